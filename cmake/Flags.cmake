@@ -1,0 +1,15 @@
+# Flags shared by every target of the project; dependencies' headers are SYSTEM and stay silent.
+add_library(lamina_flags INTERFACE)
+target_compile_options(lamina_flags INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
+  # Identity: no fused multiply-add, so every processor kind computes the same bits.
+  -ffp-contract=off
+  # Lets the compiler vectorise the kernels; neither changes a value.
+  -fno-math-errno -fno-trapping-math)
+if(LAMINA_WERROR)
+  target_compile_options(lamina_flags INTERFACE -Werror)
+endif()
+if(LAMINA_SANITIZE)
+  target_compile_options(lamina_flags INTERFACE -fsanitize=${LAMINA_SANITIZE} -fno-omit-frame-pointer)
+  target_link_options(lamina_flags INTERFACE -fsanitize=${LAMINA_SANITIZE})
+endif()

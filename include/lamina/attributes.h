@@ -1,0 +1,35 @@
+// Scalar attributes a sample or vertex carries besides position and normal: colours and anything else in the file.
+#pragma once
+#include <string>
+#include <vector>
+
+namespace lamina {
+
+enum class ScalarType { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
+
+/// Size in bytes of one value of a scalar type.
+constexpr int byte_size(ScalarType t) {
+  switch (t) {
+    case ScalarType::int8:
+    case ScalarType::uint8: return 1;
+    case ScalarType::int16:
+    case ScalarType::uint16: return 2;
+    case ScalarType::int32:
+    case ScalarType::uint32:
+    case ScalarType::float32: return 4;
+    case ScalarType::float64: return 8;
+  }
+  return 0;
+}
+
+/// One attribute. Colours are the attributes `red green blue [alpha]` in the type they came in; they are interpolated
+/// as floats in that type's own range (0-255, 0-65535 or 0-1) and rounded and clamped to it when written.
+struct AttributeSpec {
+  std::string name;
+  ScalarType type = ScalarType::float32;
+  bool operator==(const AttributeSpec&) const = default;
+};
+
+using AttributeLayout = std::vector<AttributeSpec>;
+
+}  // namespace lamina

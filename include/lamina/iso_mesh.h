@@ -1,0 +1,49 @@
+// The isosurface of one slab as it leaves extraction and enters clustering: index arrays and the corners they hang on.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+namespace lamina {
+
+/// An index into this slab's table, or (top bit set) into the next slab's: a slab's cells reach the next one's first plane.
+struct SlabIndex {
+  static constexpr std::uint32_t kNextSlab = 0x80000000u;
+  std::uint32_t bits = 0;
+  [[nodiscard]] bool next() const { return (bits & kNextSlab) != 0; }
+  [[nodiscard]] std::uint32_t index() const { return bits & ~kNextSlab; }
+  bool operator==(const SlabIndex&) const = default;
+  auto operator<=>(const SlabIndex&) const = default;
+};
+
+/// A lattice corner at an end of a minimal edge with a sign change (METHOD 3.5: the cluster's seat). Lengths are in
+/// fixed-point steps of the frame (`Frame::step`), offsets relative to the corner.
+struct SurfaceCorner {
+  std::array<std::int32_t, 3> position{};  ///< fixed-point position (x, y, z; z is the sweep axis)
+  std::array<float, 3> offset{};           ///< projected point minus corner, in steps
+  std::array<float, 3> normal{};           ///< unit normal
+  float distance = 0;                      ///< signed distance of the corner, in steps
+  float curvature = 0;                     ///< signed mean curvature of the fit, 1/steps; 0 for the plane fit
+  float cell = 0;                          ///< edge length of the finest incident cell, in steps
+};
+
+/// An isovertex: a minimal edge whose ends have different signs. Owned by the slab that holds the edge's lower end.
+struct IsoVertex {
+  SlabIndex low, high;  ///< SurfaceCorner at the lower and upper end
+  float t = 0.5F;       ///< position along the edge from low to high, in (0, 1)
+  std::uint8_t axis = 0;
+  std::uint8_t level = 0;
+  bool near_high = false;  ///< belongs to the cluster of the upper end (t > 0.5)
+};
+
+using IsoTriangle = std::array<SlabIndex, 3>;  ///< counter-clockwise seen from outside (positive side)
+
+struct IsoSlab {
+  std::int64_t slab = 0;
+  std::vector<SurfaceCorner> corners;                  ///< in canonical order (level, tile, corner)
+  std::vector<std::vector<float>> corner_attributes;   ///< one array per attribute, parallel to corners
+  std::vector<IsoVertex> vertices;                     ///< in canonical order
+  std::vector<IsoTriangle> triangles;                  ///< of the slab's cells, in canonical order
+};
+
+}  // namespace lamina

@@ -1,0 +1,46 @@
+// Point files, read in batches of rows: one implementation per format under src/points/.
+#pragma once
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "lamina/attributes.h"
+#include "lamina/sample.h"
+
+namespace lamina {
+
+struct PointSourceInfo {
+  std::string path;           ///< as given by the user, for messages
+  std::uint64_t count = 0;    ///< rows the header promises
+  bool has_normals = false;   ///< nx ny nz all present
+  bool has_radius = false;    ///< radius (or pscale)
+  bool has_quality = false;   ///< quality, else confidence
+  bool random_access = false; ///< read() may be called for any row, from several threads
+  bool double_precision = false;  ///< positions are stored as float64
+  AttributeLayout attributes; ///< every other scalar property of the points, file order (colours keep their type)
+};
+
+class PointSource {
+ public:
+  virtual ~PointSource() = default;
+  PointSource(const PointSource&) = delete;
+  PointSource& operator=(const PointSource&) = delete;
+  [[nodiscard]] const PointSourceInfo& info() const { return info_; }
+
+  /// Reads rows [first, first + count) clipped to info().count into `out` (resized, arrays reused). Values come as they
+  /// stand in the file: non-finite coordinates are the caller's to judge. Sequential sources (random_access == false)
+  /// want first == the row after the last one read, or 0 to start over.
+  /// Throws Error(unreadable) naming file, row or line, and what is wrong.
+  virtual void read(std::uint64_t first, std::size_t count, SampleBatch& out) = 0;
+
+ protected:
+  PointSource() = default;
+  PointSourceInfo info_;
+};
+
+/// Opens a point file by its content (PLY so far). Throws Error(unreadable): missing file, directory, empty file,
+/// not a PLY, malformed header, no vertex element, no x y z, list property among the point's properties,
+/// binary file shorter than the header's counts promise (or longer where nothing follows).
+std::unique_ptr<PointSource> open_points(const std::string& path);
+
+}  // namespace lamina

@@ -1,0 +1,21 @@
+// Samples as they come from a file, in the input's own coordinates.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace lamina {
+
+/// Structure of arrays; every non-empty array has size() entries. Reused between reads to keep its memory.
+struct SampleBatch {
+  std::uint64_t first = 0;                     ///< row number in the input of the first sample
+  std::vector<double> x, y, z;                 ///< positions, input coordinates
+  std::vector<float> nx, ny, nz;               ///< normals as read (any length), empty when the source has none
+  std::vector<float> radius;                   ///< influence radius, input units; empty when the source has none
+  std::vector<float> quality;                  ///< quality or confidence; empty when the source has none
+  std::vector<std::vector<float>> attributes;  ///< one array per attribute of the source's layout
+
+  [[nodiscard]] std::size_t size() const { return x.size(); }
+};
+
+}  // namespace lamina

@@ -1,0 +1,78 @@
+// The out-of-core store: samples bucketed along the sweep axis, Blosc-compressed blocks in one temporary file.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "lamina/attributes.h"
+
+namespace lamina {
+
+/// Samples in fixed-point local coordinates; arrays are parallel, optional ones empty.
+struct LocalSamples {
+  std::vector<std::int32_t> x, y, z;           ///< steps of the frame
+  std::vector<float> nx, ny, nz;               ///< unit normals in the local frame
+  std::vector<float> radius;                   ///< influence radius in steps, when the input gave one
+  std::vector<float> quality;                  ///< when the input gave one
+  std::vector<std::vector<float>> attributes;  ///< one array per attribute
+  [[nodiscard]] std::size_t size() const { return x.size(); }
+  void clear();
+  void reserve(std::size_t n);
+};
+
+struct StoreLayout {
+  bool has_radius = false;
+  bool has_quality = false;
+  AttributeLayout attributes;  ///< stored in their own type: 8-bit colours cost a byte
+};
+
+struct StoreSettings {
+  std::string directory;                       ///< where the temporary file goes
+  std::int32_t z_min = 0;                      ///< bucket 0 begins here; lower samples go to bucket 0
+  std::int32_t bucket_height = 1;              ///< steps, > 0
+  std::size_t buckets = 1;                     ///< samples above the last bucket go to the last
+  std::size_t buffer_bytes = 32u << 20;        ///< memory for all unwritten samples together
+};
+
+/// What the finished store holds. Order inside a bucket is the order of append().
+class SlabStore {
+ public:
+  ~SlabStore();
+  SlabStore(SlabStore&&) noexcept;
+  SlabStore& operator=(SlabStore&&) noexcept;
+  [[nodiscard]] std::size_t buckets() const;
+  [[nodiscard]] std::uint64_t count(std::size_t bucket) const;
+  [[nodiscard]] std::int32_t z_lower(std::size_t bucket) const;  ///< smallest z stored in the bucket (exact)
+  [[nodiscard]] std::int32_t z_upper(std::size_t bucket) const;  ///< largest z stored in the bucket (exact)
+  [[nodiscard]] std::uint64_t total() const;
+  [[nodiscard]] std::uint64_t disk_bytes() const;
+  /// Decompresses one bucket into `out`; safe from several threads. Throws Error(budget) on a read failure.
+  void read(std::size_t bucket, LocalSamples& out) const;
+
+ private:
+  friend class SlabStoreWriter;
+  struct Impl;
+  explicit SlabStore(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Fills a store. The temporary file is unlinked at creation, so it is gone whatever happens.
+class SlabStoreWriter {
+ public:
+  /// Throws Error(budget) when the directory does not exist or cannot be written, naming it.
+  SlabStoreWriter(StoreLayout layout, StoreSettings settings);
+  ~SlabStoreWriter();
+  SlabStoreWriter(const SlabStoreWriter&) = delete;
+  SlabStoreWriter& operator=(const SlabStoreWriter&) = delete;
+  /// Appends samples in order. Throws Error(budget) when the disk is full, naming directory and bytes written.
+  void append(const LocalSamples& samples);
+  SlabStore finish();
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace lamina
