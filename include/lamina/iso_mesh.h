@@ -6,7 +6,8 @@
 
 namespace lamina {
 
-/// An index into this slab's table, or (top bit set) into the next slab's: a slab's cells reach the next one's first plane.
+/// An index into this slab's table, or (top bit set) into the next slab's: a slab's cells reach the next one's first
+/// plane.
 struct SlabIndex {
   static constexpr std::uint32_t kNextSlab = 0x80000000u;
   std::uint32_t bits = 0;
@@ -40,10 +41,10 @@ using IsoTriangle = std::array<SlabIndex, 3>;  ///< counter-clockwise seen from 
 
 struct IsoSlab {
   std::int64_t slab = 0;
-  std::vector<SurfaceCorner> corners;                  ///< in canonical order (level, tile, corner)
-  std::vector<std::vector<float>> corner_attributes;   ///< one array per attribute, parallel to corners
-  std::vector<IsoVertex> vertices;                     ///< in canonical order
-  std::vector<IsoTriangle> triangles;                  ///< of the slab's cells, in canonical order
+  std::vector<SurfaceCorner> corners;                 ///< in canonical order (level, tile, corner)
+  std::vector<std::vector<float>> corner_attributes;  ///< one array per attribute, parallel to corners
+  std::vector<IsoVertex> vertices;                    ///< in canonical order
+  std::vector<IsoTriangle> triangles;                 ///< of the slab's cells, in canonical order
 };
 
 }  // namespace lamina

@@ -11,8 +11,8 @@ namespace lamina {
 
 struct TriangleMesh {
   std::vector<std::array<double, 3>> positions;
-  std::vector<std::array<float, 3>> normals;            ///< per vertex, empty or one each
-  AttributeLayout layout;                               ///< names and types of `attributes`; colours as in attributes.h
+  std::vector<std::array<float, 3>> normals;  ///< per vertex, empty or one each
+  AttributeLayout layout;                     ///< names and types of `attributes`; colours as in attributes.h
   std::vector<std::vector<float>> attributes;
   std::vector<std::array<std::uint32_t, 3>> triangles;  ///< polygons come triangulated
 };

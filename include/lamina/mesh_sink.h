@@ -21,10 +21,10 @@ struct VertexBatch {
 };
 
 struct MeshSinkSettings {
-  std::string path;                ///< final name; "-" is standard output
-  std::string tmp_dir;             ///< for the face file; empty: next to the output
-  AttributeLayout attributes;      ///< written after the normals in their own types
-  bool double_positions = false;   ///< `property double x` where float would lose precision
+  std::string path;               ///< final name; "-" is standard output
+  std::string tmp_dir;            ///< for the face file; empty: next to the output
+  AttributeLayout attributes;     ///< written after the normals in their own types
+  bool double_positions = false;  ///< `property double x` where float would lose precision
   std::vector<std::string> comments;
 };
 
@@ -38,7 +38,8 @@ class MeshSink {
   MeshSink(const MeshSink&) = delete;
   MeshSink& operator=(const MeshSink&) = delete;
   void append_vertices(const VertexBatch& batch);
-  /// Vertex indices are global (order of append_vertices). More than 2^31 - 1 vertices need uint indices (up to 2^32 - 1).
+  /// Vertex indices are global (order of append_vertices). More than 2^31 - 1 vertices need uint indices (up to 2^32 -
+  /// 1).
   void append_triangles(const std::vector<std::array<std::uint32_t, 3>>& triangles);
   [[nodiscard]] std::uint64_t vertices() const;
   [[nodiscard]] std::uint64_t triangles() const;

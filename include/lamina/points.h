@@ -10,14 +10,14 @@
 namespace lamina {
 
 struct PointSourceInfo {
-  std::string path;           ///< as given by the user, for messages
-  std::uint64_t count = 0;    ///< rows the header promises
-  bool has_normals = false;   ///< nx ny nz all present
-  bool has_radius = false;    ///< radius (or pscale)
-  bool has_quality = false;   ///< quality, else confidence
-  bool random_access = false; ///< read() may be called for any row, from several threads
+  std::string path;               ///< as given by the user, for messages
+  std::uint64_t count = 0;        ///< rows the header promises
+  bool has_normals = false;       ///< nx ny nz all present
+  bool has_radius = false;        ///< radius (or pscale)
+  bool has_quality = false;       ///< quality, else confidence
+  bool random_access = false;     ///< read() may be called for any row, from several threads
   bool double_precision = false;  ///< positions are stored as float64
-  AttributeLayout attributes; ///< every other scalar property of the points, file order (colours keep their type)
+  AttributeLayout attributes;     ///< every other scalar property of the points, file order (colours keep their type)
 };
 
 class PointSource {

@@ -29,11 +29,11 @@ struct StoreLayout {
 };
 
 struct StoreSettings {
-  std::string directory;                       ///< where the temporary file goes
-  std::int32_t z_min = 0;                      ///< bucket 0 begins here; lower samples go to bucket 0
-  std::int32_t bucket_height = 1;              ///< steps, > 0
-  std::size_t buckets = 1;                     ///< samples above the last bucket go to the last
-  std::size_t buffer_bytes = 32u << 20;        ///< memory for all unwritten samples together
+  std::string directory;                 ///< where the temporary file goes
+  std::int32_t z_min = 0;                ///< bucket 0 begins here; lower samples go to bucket 0
+  std::int32_t bucket_height = 1;        ///< steps, > 0
+  std::size_t buckets = 1;               ///< samples above the last bucket go to the last
+  std::size_t buffer_bytes = 32u << 20;  ///< memory for all unwritten samples together
 };
 
 /// What the finished store holds. Order inside a bucket is the order of append().
