@@ -60,13 +60,16 @@ struct LayerNumbers {
 
 struct CornerBlock {
   // Cells of the octree. A cell of this level exists when its parent is split (or at the coarsest level when touched).
-  BlockMask touched;  ///< cells that a sample of this level reaches
+  BlockMask home;     ///< cells that hold a sample of this level
+  BlockMask touched;  ///< cells that a sample of this level reaches: within two cells of its home
+  BlockMask close;    ///< cells within one cell of the home of a sample of this or a coarser level
   BlockMask reached;  ///< cells that a sample of this or a coarser level reaches
   BlockMask split;    ///< subdivided cells
   BlockMask cells;    ///< leaf cells that take part: existing, not split, reached by a sample
 
   // Corners.
   BlockMask corners;   ///< of the leaf cells in `cells`, of this level
+  BlockMask shared;    ///< subset of corners: held by a finer level too, whose value counts
   BlockMask near;      ///< corners that carry values (CornerValues): close enough to samples to be projected
   BlockMask seen;      ///< subset of near: samples contributed; an edge with such an end is valid
   BlockMask good;      ///< subset of seen: own value is trusted; other corners are extended from good neighbours

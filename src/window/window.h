@@ -29,9 +29,15 @@ struct Tile {
   CornerBlock* leaf = nullptr;
 };
 
+/// Cross-section of the cloud in fixed-point steps, inclusive.
+struct Bounds {
+  std::int32_t x_min = 0, x_max = -1, y_min = 0, y_max = -1;
+};
+
 class Window {
  public:
-  Window(const Lattice& lattice, int attributes);
+  /// `bounds`: where leaves are expected across the sweep axis; lookups inside take a table instead of the tree.
+  Window(const Lattice& lattice, int attributes, const Bounds& bounds = {});
   ~Window();
   Window(const Window&) = delete;
   Window& operator=(const Window&) = delete;
@@ -49,6 +55,10 @@ class Window {
   [[nodiscard]] CornerBlock* probe(int level, const Block& b);
   /// The leaf, made if absent. One thread at a time.
   CornerBlock& touch(int level, const Block& b);
+  /// Makes room for the leaves of a slab, before touch_shared() there.
+  void cover(std::int32_t slab);
+  /// touch() from several threads at once (all of them through this function, nobody probing), in covered slabs.
+  CornerBlock& touch_shared(int level, const Block& b);
   /// The level's leaves that hold layers of a slab, in canonical order (z, y, x).
   [[nodiscard]] std::vector<Tile> tiles(int level, std::int32_t slab) const;
   /// Frees the values of a slab's corners; masks stay.
