@@ -6,6 +6,9 @@
 
 int main(int argc, char** argv) {
   CLI::App app{"Lamina: streaming surface reconstruction from oriented points", "lamina"};
+  lamina::tools::add_scatter(app);
+  lamina::tools::add_compare(app);
+  lamina::tools::add_check(app);
   app.require_subcommand(1);
   try {
     app.parse(argc, argv);
