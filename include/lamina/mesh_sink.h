@@ -22,19 +22,11 @@ struct VertexBatch {
 };
 
 struct MeshSinkSettings {
-<<<<<<< HEAD
-  std::string path;               ///< final name; "-" is standard output
-  std::string tmp_dir;            ///< for the face file; empty: next to the output
-  AttributeLayout attributes;     ///< written after the normals in their own types
-  bool double_positions = false;  ///< `property double x` where float would lose precision
-  std::vector<std::string> comments;
-=======
   std::string path;            ///< final name; "-" is standard output; links are followed, pipes and devices written to
   std::string tmp_dir;         ///< for the face file; empty: next to the output (standard output: the system's)
   AttributeLayout attributes;  ///< written after the normals in their own types; integers are rounded and clamped
   bool double_positions = false;      ///< `property double x` where float would lose precision
   std::vector<std::string> comments;  ///< one header line each, beside the signature
->>>>>>> frame
 };
 
 /// Binary little-endian PLY: x y z nx ny nz and the attributes per vertex, `list uchar int vertex_indices` per face.
@@ -54,13 +46,8 @@ class MeshSink {
   /// Throws Error(internal) naming the vertex when a number is not finite (or too large for its float property) or the
   /// arrays differ in length, Error(budget) naming path and reason when the disk is full.
   void append_vertices(const VertexBatch& batch);
-<<<<<<< HEAD
-  /// Vertex indices are global (order of append_vertices). More than 2^31 - 1 vertices need uint indices (up to 2^32 -
-  /// 1).
-=======
   /// Vertex indices are global (order of append_vertices) and may run ahead of the vertices appended so far; commit()
   /// throws Error(internal) when one of them never came. Errors as append_vertices.
->>>>>>> frame
   void append_triangles(const std::vector<std::array<std::uint32_t, 3>>& triangles);
   [[nodiscard]] std::uint64_t vertices() const;
   [[nodiscard]] std::uint64_t triangles() const;

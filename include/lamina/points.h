@@ -13,17 +13,10 @@ struct PointSourceInfo {
   std::string path;               ///< as given by the user, for messages
   std::uint64_t count = 0;        ///< rows the header promises
   bool has_normals = false;       ///< nx ny nz all present
-<<<<<<< HEAD
-  bool has_radius = false;        ///< radius (or pscale)
-  bool has_quality = false;       ///< quality, else confidence
-  bool random_access = false;     ///< read() may be called for any row, from several threads
-  bool double_precision = false;  ///< positions are stored as float64
-=======
   bool has_radius = false;        ///< radius, else pscale
   bool has_quality = false;       ///< quality, else confidence
   bool random_access = false;     ///< read() may be called for any row, from several threads
   bool double_precision = false;  ///< positions are declared float64
->>>>>>> frame
   AttributeLayout attributes;     ///< every other scalar property of the points, file order (colours keep their type)
 };
 
