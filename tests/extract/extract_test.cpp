@@ -84,9 +84,24 @@ struct Case {
   }
 };
 
-void expect_closed(Case& c) {
+/// What a run of cases has seen, so that none of them tests nothing.
+struct Coverage {
+  std::uint64_t triangles = 0, general = 0, centres = 0, rejected = 0, separated = 0;
+  std::size_t boundary = 0;
+  void add(const WholeMesh& mesh, const MeshFacts& facts) {
+    triangles += mesh.triangles.size();
+    general += mesh.counts.general_cells;
+    rejected += mesh.counts.rejected_loops;
+    separated += mesh.counts.separated_vertices;
+    boundary += facts.boundary.size();
+    for (const IsoVertex& v : mesh.vertices) centres += v.axis == IsoVertex::kCentre ? 1 : 0;
+  }
+};
+
+void expect_closed(Case& c, Coverage& coverage) {
   const WholeMesh mesh = c.mesh();
   const MeshFacts facts = check_mesh(mesh.triangles);
+  coverage.add(mesh, facts);
   ASSERT_TRUE(facts.is_closed_manifold())
       << "seed " << c.seed << " kind " << c.kind << " levels " << c.octree.levels() << ": degenerate "
       << facts.degenerate << " duplicates " << facts.duplicates << " complex " << facts.complex_edges << " fans "
@@ -99,9 +114,10 @@ void expect_closed(Case& c) {
   }
 }
 
-void expect_manifold(Case& c) {
+void expect_manifold(Case& c, Coverage& coverage) {
   const WholeMesh mesh = c.mesh();
   const MeshFacts facts = check_mesh(mesh.triangles);
+  coverage.add(mesh, facts);
   ASSERT_TRUE(facts.is_manifold()) << "seed " << c.seed << " kind " << c.kind << " levels " << c.octree.levels()
                                    << ": degenerate " << facts.degenerate << " duplicates " << facts.duplicates
                                    << " complex " << facts.complex_edges << " fans " << facts.several_fans;
@@ -111,31 +127,43 @@ void expect_manifold(Case& c) {
 }
 
 TEST(Extract, ClosedOnRandomOctreesOfFourLevels) {
+  Coverage coverage;
   for (std::uint64_t seed = 0; seed < 8000; ++seed) {
     Case c = Case::make(seed, 1 + static_cast<int>(seed % 4),
                         {1 + static_cast<int>(seed % 2), 1, 1 + static_cast<int>(seed % 3)});
-    expect_closed(c);
+    expect_closed(c, coverage);
     if (HasFatalFailure()) return;
   }
+  EXPECT_GT(coverage.triangles, 1000000U);
+  EXPECT_GT(coverage.general, 50000U);
+  EXPECT_GT(coverage.centres, 1000U);
 }
 
 TEST(Extract, ClosedOnRandomOctreesOfSixLevels) {
+  Coverage coverage;
   for (std::uint64_t seed = 0; seed < 500; ++seed) {
     Case c = Case::make(seed + 100000, 5 + static_cast<int>(seed % 2), {1, 1, 1 + static_cast<int>(seed % 2)});
-    expect_closed(c);
+    expect_closed(c, coverage);
     if (HasFatalFailure()) return;
   }
+  EXPECT_GT(coverage.triangles, 1000000U);
+  EXPECT_GT(coverage.general, 50000U);
+  EXPECT_GT(coverage.centres, 1000U);
 }
 
 TEST(Extract, ManifoldWithBoundaryWhereCornersAreUnseenOrCellsMissing) {
+  Coverage coverage;
   for (std::uint64_t seed = 0; seed < 4000; ++seed) {
     Case c = Case::make(seed + 200000, 1 + static_cast<int>(seed % 4),
                         {1 + static_cast<int>(seed % 2), 2, 1 + static_cast<int>(seed % 3)});
     if (seed % 3 != 0) c.unseen = 0.2 + 0.15 * static_cast<double>(seed % 5);
     if (seed % 3 != 1) c.drop_cells(0.05 + 0.1 * static_cast<double>(seed % 4));
-    expect_manifold(c);
+    expect_manifold(c, coverage);
     if (HasFatalFailure()) return;
   }
+  EXPECT_GT(coverage.rejected, 100000U);
+  EXPECT_GT(coverage.separated, 1000U);
+  EXPECT_GT(coverage.boundary, 100000U);
 }
 
 TEST(Extract, SurfaceDoesNotDependOnSlabHeight) {
