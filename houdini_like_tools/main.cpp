@@ -1,23 +1,15 @@
 // The program: one sub-command per tool.
-#include <fmt/format.h>
-
-#include "lamina/error.h"
+#include "command_line.h"
 #include "tool.h"
 
 int main(int argc, char** argv) {
-  CLI::App app{"Lamina: streaming surface reconstruction from oriented points", "lamina"};
-  app.require_subcommand(1);
-  try {
-    app.parse(argc, argv);
-    return static_cast<int>(lamina::ExitCode::ok);
-  } catch (const CLI::ParseError& e) {
-    const int code = app.exit(e);
-    return code == 0 ? 0 : static_cast<int>(lamina::ExitCode::usage);
-  } catch (const lamina::Error& e) {
-    fmt::print(stderr, "lamina: {}\n", e.what());
-    return static_cast<int>(e.code());
-  } catch (const std::exception& e) {
-    fmt::print(stderr, "lamina: internal error: {}\n", e.what());
-    return static_cast<int>(lamina::ExitCode::internal);
-  }
+  using namespace lamina::tools;
+  const std::vector<AddTool> tools{
+      // clang-format off: one tool a line, in the order of the help
+      add_scatter,
+      add_compare,
+      add_check,
+      // clang-format on
+  };
+  return run_program(argc, argv, tools);
 }

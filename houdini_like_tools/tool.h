@@ -1,11 +1,11 @@
-// A sub-command of `lamina`: options in, settings out. Each tool is one file and registers itself in main.cpp's list.
+// A sub-command of `lamina`: options in, settings out. Each tool is one file and stands in main.cpp's list.
 #pragma once
 #include <CLI/CLI.hpp>
-#include <functional>
 
 namespace lamina::tools {
 
-/// Adds the sub-command's options to `app` and sets its callback; the callback throws lamina::Error.
+/// Adds the tool's sub-command to the program `app`: name, options in groups, and a callback that does the work.
+/// The callback throws lamina::Error; options shared by tools come from console.h.
 void add_surface(CLI::App& app);
 void add_scatter(CLI::App& app);
 void add_compare(CLI::App& app);

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -21,34 +22,49 @@ struct VertexBatch {
 };
 
 struct MeshSinkSettings {
-  std::string path;               ///< final name; "-" is standard output
-  std::string tmp_dir;            ///< for the face file; empty: next to the output
-  AttributeLayout attributes;     ///< written after the normals in their own types
-  bool double_positions = false;  ///< `property double x` where float would lose precision
-  std::vector<std::string> comments;
+  std::string path;            ///< final name; "-" is standard output; links are followed, pipes and devices written to
+  std::string tmp_dir;         ///< for the face file; empty: next to the output (standard output: the system's)
+  AttributeLayout attributes;  ///< written after the normals in their own types; integers are rounded and clamped
+  bool double_positions = false;      ///< `property double x` where float would lose precision
+  std::vector<std::string> comments;  ///< one header line each, beside the signature
 };
 
-/// Binary little-endian PLY. Bytes depend on the appended data alone, not on how it was split into batches.
+/// Binary little-endian PLY: x y z nx ny nz and the attributes per vertex, `list uchar int vertex_indices` per face.
+/// Bytes depend on the appended data alone, not on how it was split into batches. Keeps half a megabyte, whatever the
+/// size. One thread at a time. After an error only destruction is left.
+///
+/// Until commit() the vertices lie in a hidden file beside the output (.NAME.partial-PID), the faces in an unnamed one.
 class MeshSink {
  public:
-  /// Creates the files. Throws Error(budget) naming path and reason when the output's folder cannot be written,
-  /// or the path is a directory.
+  /// Creates the files. Throws Error(budget) naming path and reason when the output's folder is missing or cannot be
+  /// written, the path is a directory or a file that may not be replaced; Error(usage) when standard output is a
+  /// terminal; Error(internal) for attribute names a PLY cannot hold.
   explicit MeshSink(MeshSinkSettings settings);
   ~MeshSink();  ///< without commit(): removes everything it made
   MeshSink(const MeshSink&) = delete;
   MeshSink& operator=(const MeshSink&) = delete;
+  /// Throws Error(internal) naming the vertex when a number is not finite (or too large for its float property) or the
+  /// arrays differ in length, Error(budget) naming path and reason when the disk is full.
   void append_vertices(const VertexBatch& batch);
-  /// Vertex indices are global (order of append_vertices). More than 2^31 - 1 vertices need uint indices (up to 2^32 -
-  /// 1).
+  /// Vertex indices are global (order of append_vertices) and may run ahead of the vertices appended so far; commit()
+  /// throws Error(internal) when one of them never came. Errors as append_vertices.
   void append_triangles(const std::vector<std::array<std::uint32_t, 3>>& triangles);
   [[nodiscard]] std::uint64_t vertices() const;
   [[nodiscard]] std::uint64_t triangles() const;
-  /// Fills in the header, appends the faces, renames to the final name. Throws Error(budget) on disk full.
+  /// Fills in the header (`uint` indices where more than 2^31 - 1 vertices need them; up to 2^32 - 1), appends the
+  /// faces, renames to the final name. Throws Error(budget) on disk full; the output's name is untouched then.
   void commit();
 
  private:
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// The comment every sink writes first: "made by lamina VERSION".
+std::string sink_signature();
+
+/// The version of the lamina that wrote a PLY file, from its signature; nothing for files of other programs.
+/// Throws Error(unreadable) when the file cannot be opened.
+std::optional<std::string> read_sink_signature(const std::string& path);
 
 }  // namespace lamina

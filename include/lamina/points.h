@@ -13,10 +13,10 @@ struct PointSourceInfo {
   std::string path;               ///< as given by the user, for messages
   std::uint64_t count = 0;        ///< rows the header promises
   bool has_normals = false;       ///< nx ny nz all present
-  bool has_radius = false;        ///< radius (or pscale)
+  bool has_radius = false;        ///< radius, else pscale
   bool has_quality = false;       ///< quality, else confidence
   bool random_access = false;     ///< read() may be called for any row, from several threads
-  bool double_precision = false;  ///< positions are stored as float64
+  bool double_precision = false;  ///< positions are declared float64
   AttributeLayout attributes;     ///< every other scalar property of the points, file order (colours keep their type)
 };
 
@@ -38,9 +38,18 @@ class PointSource {
   PointSourceInfo info_;
 };
 
-/// Opens a point file by its content (PLY so far). Throws Error(unreadable): missing file, directory, empty file,
-/// not a PLY, malformed header, no vertex element, no x y z, list property among the point's properties,
-/// binary file shorter than the header's counts promise (or longer where nothing follows).
-std::unique_ptr<PointSource> open_points(const std::string& path);
+/// Opens a point file by its content (PLY so far: ascii, binary little and big endian). "-" is standard input; it and
+/// other pipes are first spooled to an unlinked file in `tmp_dir` (empty: the system's temporary folder).
+///
+/// Properties of element `vertex`: x y z; nx ny nz; radius (else pscale); quality (else confidence); every other one is
+/// an attribute, carried as float: integers beyond 2^24 and doubles are rounded to it. Positions in an ascii file keep
+/// all their digits even where the header says float, as georeferenced ones need them. Binary files are random_access
+/// and never mapped: resident memory does not grow with the file.
+///
+/// Throws Error(unreadable) naming the file and the place: missing file, directory, empty file, not a PLY, malformed
+/// header, no vertex element, no x y z, an incomplete normal, a property named twice, a list among the vertex's
+/// properties, a file shorter or longer than the header's counts promise (ascii: known when the last row is read).
+/// Throws Error(budget) when `tmp_dir` cannot take the spooled input.
+std::unique_ptr<PointSource> open_points(const std::string& path, const std::string& tmp_dir = {});
 
 }  // namespace lamina

@@ -1,76 +1,80 @@
 #include "project/corner_value.h"
 
 #include <cmath>
-#include <cstdlib>
+#include <utility>
 
 namespace lamina {
 namespace {
 
-bool read_good(const Window& window, int level, const Cell& c, CornerValue& out, float* attributes) {
-  const CornerBlock* block = window.probe(level, block_of(c));
-  const int offset = offset_in_block(c);
-  if (block == nullptr || !block->near.test(offset) || !block->good.test(offset)) return false;
-  const CornerValues& values = block->values[window.brick_of(level, offset >> 6)];
-  const std::uint32_t i = block->value_index(offset, window.brick_layers(level));
+struct Place {
+  const CornerBlock* block;
+  int offset;
+};
+
+Place place_of(const Window& window, int level, const Cell& corner) {
+  return {window.probe(level, block_of(corner)), offset_in_block(corner)};
+}
+
+/// Own value; the corner must be near and its slab projected.
+void own_value(const Window& window, int level, const Place& p, CornerValue& out, float* attributes, float weight) {
+  const CornerValues& values = p.block->values[window.brick_of(level, p.offset >> 6)];
+  const std::uint32_t i = p.block->value_index(p.offset, window.brick_layers(level));
   out.distance = values.channel(kDistance)[i];
   out.normal = {values.channel(kNormalX)[i], values.channel(kNormalY)[i], values.channel(kNormalZ)[i]};
   out.curvature = values.channel(kCurvature)[i];
   out.reach = values.channel(kReach)[i];
-  if (attributes != nullptr) {
-    for (int a = 0; a < window.attributes(); ++a) attributes[a] = values.channel(kFirstAttribute + a)[i];
-  }
-  return true;
+  if (attributes == nullptr) return;
+  for (int c = 0; c < window.attributes(); ++c) attributes[c] += weight * values.channel(kFirstAttribute + c)[i];
+}
+
+bool has_values(const Window& window, int level, const Place& p) {
+  return p.block->values[window.brick_of(level, p.offset >> 6)].count != 0;
 }
 
 }  // namespace
 
 bool corner_value(const Window& window, int level, const Cell& corner, CornerValue& out, float* attributes) {
-  int finest = level;
-  Cell c = corner;
-  Cell at = corner;
-  for (int l = level; l-- > 0;) {
-    at = {at.x * 2, at.y * 2, at.z * 2};
-    const CornerBlock* block = window.probe(l, block_of(at));
-    if (block == nullptr || !block->corners.test(offset_in_block(at))) continue;
-    finest = l;
-    c = at;
+  const Place here = place_of(window, level, corner);
+  if (here.block->shared.test(here.offset)) {
+    return corner_value(window, level - 1, {corner.x * 2, corner.y * 2, corner.z * 2}, out, attributes);
   }
-  if (read_good(window, finest, c, out, attributes)) return true;
-
-  const auto cell = static_cast<float>(window.lattice().cell_size(finest));
-  std::vector<float> extra(static_cast<std::size_t>(window.attributes()));
-  std::vector<float> sums(extra.size());
+  for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] = 0;
+  if (here.block->good.test(here.offset) && has_values(window, level, here)) {
+    own_value(window, level, here, out, attributes, 1);
+    return true;
+  }
+  const auto cell = static_cast<float>(window.lattice().cell_size(level));
   CornerValue sum;
-  float weight = 0;
-  for (int z = -1; z <= 1; ++z) {
-    for (int y = -1; y <= 1; ++y) {
-      for (int x = -1; x <= 1; ++x) {
+  float total = 0;
+  for (int dz = -1; dz <= 1; ++dz) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const int m = (dx != 0) + (dy != 0) + (dz != 0);
+        if (m == 0) continue;
+        const Place p = place_of(window, level, corner + Cell{dx, dy, dz});
+        if (p.block == nullptr || !p.block->good.test(p.offset) || !has_values(window, level, p)) continue;
+        const float w = 1.0F / static_cast<float>(m * m);
         CornerValue v;
-        if ((x | y | z) == 0 || !read_good(window, finest, c + Cell{x, y, z}, v, extra.data())) continue;
-        const auto m = static_cast<float>(std::abs(x) + std::abs(y) + std::abs(z));
-        const float w = 1 / (m * m);
-        const std::array<int, 3> step{-x, -y, -z};
-        float d = v.distance;
-        for (int i = 0; i < 3; ++i) {
-          d += v.normal[i] * static_cast<float>(step[i]) * cell;
-          sum.normal[i] += w * v.normal[i];
-        }
-        sum.distance += w * d;
+        own_value(window, level, p, v, attributes, w);
+        sum.distance +=
+            w * (v.distance - cell * (v.normal[0] * static_cast<float>(dx) + v.normal[1] * static_cast<float>(dy) +
+                                      v.normal[2] * static_cast<float>(dz)));
+        for (int k = 0; k < 3; ++k) sum.normal[k] += w * v.normal[k];
         sum.curvature += w * v.curvature;
-        weight += w;
-        for (std::size_t a = 0; a < sums.size(); ++a) sums[a] += w * extra[a];
+        total += w;
       }
     }
   }
-  const float length = std::hypot(sum.normal[0], sum.normal[1], sum.normal[2]);
-  if (weight <= 0 || length <= 0) return false;
-  out.distance = sum.distance / weight;
-  for (int i = 0; i < 3; ++i) out.normal[i] = sum.normal[i] / length;
-  out.curvature = sum.curvature / weight;
+  if (total <= 0) return false;
+  const float inv = 1.0F / total;
+  const float length =
+      std::sqrt(sum.normal[0] * sum.normal[0] + sum.normal[1] * sum.normal[1] + sum.normal[2] * sum.normal[2]);
+  if (!(length > 1e-6F)) return false;
+  out.distance = sum.distance * inv;
+  for (int k = 0; k < 3; ++k) out.normal[k] = sum.normal[k] / length;
+  out.curvature = sum.curvature * inv;
   out.reach = 0;
-  if (attributes != nullptr) {
-    for (std::size_t a = 0; a < sums.size(); ++a) attributes[a] = sums[a] / weight;
-  }
+  for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] *= inv;
   return true;
 }
 

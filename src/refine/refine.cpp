@@ -65,7 +65,7 @@ void touch_around(Window& window, int level, std::int32_t slab, BlockMask Corner
     for (const Tile& t : window.tiles(level, s)) {
       if (t.block.z <= done) continue;  // slabs share leaves at coarse levels
       const BlockMask& m = t.leaf->*mask;
-      std::uint64_t low = 0;   // bits of layers that reach down into the slab's layers from above, and so on
+      std::uint64_t low = 0;  // bits of layers that reach down into the slab's layers from above, and so on
       std::array<std::uint64_t, 3> by_target{};
       for (int z = 0; z < 8; ++z) {
         if (m.words[z] == 0) continue;
@@ -96,7 +96,9 @@ void touch_around(Window& window, int level, std::int32_t slab, BlockMask Corner
   for (const Block& b : wanted) window.touch(level, b);
 }
 
-Block parent_block(const Block& b) { return {b.x >> 1, b.y >> 1, b.z >> 1}; }
+Block parent_block(const Block& b) {
+  return {b.x >> 1, b.y >> 1, b.z >> 1};
+}
 
 /// Word z of the child block's view of a parent mask.
 std::uint64_t from_parent(const BlockMask& parent, const Block& child, int z) {
@@ -135,7 +137,8 @@ void inherit(Window& window, int level, std::int32_t slab) {
   for (const Tile& t : window.tiles(parent_level, slab)) {
     const LeafLayers layers = leaf_layers(window, parent_level, slab, t.block);
     for (int octant = 0; octant < 8; ++octant) {
-      const Block child{t.block.x * 2 + (octant & 1), t.block.y * 2 + ((octant >> 1) & 1), t.block.z * 2 + (octant >> 2)};
+      const Block child{t.block.x * 2 + (octant & 1), t.block.y * 2 + ((octant >> 1) & 1),
+                        t.block.z * 2 + (octant >> 2)};
       std::uint64_t any = 0;
       const int oz = (octant >> 2) * 4;
       for (int z = std::max(layers.begin, oz); z < std::min(layers.end, oz + 4); ++z) {

@@ -8,7 +8,9 @@
 namespace lamina::bits {
 
 /// Columns x < n of every row.
-constexpr std::uint64_t columns_below(int n) { return n >= 8 ? ~std::uint64_t{0} : 0x0101010101010101ULL * ((1ULL << n) - 1); }
+constexpr std::uint64_t columns_below(int n) {
+  return n >= 8 ? ~std::uint64_t{0} : 0x0101010101010101ULL * ((1ULL << n) - 1);
+}
 
 /// Row shift: result row y is the source's row y - d; rows come in from the neighbouring words below (y - 1) and above.
 constexpr std::uint64_t shift_y(std::uint64_t below, std::uint64_t here, std::uint64_t above, int d) {

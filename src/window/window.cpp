@@ -11,7 +11,9 @@
 namespace lamina {
 namespace {
 
-openvdb::Coord leaf_origin(const Block& b) { return {b.z * 8, b.y * 8, b.x * 8}; }
+openvdb::Coord leaf_origin(const Block& b) {
+  return {b.z * 8, b.y * 8, b.x * 8};
+}
 
 /// Beyond this many entries a layer's lookup table costs more memory than it saves time.
 constexpr std::int64_t kTableLimit = std::int64_t{1} << 22;
@@ -51,7 +53,8 @@ struct Window::Trees {
     const std::int32_t x = b.x - level.x0;
     const std::int32_t y = b.y - level.y0;
     const std::int32_t z = b.z - level.z_base;
-    if (x < 0 || y < 0 || z < 0 || x >= level.nx || y >= level.ny || z >= static_cast<std::int32_t>(level.layers.size())) {
+    if (x < 0 || y < 0 || z < 0 || x >= level.nx || y >= level.ny ||
+        z >= static_cast<std::int32_t>(level.layers.size())) {
       return nullptr;
     }
     return &level.layers[z].table[static_cast<std::size_t>(y) * level.nx + x];
@@ -104,9 +107,13 @@ Window::Window(const Lattice& lattice, int attributes, const Bounds& bounds)
 
 Window::~Window() = default;
 
-const CornerBlock* Window::probe(int level, const Block& b) const { return trees_->find(level, b); }
+const CornerBlock* Window::probe(int level, const Block& b) const {
+  return trees_->find(level, b);
+}
 
-CornerBlock* Window::probe(int level, const Block& b) { return trees_->find(level, b); }
+CornerBlock* Window::probe(int level, const Block& b) {
+  return trees_->find(level, b);
+}
 
 CornerBlock& Window::touch(int level, const Block& b) {
   if (CornerBlock* block = trees_->find(level, b)) return *block;

@@ -1,0 +1,102 @@
+#include "command_line.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <new>
+#include <string>
+#include <string_view>
+
+#include "console.h"
+#include "lamina/error.h"
+#include "lamina/version.h"
+#include "text.h"
+
+namespace lamina::tools {
+namespace {
+
+int exit_code(ExitCode code) {
+  return static_cast<int>(code);
+}
+
+const CLI::App& chosen_tool(const CLI::App& app) {
+  const auto chosen = app.get_subcommands();
+  return chosen.empty() ? app : *chosen.front();
+}
+
+std::vector<std::string> option_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  return names;
+}
+
+std::string suggestion(std::string_view word, const std::vector<std::string>& candidates) {
+  const std::string near = nearest_word(word, candidates);
+  return near.empty() ? "" : fmt::format("; did you mean '{}'?", near);
+}
+
+std::vector<std::string> tool_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* tool : app.get_subcommands({})) names.push_back(tool->get_name());
+  return names;
+}
+
+// The first word that cannot be meant, whatever else CLI11 found wanting: an unknown tool or option explains the rest.
+std::string unknown_word(const CLI::App& app, const CLI::App& tool) {
+  for (const std::string& word : app.remaining(true)) {
+    if (word.size() > 1 && word.front() == '-') {
+      const std::string name = word.substr(0, word.find('='));
+      return fmt::format("unknown option '{}'{}", name, suggestion(name, option_names(tool)));
+    }
+    if (&tool == &app) {
+      return fmt::format("unknown tool '{}'{}", word, suggestion(word, tool_names(app)));
+    }
+    return fmt::format("unexpected argument '{}'", word);
+  }
+  return {};
+}
+
+int answer_parse_error(const CLI::App& app, const CLI::ParseError& error) {
+  if (error.get_exit_code() == 0) return app.exit(error);  // help and version
+  const CLI::App& tool = chosen_tool(app);
+  const std::string command = &tool == &app ? "lamina" : "lamina " + tool.get_name();
+  std::string reason = unknown_word(app, tool);
+  if (reason.empty()) {
+    reason =
+        &tool == &app ? fmt::format("no tool named; there are {}", fmt::join(tool_names(app), ", ")) : error.what();
+  }
+  fmt::print(stderr, "{}: {} (see '{} --help')\n", command, reason, command);
+  return exit_code(ExitCode::usage);
+}
+
+}  // namespace
+
+int run_program(int argc, const char* const* argv, const std::vector<AddTool>& tools) {
+  CLI::App app{"Lamina: streaming surface reconstruction from oriented points", "lamina"};
+  app.set_version_flag("--version", "lamina " + std::string(version()));
+  app.require_subcommand(1);
+  app.get_formatter()->column_width(34);
+  app.get_formatter()->label("SUBCOMMAND", "TOOL");
+  app.get_formatter()->label("Subcommands", "Tools");
+  try {
+    for (const AddTool add : tools) add(app);
+    cancel_on_signals();
+    app.parse(argc, argv);
+    return exit_code(ExitCode::ok);
+  } catch (const CLI::ParseError& e) {
+    return answer_parse_error(app, e);
+  } catch (const Error& e) {
+    fmt::print(stderr, "lamina: {}\n", e.what());
+    return exit_code(e.code());
+  } catch (const std::bad_alloc&) {
+    fmt::print(stderr, "lamina: out of memory; free some, or see --max-memory to plan the job\n");
+    return exit_code(ExitCode::budget);
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "lamina: internal error: {}\n", e.what());
+    return exit_code(ExitCode::internal);
+  }
+}
+
+}  // namespace lamina::tools

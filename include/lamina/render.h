@@ -1,0 +1,86 @@
+// Pictures of meshes and point clouds, drawn in software: to look at a result on a machine without a screen.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lamina/attributes.h"
+#include "lamina/mesh.h"
+#include "lamina/run.h"
+#include "lamina/sample.h"
+
+namespace lamina {
+
+/// Eight-bit sRGB pixels, three bytes each, rows from the top.
+struct Image {
+  int width = 0, height = 0;
+  std::vector<std::uint8_t> pixels;
+  [[nodiscard]] std::array<std::uint8_t, 3> at(int x, int y) const;
+};
+
+enum class ColourMode {
+  automatic,  ///< the vertices' or points' own colours where there are any, else one clay-like colour
+  none,       ///< one colour
+  normals,    ///< the normal's components as red, green, blue
+};
+
+/// The camera is orthographic. Back faces are tinted blue, so holes and turned triangles show.
+struct RenderSettings {
+  /// A place to look at: the ball around `centre` fills the picture; what lies more than the radius before it is cut
+  /// away.
+  struct Zoom {
+    std::array<double, 3> centre{};  ///< input coordinates
+    double radius = 1;               ///< input units, > 0
+  };
+
+  int width = 1024, height = 1024;  ///< pixels of the whole picture, 1 to 16384 each
+  int supersample = 2;              ///< samples per pixel and direction, 1 to 8
+  int views = 1;                    ///< 1 to 16 views from around the up axis, side by side at one scale
+  double azimuth = 30;              ///< degrees around the up axis, counter-clockwise seen from above; 0 is the front
+  double elevation = 20;            ///< degrees above the horizon, -90 to 90
+  int up = 1;                       ///< axis that points up: 0, 1, 2; the front is +z for 0 and 1, -y for 2
+  std::optional<Zoom> zoom;         ///< otherwise everything framed is in the picture
+  ColourMode colour = ColourMode::automatic;
+  bool flat = false;           ///< one shade per triangle instead of interpolated normals
+  bool wire = false;           ///< dark lines along the triangles' edges
+  bool mark_boundary = false;  ///< edges of only one triangle in red, over everything
+  double point_radius = 0;     ///< input units; 0: half a sample's own radius, or else chosen from density
+};
+
+/// Draws into one picture: frame everything first, then draw it. The picture is the same for any number of threads.
+class Renderer {
+ public:
+  /// Throws Error(usage) when a setting is out of its range, Error(budget) when the picture exceeds the memory limit.
+  Renderer(const RenderSettings& settings, const RunContext& context);
+  ~Renderer();
+  Renderer(const Renderer&) = delete;
+  Renderer& operator=(const Renderer&) = delete;
+
+  /// Makes room in the picture for the vertices or points; those that are not finite are left out here and in drawing.
+  void frame(const TriangleMesh& mesh);
+  void frame(const SampleBatch& points);
+
+  /// Draws triangles; a mesh without normals gets them from its triangles.
+  void draw(const TriangleMesh& mesh);
+  /// Draws points as discs across their normals, or facing the viewer where they have none.
+  void draw(const SampleBatch& points, const AttributeLayout& layout);
+
+  /// Boundary edges drawn so far (per mesh, not per view); 0 unless RenderSettings::mark_boundary.
+  [[nodiscard]] std::uint64_t boundary_edges() const;
+  [[nodiscard]] Image finish() const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Frames, draws and finishes one mesh.
+Image render(const TriangleMesh& mesh, const RenderSettings& settings, const RunContext& context = {});
+
+/// Writes a PNG beside `path`, then renames it; "-" is standard output. Throws Error(budget) when it cannot be written.
+void write_png(const Image& image, const std::string& path);
+
+}  // namespace lamina

@@ -1,0 +1,9 @@
+#include "lamina/version.h"
+
+namespace lamina {
+
+std::string_view version() {
+  return LAMINA_VERSION;
+}
+
+}  // namespace lamina

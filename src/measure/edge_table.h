@@ -1,0 +1,45 @@
+// The edges of a triangle mesh with the triangle sides that run along each.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "lamina/mesh.h"
+
+namespace lamina::measure {
+
+/// True when the triangle names a vertex twice.
+inline bool repeats_index(const std::array<std::uint32_t, 3>& t) {
+  return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
+}
+
+/// Side k of triangle t, from its corner k to corner (k + 1) % 3.
+struct Side {
+  std::uint32_t high = 0;    ///< the edge's higher vertex
+  std::uint32_t corner = 0;  ///< 3 t + k
+  [[nodiscard]] std::uint32_t next_corner() const { return corner % 3 == 2 ? corner - 2 : corner + 1; }
+};
+
+/// Sides grouped by edge: by lower vertex through a counting sort, then by the higher. Triangles that repeat an index
+/// have none. Wants fewer than 2^32 / 3 triangles.
+class EdgeTable {
+ public:
+  explicit EdgeTable(const TriangleMesh& mesh);
+  /// Calls visit(std::span<const Side>) once per edge; sides of an edge stand in the order of their triangles.
+  template <class Visit>
+  void for_each_edge(Visit&& visit) const {
+    for (std::size_t v = 0; v + 1 < start_.size(); ++v)
+      for (std::size_t i = start_[v]; i < start_[v + 1];) {
+        std::size_t j = i + 1;
+        while (j < start_[v + 1] && sides_[j].high == sides_[i].high) ++j;
+        visit(std::span<const Side>(sides_.data() + i, j - i));
+        i = j;
+      }
+  }
+
+ private:
+  std::vector<std::uint32_t> start_;  ///< first side of each lower vertex
+  std::vector<Side> sides_;
+};
+
+}  // namespace lamina::measure

@@ -1,0 +1,52 @@
+// Bounding volume hierarchy over a mesh's triangles: nearest distance and first hit along a ray.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "lamina/mesh.h"
+#include "meshes/vec3.h"
+
+namespace lamina::measure {
+
+struct RayHit {
+  double distance = 0;  ///< along the unit direction
+  std::uint32_t triangle = 0;
+  std::array<double, 3> weights{};  ///< barycentric
+};
+
+/// Holds a reference to the mesh: it must outlive the tree. Queries may run on any number of threads.
+/// About 20 bytes per triangle.
+class TriangleBvh {
+ public:
+  /// Wants at least one triangle and finite vertices.
+  explicit TriangleBvh(const TriangleMesh& mesh);
+
+  /// Exact distance from p to the nearest triangle.
+  [[nodiscard]] double distance(const meshes::Vec3& p) const;
+  /// Nearest triangle hit by origin + t * direction, t > 0, from either side. `direction` is a unit vector.
+  [[nodiscard]] std::optional<RayHit> first_hit(const meshes::Vec3& origin, const meshes::Vec3& direction) const;
+
+ private:
+  struct Box {
+    std::array<float, 3> low, high;
+  };
+  struct Node {
+    Box box;                  ///< relative to centre_, rounded outwards
+    std::uint32_t first = 0;  ///< leaf: first of its triangles in order_; inner: left child, the right one follows it
+    std::uint32_t count = 0;  ///< triangles of a leaf, 0 for inner nodes
+  };
+  struct Builder;
+
+  [[nodiscard]] static double squared_distance_to_box(const meshes::Vec3& p, const Box& box);
+  [[nodiscard]] static std::optional<double> entry(const meshes::Vec3& origin, const meshes::Vec3& inverse,
+                                                   const Box& box);
+
+  const TriangleMesh& mesh_;
+  meshes::Vec3 centre_{};
+  std::vector<std::uint32_t> order_;
+  std::vector<Node> nodes_;
+};
+
+}  // namespace lamina::measure

@@ -1,0 +1,102 @@
+#include "mesh_sink/output_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <filesystem>
+
+#include "lamina/error.h"
+
+namespace lamina {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void refuse(const std::string& name, const std::string& why) {
+  throw Error(ExitCode::budget, fmt::format("{}: cannot be written: {}", name, why));
+}
+
+/// The file a link stands for, so that the link stays and its file is replaced.
+std::string follow_links(const std::string& path) {
+  std::error_code error;
+  if (!fs::is_symlink(path, error)) return path;
+  const fs::path target = fs::weakly_canonical(path, error);
+  return error ? path : target.string();
+}
+
+/// Creates the hidden file; a number is added when a run that was killed left one behind.
+Descriptor create_partial(const fs::path& path, std::string& partial) {
+  constexpr std::size_t kLongestName = 200;  // leaves room in the 255 bytes file systems allow
+  constexpr int kTries = 1000;
+  const std::string stem = fmt::format(".{}.partial-{}", path.filename().string().substr(0, kLongestName), ::getpid());
+  for (int i = 0; i < kTries; ++i) {
+    partial = (path.parent_path() / (i == 0 ? stem : fmt::format("{}-{}", stem, i))).string();
+    Descriptor file(::open(partial.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
+    if (file || errno != EEXIST) return file;
+  }
+  return {};
+}
+
+}  // namespace
+
+OutputFile::OutputFile(const std::string& path, const std::string& tmp_dir) : name_(path), path_(follow_links(path)) {
+  struct stat status {};
+  const bool exists = path != "-" && ::stat(path_.c_str(), &status) == 0;
+  streams_ = path == "-" || (exists && !S_ISREG(status.st_mode) && !S_ISDIR(status.st_mode));
+  if (path == "-") {
+    name_ = "standard output";
+    if (::isatty(STDOUT_FILENO) == 1) {
+      throw Error(ExitCode::usage, "standard output is a terminal; name an output file or pipe the mesh on");
+    }
+  }
+  if (streams_) {
+    directory_ = tmp_dir.empty() ? system_tmp_dir() : tmp_dir;
+    file_ = open_unlinked(directory_);
+    return;
+  }
+  if (path.empty()) refuse("the output", "its name is empty");
+  const fs::path final_path(path_);
+  if ((exists && S_ISDIR(status.st_mode)) || !final_path.has_filename()) refuse(name_, "it is a directory");
+  // Renaming would replace a write-protected file all the same.
+  if (exists && ::access(path_.c_str(), W_OK) != 0) refuse(name_, system_message(errno));
+  directory_ = final_path.has_parent_path() ? final_path.parent_path().string() : ".";
+  file_ = create_partial(final_path, partial_);
+  if (!file_) {
+    const int error = errno;
+    partial_.clear();
+    std::error_code ignored;
+    if (!fs::exists(directory_, ignored)) refuse(name_, fmt::format("the folder {} does not exist", directory_));
+    refuse(name_, system_message(error));
+  }
+}
+
+OutputFile::~OutputFile() {
+  if (!partial_.empty()) ::unlink(partial_.c_str());
+}
+
+void OutputFile::publish() {
+  // No fsync, like cp and mv: it would hold every run for the disk. A failure that a network file system keeps for
+  // close() is caught.
+  if (const int error = file_.close(); error != 0) report_write_error(name_, error);
+  if (std::rename(partial_.c_str(), path_.c_str()) != 0) report_write_error(name_, errno);
+  partial_.clear();
+}
+
+Descriptor OutputFile::destination() const {
+  Descriptor to(name_ == "standard output" ? ::fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 0)
+                                           : ::open(path_.c_str(), O_WRONLY | O_CLOEXEC));
+  if (!to) report_write_error(name_, errno);
+  return to;
+}
+
+void report_write_error(const std::string& name, int error) {
+  const bool full = error == ENOSPC || error == EDQUOT;
+  throw Error(ExitCode::budget, fmt::format("{}: cannot be written: {}{}", name, system_message(error),
+                                            full ? "; free some space or choose another folder" : ""));
+}
+
+}  // namespace lamina

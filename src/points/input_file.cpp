@@ -1,0 +1,86 @@
+#include "points/input_file.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <memory>
+
+#include "lamina/error.h"
+#include "points/sniff.h"
+
+namespace lamina {
+namespace {
+
+constexpr std::size_t kSpoolBytes = 256 << 10;
+
+[[noreturn]] void cannot_read(const std::string& name, int error) {
+  throw Error(ExitCode::unreadable, fmt::format("{}: cannot be read: {}", name, system_message(error)));
+}
+
+/// Bytes that have come from a pipe, up to `size`.
+std::size_t receive(int fd, const std::string& name, std::byte* data, std::size_t size) {
+  std::size_t have = 0;
+  while (have < size) {
+    const ssize_t n = ::read(fd, data + have, size - have);
+    if (n < 0 && errno != EINTR) cannot_read(name, errno);
+    if (n == 0) break;
+    if (n > 0) have += static_cast<std::size_t>(n);
+  }
+  return have;
+}
+
+InputFile spool(int fd, std::string name, const std::string& tmp_dir) {
+  const std::string directory = tmp_dir.empty() ? system_tmp_dir() : tmp_dir;
+  InputFile input{open_unlinked(directory), 0, std::move(name)};
+  const auto buffer = std::make_unique_for_overwrite<std::byte[]>(kSpoolBytes);
+  for (;;) {
+    const std::size_t n = receive(fd, input.name, buffer.get(), kSpoolBytes);
+    if (input.bytes == 0) require_ply({reinterpret_cast<const char*>(buffer.get()), n}, input.name);
+    if (n == 0) return input;
+    if (const int error = write_all(input.file.get(), buffer.get(), n); error != 0) {
+      throw Error(ExitCode::budget,
+                  fmt::format("{}: no room to keep {} ({} bytes so far): {}; choose another folder for temporary files",
+                              directory, input.name, input.bytes, system_message(error)));
+    }
+    input.bytes += n;
+  }
+}
+
+}  // namespace
+
+std::size_t InputFile::read(std::uint64_t offset, void* data, std::size_t size) const {
+  const ReadResult result = pread_all(file.get(), data, size, offset);
+  if (result.error != 0) cannot_read(name, result.error);
+  return result.bytes;
+}
+
+InputFile open_input(const std::string& path, const std::string& tmp_dir) {
+  if (path == "-") return spool(STDIN_FILENO, "standard input", tmp_dir);
+  Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  struct stat status {};
+  if (!file || ::fstat(file.get(), &status) != 0) {
+    throw Error(ExitCode::unreadable, fmt::format("{}: cannot be opened: {}", path, system_message(errno)));
+  }
+  if (S_ISDIR(status.st_mode)) {
+    throw Error(ExitCode::unreadable, fmt::format("{}: is a directory; name a point file", path));
+  }
+  if (!S_ISREG(status.st_mode)) return spool(file.get(), path, tmp_dir);
+  ::posix_fadvise(file.get(), 0, 0, POSIX_FADV_SEQUENTIAL);
+  InputFile input{std::move(file), static_cast<std::uint64_t>(status.st_size), path};
+  char start[512];
+  require_ply({start, input.read(0, start, sizeof start)}, path);
+  return input;
+}
+
+std::string quoted(std::string_view word) {
+  constexpr std::size_t kLongest = 40;
+  std::string text = "'";
+  for (const char c : word.substr(0, kLongest)) text += c >= ' ' && c <= '~' ? c : '?';
+  text += word.size() > kLongest ? "...'" : "'";
+  return text;
+}
+
+}  // namespace lamina

@@ -1,0 +1,170 @@
+#include "points/ply_header.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+
+#include "attributes/ply_type.h"
+#include "lamina/error.h"
+
+namespace lamina {
+namespace {
+
+constexpr std::size_t kLongestHeader = 1 << 20;
+
+/// Walks the lines of a header; its errors name the line.
+class HeaderParser {
+ public:
+  HeaderParser(std::string_view text, const std::string& name) : text_(text), name_(name) {
+    // Old Macintosh files end lines in a lone CR; the first line tells.
+    const std::size_t end = text_.find_first_of("\r\n");
+    const bool lone_cr =
+        end != std::string_view::npos && text_[end] == '\r' && (end + 1 == text_.size() || text_[end + 1] != '\n');
+    header_.line_end = lone_cr ? '\r' : '\n';
+  }
+
+  PlyHeader parse() {
+    while (next_line()) {
+      const std::string_view keyword = word();
+      if (header_.lines == 1) {
+        if (keyword != "ply") fail("'ply' expected");
+      } else if (keyword == "format") {
+        format();
+      } else if (keyword == "element") {
+        element();
+      } else if (keyword == "property") {
+        property();
+      } else if (keyword == "end_header") {
+        if (!has_format_) fail("the header ends without a format line");
+        return std::move(header_);
+      } else if (!keyword.empty() && keyword != "comment" && keyword != "obj_info") {
+        fail(fmt::format("{} is no keyword of a PLY header", quoted(keyword)));
+      }
+    }
+    throw Error(ExitCode::unreadable, fmt::format("{}: no end_header in the first {} bytes: the header is cut short or "
+                                                  "this is not a PLY file",
+                                                  name_, text_.size()));
+  }
+
+ private:
+  [[noreturn]] void fail(const std::string& what) const {
+    throw Error(ExitCode::unreadable, fmt::format("{}, line {}: {}", name_, header_.lines, what));
+  }
+
+  /// A line counts only when its end is there: data may follow the last one directly.
+  bool next_line() {
+    const std::size_t end = text_.find(header_.line_end, header_.bytes);
+    if (end == std::string_view::npos) return false;
+    line_ = text_.substr(header_.bytes, end - header_.bytes);
+    header_.bytes = end + 1;
+    ++header_.lines;
+    return true;
+  }
+
+  /// The line's next word, empty at its end.
+  std::string_view word() {
+    constexpr std::string_view kSpace = " \t\r\v\f";
+    const std::size_t begin = std::min(line_.find_first_not_of(kSpace), line_.size());
+    const std::size_t end = std::min(line_.find_first_of(kSpace, begin), line_.size());
+    const std::string_view found = line_.substr(begin, end - begin);
+    line_.remove_prefix(end);
+    return found;
+  }
+
+  std::string_view needed_word(std::string_view what) {
+    const std::string_view found = word();
+    if (found.empty()) fail(fmt::format("{} expected, the line ends", what));
+    return found;
+  }
+
+  void end_of_line() {
+    if (const std::string_view more = word(); !more.empty()) fail(fmt::format("{} is too much here", quoted(more)));
+  }
+
+  void format() {
+    const std::string_view encoding = needed_word("a format");
+    if (encoding == "ascii") {
+      header_.format = PlyFormat::ascii;
+    } else if (encoding == "binary_little_endian") {
+      header_.format = PlyFormat::little_endian;
+    } else if (encoding == "binary_big_endian") {
+      header_.format = PlyFormat::big_endian;
+    } else {
+      fail(fmt::format("format {} is not supported; ascii, binary_little_endian and binary_big_endian are",
+                       quoted(encoding)));
+    }
+    const std::string_view version = needed_word("a version");
+    if (version != "1.0") fail(fmt::format("PLY version {} is not supported; 1.0 is", quoted(version)));
+    end_of_line();
+    has_format_ = true;
+  }
+
+  void element() {
+    PlyElement element;
+    element.name = needed_word("an element's name");
+    const std::string_view count = needed_word("a count");
+    const auto [end, error] = std::from_chars(count.data(), count.data() + count.size(), element.count);
+    if (error != std::errc{} || end != count.data() + count.size()) {
+      fail(fmt::format("the count of element {} is {}; a whole number expected", quoted(element.name), quoted(count)));
+    }
+    end_of_line();
+    header_.elements.push_back(std::move(element));
+  }
+
+  ScalarType type() {
+    const std::string_view name = needed_word("a type");
+    const std::optional<ScalarType> found = ply_type(name);
+    if (!found) fail(fmt::format("{} is no PLY type", quoted(name)));
+    return *found;
+  }
+
+  void property() {
+    if (header_.elements.empty()) fail("a property before the first element");
+    PlyProperty property;
+    const std::string_view rest = line_;
+    if (word() == "list") {
+      property.list_count = type();
+      if (*property.list_count == ScalarType::float32 || *property.list_count == ScalarType::float64) {
+        fail("the length of a list must be of an integer type");
+      }
+    } else {
+      line_ = rest;
+    }
+    property.type = type();
+    property.name = needed_word("a property's name");
+    end_of_line();
+    header_.elements.back().properties.push_back(std::move(property));
+  }
+
+  std::string_view text_;
+  const std::string& name_;
+  std::string_view line_;
+  PlyHeader header_;
+  bool has_format_ = false;
+};
+
+}  // namespace
+
+bool PlyElement::has_list() const {
+  return std::any_of(properties.begin(), properties.end(),
+                     [](const PlyProperty& p) { return p.list_count.has_value(); });
+}
+
+std::size_t PlyElement::row_bytes() const {
+  std::size_t bytes = 0;
+  for (const PlyProperty& property : properties) bytes += static_cast<std::size_t>(byte_size(property.type));
+  return bytes;
+}
+
+PlyHeader parse_ply_header(std::string_view text, const std::string& name) {
+  return HeaderParser(text, name).parse();
+}
+
+PlyHeader read_ply_header(const InputFile& file) {
+  std::string text(static_cast<std::size_t>(std::min<std::uint64_t>(file.bytes, kLongestHeader)), '\0');
+  text.resize(file.read(0, text.data(), text.size()));
+  return parse_ply_header(text, file.name);
+}
+
+}  // namespace lamina

@@ -1,0 +1,67 @@
+#include "render/canvas.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace lamina::render_detail {
+namespace {
+
+constexpr std::size_t kEncodeSteps = 8192;  // finer than eight bits even at the curve's steep dark end
+
+struct Tables {
+  std::array<std::uint8_t, kEncodeSteps + 1> encode{};
+  std::array<float, 256> decode{};
+  Tables() {
+    for (std::size_t i = 0; i <= kEncodeSteps; ++i) {
+      const double v = static_cast<double>(i) / kEncodeSteps;
+      const double s = v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
+      encode[i] = static_cast<std::uint8_t>(std::lround(255 * s));
+    }
+    for (std::size_t i = 0; i < decode.size(); ++i) {
+      const double s = static_cast<double>(i) / 255;
+      decode[i] = static_cast<float>(s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4));
+    }
+  }
+};
+
+const Tables& tables() {
+  static const Tables made;
+  return made;
+}
+
+constexpr Rgb kBackground{0.92F, 0.93F, 0.95F};
+
+}  // namespace
+
+std::uint8_t encode(float linear) {
+  return tables().encode[static_cast<std::size_t>(std::clamp(linear, 0.0F, 1.0F) * kEncodeSteps + 0.5F)];
+}
+
+float decode(std::uint8_t encoded) {
+  return tables().decode[encoded];
+}
+
+Image Canvas::resolve(int supersample) const {
+  Image image{width_ / supersample, height_ / supersample, {}};
+  const auto row_bytes = 3 * static_cast<std::size_t>(image.width);
+  image.pixels.resize(row_bytes * static_cast<std::size_t>(image.height));
+  const float share = 1.0F / static_cast<float>(supersample * supersample);
+  tbb::parallel_for(0, image.height, [&](int y) {
+    std::uint8_t* out = image.pixels.data() + static_cast<std::size_t>(y) * row_bytes;
+    for (int x = 0; x < image.width; ++x) {
+      Rgb sum{};
+      for (int sy = 0; sy < supersample; ++sy) {
+        for (int sx = 0; sx < supersample; ++sx) {
+          const auto& sample = colour_[index(x * supersample + sx, y * supersample + sy)];
+          for (std::size_t c = 0; c < 3; ++c) sum[c] += sample[3] != 0 ? decode(sample[c]) : kBackground[c];
+        }
+      }
+      for (std::size_t c = 0; c < 3; ++c) *out++ = encode(sum[c] * share);
+    }
+  });
+  return image;
+}
+
+}  // namespace lamina::render_detail

@@ -1,0 +1,51 @@
+// Samples of a picture: what is nearest at each, and averaging them into pixels.
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "lamina/render.h"
+
+namespace lamina::render_detail {
+
+using Rgb = std::array<float, 3>;  ///< linear light, 0 to 1
+
+/// sRGB encoding, by table.
+std::uint8_t encode(float linear);
+float decode(std::uint8_t encoded);
+
+/// Depth grows toward the viewer.
+class Canvas {
+ public:
+  static constexpr float kOverEverything = std::numeric_limits<float>::infinity();
+
+  Canvas(int width, int height)
+      : width_(width),
+        height_(height),
+        depth_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), -kOverEverything),
+        colour_(depth_.size(), {0, 0, 0, 0}) {}
+
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] int height() const { return height_; }
+  /// True when something at `depth` would be seen; of equals the first one stays.
+  [[nodiscard]] bool visible(int x, int y, float depth) const { return depth > depth_[index(x, y)]; }
+  void set(int x, int y, float depth, const Rgb& colour) {
+    depth_[index(x, y)] = depth;
+    colour_[index(x, y)] = {encode(colour[0]), encode(colour[1]), encode(colour[2]), 1};
+  }
+  /// Averages squares of `supersample` samples over the background.
+  [[nodiscard]] Image resolve(int supersample) const;
+
+ private:
+  [[nodiscard]] std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x);
+  }
+
+  int width_, height_;
+  std::vector<float> depth_;
+  std::vector<std::array<std::uint8_t, 4>> colour_;  ///< the last byte: something was drawn
+};
+
+}  // namespace lamina::render_detail

@@ -1,0 +1,167 @@
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "render/draw.h"
+#include "render/raster.h"
+#include "render/shade.h"
+
+namespace lamina::render_detail {
+namespace {
+
+constexpr double kWireWidth = 0.45;      // half the width of a wire line, pixels
+constexpr double kBoundaryWidth = 1.25;  // half the width of a boundary line, pixels
+constexpr float kWireDarkening = 0.25F;
+
+Eigen::Vector3d position(const TriangleMesh& mesh, std::uint32_t v) {
+  const auto& p = mesh.positions[v];
+  return {p[0], p[1], p[2]};
+}
+
+std::vector<Projected> project_all(const TriangleMesh& mesh, const View& view) {
+  std::vector<Projected> projected(mesh.positions.size());
+  tbb::parallel_for(std::size_t{0}, projected.size(),
+                    [&](std::size_t i) { projected[i] = view.project(mesh.positions[i]); });
+  return projected;
+}
+
+// How one triangle looks at any of its points.
+class Surface {
+ public:
+  Surface(const TriangleMesh& mesh, const std::vector<std::array<float, 3>>& normals, const RenderSettings& settings,
+          const std::optional<ColourReader>& colours, const View& view, std::size_t triangle)
+      : settings_(settings) {
+    const auto& t = mesh.triangles[triangle];
+    const Eigen::Vector3d face =
+        (position(mesh, t[1]) - position(mesh, t[0])).cross(position(mesh, t[2]) - position(mesh, t[0])).normalized();
+    face_ = view.direction({static_cast<float>(face[0]), static_cast<float>(face[1]), static_cast<float>(face[2])});
+    back_ = face_.z() < 0;
+    if (back_) face_ = -face_;
+    for (std::size_t i = 0; i < 3; ++i) {
+      normal_[i] = view.direction(normals[t[i]]);
+      if (settings.colour == ColourMode::normals) {
+        base_[i] = normal_colour(normals[t[i]]);
+      } else {
+        base_[i] = colours ? (*colours)(t[i]) : kClay;
+      }
+    }
+  }
+  [[nodiscard]] Rgb at(const std::array<float, 3>& w) const {
+    Rgb base{};
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();
+    for (std::size_t i = 0; i < 3; ++i) {
+      for (std::size_t c = 0; c < 3; ++c) base[c] += w[i] * base_[i][c];
+      normal += w[i] * normal_[i];
+    }
+    const float length = normal.norm();
+    if (settings_.flat || !(length > 0)) {
+      normal = face_;
+    } else {
+      normal *= (normal.dot(face_) < 0 ? -1 : 1) / length;
+    }
+    return lit(base, normal, back_);
+  }
+
+ private:
+  const RenderSettings& settings_;
+  Eigen::Vector3f face_;  ///< toward the viewer
+  std::array<Eigen::Vector3f, 3> normal_;
+  std::array<Rgb, 3> base_;
+  bool back_ = false;
+};
+
+// Squared distance from a point to a segment, in samples.
+double segment_distance2(const Projected& a, const Projected& b, double px, double py) {
+  const double dx = static_cast<double>(b.x) - a.x, dy = static_cast<double>(b.y) - a.y;
+  const double length2 = dx * dx + dy * dy;
+  const double along = length2 > 0 ? std::clamp(((px - a.x) * dx + (py - a.y) * dy) / length2, 0.0, 1.0) : 0.0;
+  const double ex = a.x + along * dx - px, ey = a.y + along * dy - py;
+  return ex * ex + ey * ey;
+}
+
+}  // namespace
+
+std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh) {
+  std::vector<Eigen::Vector3d> sums(mesh.positions.size(), Eigen::Vector3d::Zero());
+  for (const auto& t : mesh.triangles) {
+    const Eigen::Vector3d area =
+        (position(mesh, t[1]) - position(mesh, t[0])).cross(position(mesh, t[2]) - position(mesh, t[0]));
+    if (!area.allFinite()) continue;
+    for (const std::uint32_t v : t) sums[v] += area;
+  }
+  std::vector<std::array<float, 3>> normals(sums.size());
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    const Eigen::Vector3f n = sums[i].normalized().cast<float>();
+    normals[i] = {n[0], n[1], n[2]};
+  }
+  return normals;
+}
+
+void draw_mesh(const TriangleMesh& mesh, const std::vector<std::array<float, 3>>& normals,
+               const RenderSettings& settings, const View& view, Canvas& canvas) {
+  const std::vector<Projected> projected = project_all(mesh, view);
+  const auto colours =
+      settings.colour == ColourMode::automatic ? ColourReader::find(mesh.layout, mesh.attributes) : std::nullopt;
+  const double wire = kWireWidth * settings.supersample;
+  const auto span = [&](std::size_t i) {
+    const auto& t = mesh.triangles[i];
+    return TriangleSpan(projected[t[0]], projected[t[1]], projected[t[2]]);
+  };
+  const auto rows_of = [&](std::size_t i) {
+    const TriangleSpan triangle = span(i);
+    return triangle.empty() ? Rows{} : triangle.rows(view.tile);
+  };
+  draw_in_bands(mesh.triangles.size(), canvas.height(), rows_of, [&](std::size_t i, Rows rows) {
+    const TriangleSpan triangle = span(i);
+    const Rows columns = triangle.columns(view.tile);
+    const auto& t = mesh.triangles[i];
+    std::optional<Surface> surface;
+    for (int y = rows.first; y <= rows.last; ++y) {
+      for (int x = columns.first; x <= columns.last; ++x) {
+        std::array<float, 3> w{};
+        if (!triangle.weights(x, y, w)) continue;
+        const float depth = w[0] * projected[t[0]].depth + w[1] * projected[t[1]].depth + w[2] * projected[t[2]].depth;
+        if (!(depth <= view.near) || !canvas.visible(x, y, depth)) continue;
+        if (!surface) surface.emplace(mesh, normals, settings, colours, view, i);
+        Rgb colour = surface->at(w);
+        if (settings.wire && triangle.side_distance(w) < wire) {
+          for (float& c : colour) c *= kWireDarkening;
+        }
+        canvas.set(x, y, depth, colour);
+      }
+    }
+  });
+}
+
+void draw_edges(const TriangleMesh& mesh, const std::vector<Edge>& edges, const RenderSettings& settings,
+                const View& view, Canvas& canvas) {
+  const double reach = kBoundaryWidth * settings.supersample;
+  struct Ends {
+    Projected a, b;
+    bool shown;
+  };
+  const auto ends = [&](std::size_t i) {
+    const Projected a = view.project(mesh.positions[edges[i][0]]), b = view.project(mesh.positions[edges[i][1]]);
+    const bool finite = std::isfinite(a.x + a.y + a.depth + b.x + b.y + b.depth);
+    return Ends{a, b, finite && std::min(a.depth, b.depth) <= view.near};
+  };
+  const auto rows_of = [&](std::size_t i) {
+    const auto [a, b, shown] = ends(i);
+    if (!shown) return Rows{};
+    return clip_span(std::min(a.y, b.y) - reach, std::max(a.y, b.y) + reach, view.tile.y, view.tile.height);
+  };
+  draw_in_bands(edges.size(), canvas.height(), rows_of, [&](std::size_t i, Rows rows) {
+    const auto [a, b, shown] = ends(i);
+    const Rows columns =
+        clip_span(std::min(a.x, b.x) - reach, std::max(a.x, b.x) + reach, view.tile.x, view.tile.width);
+    for (int y = rows.first; y <= rows.last; ++y) {
+      for (int x = columns.first; x <= columns.last; ++x) {
+        if (segment_distance2(a, b, x + 0.5, y + 0.5) > reach * reach) continue;
+        canvas.set(x, y, Canvas::kOverEverything, kBoundary);
+      }
+    }
+  });
+}
+
+}  // namespace lamina::render_detail

@@ -1,0 +1,47 @@
+#include "scatter/point_rows.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+
+namespace lamina::scatter_detail {
+
+std::string ply_header(const RowLayout& layout, std::uint64_t count, const std::vector<std::string>& comments) {
+  std::string h = "ply\nformat binary_little_endian 1.0\n";
+  for (const auto& c : comments) h += fmt::format("comment {}\n", c);
+  h += fmt::format("element vertex {}\n", count);
+  const char* type = layout.double_positions ? "double" : "float";
+  for (const char* name : {"x", "y", "z"}) h += fmt::format("property {} {}\n", type, name);
+  for (const char* name : {"nx", "ny", "nz"}) h += fmt::format("property float {}\n", name);
+  if (layout.colours)
+    for (const char* name : {"red", "green", "blue"}) h += fmt::format("property uchar {}\n", name);
+  if (layout.confidence) h += "property float confidence\n";
+  return h + "end_header\n";
+}
+
+template <class T>
+void RowPacker::put(T value) {
+  std::array<char, sizeof(T)> raw;
+  std::memcpy(raw.data(), &value, sizeof(T));
+  if constexpr (std::endian::native == std::endian::big) std::reverse(raw.begin(), raw.end());
+  bytes_.append(raw.data(), raw.size());
+}
+
+void RowPacker::add(const std::array<double, 3>& position, const std::array<double, 3>& normal,
+                    const std::array<float, 3>& colour, float confidence) {
+  for (const double c : position) {
+    if (layout_.double_positions)
+      put(c);
+    else
+      put(static_cast<float>(c));
+  }
+  for (const double c : normal) put(static_cast<float>(c));
+  if (layout_.colours)
+    for (const float c : colour) put(static_cast<std::uint8_t>(std::lround(std::clamp(c, 0.0F, 255.0F))));
+  if (layout_.confidence) put(confidence);
+}
+
+}  // namespace lamina::scatter_detail
