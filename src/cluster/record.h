@@ -25,12 +25,13 @@ inline Ref slab_tag(std::int64_t slab) {
 }
 
 struct VertexNote {
-  static constexpr std::uint16_t kUsed = 1;   ///< a triangle names it
-  static constexpr std::uint16_t kThree = 2;  ///< one of its triangles lies in three clusters
-  static constexpr std::uint16_t kHard = 4;   ///< its cluster is hard
-  std::uint32_t corner = 0;                   ///< the cluster's corner, SlabIndex bits relative to the vertex's slab
+  static constexpr std::uint8_t kUsed = 1;   ///< a triangle names it
+  static constexpr std::uint8_t kThree = 2;  ///< one of its triangles lies in three clusters
+  static constexpr std::uint8_t kHard = 4;   ///< its cluster is hard
+  std::uint32_t corner = 0;                  ///< the cluster's corner, SlabIndex bits relative to the vertex's slab
   Ref balance = 0;  ///< every neighbour once as successor, once as predecessor, by XOR: 0 unless on a boundary
-  std::uint16_t marks = 0;
+  std::uint8_t marks = 0;
+  std::uint8_t direction = 0;    ///< from the corner to the vertex: 2 * axis + (0 up, 1 down)
   std::uint16_t piece = 0;       ///< which connected component of a hard cluster
   std::uint32_t number = kNone;  ///< in the final mesh
 
@@ -40,12 +41,15 @@ struct VertexNote {
 
 /// Sums over a cluster's triangles. All are free of order.
 struct CornerNote {
-  std::uint64_t ring = 0;              ///< one bit per neighbour cluster met on the ring, by its `slot`
-  std::uint16_t ring_triangles = 0;    ///< triangles in three clusters
-  std::uint16_t inner_half_edges = 0;  ///< an edge between two members counts once per triangle
-  std::uint16_t inner_triangles = 0;   ///< all three vertices are members
-  std::uint8_t members = 0;            ///< used isovertices, saturating
-  std::uint8_t slot = 0;               ///< the corner's place in a 4 x 4 x 4 tiling of the lattice: neighbours differ
+  static constexpr std::uint8_t kBeyond =
+      0x80;                          ///< on a boundary, or two members in one direction: these sums do not tell
+  std::uint64_t ring = 0;            ///< one bit per neighbour cluster met on the ring, by its `slot`
+  std::uint16_t ring_triangles = 0;  ///< triangles in three clusters
+  std::uint16_t edges = 0;           ///< between members, one bit per pair of directions
+  std::uint8_t inner_triangles = 0;  ///< all three vertices are members
+  std::uint8_t members = 0;          ///< used isovertices, one bit per direction, and kBeyond
+  std::uint8_t idle = 0;             ///< members without a triangle in three clusters
+  std::uint8_t slot = 0;             ///< the corner's place in a 4 x 4 x 4 tiling of the lattice: neighbours differ
 };
 
 enum class Verdict : std::uint8_t {

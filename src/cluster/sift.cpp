@@ -5,31 +5,27 @@
 
 #include "cluster/chunks.h"
 #include "cluster/hard.h"
+#include "cluster/shape.h"
 
 namespace lamina::cluster {
 namespace {
 
 constexpr std::size_t kLeast = 1 << 13;
-constexpr std::uint8_t kSaturated = 255;
-
-/// Folds a used vertex into its cluster's note. A boundary, or a vertex without a triangle in three clusters (the only
-/// place where condition Q can fail beside a contractible neighbour), makes the cluster hard.
+/// Folds a used vertex into its cluster's note.
 void fold(const VertexNote& vertex, CornerNote& corner) {
   if (!vertex.used()) return;
-  const bool plain = vertex.balance == 0 && (vertex.marks & VertexNote::kThree) != 0;
-  if (!plain || corner.members == kSaturated) {
-    corner.members = kSaturated;
-  } else {
-    ++corner.members;
-  }
+  const auto bit = static_cast<std::uint8_t>(1U << vertex.direction);
+  const bool beyond = vertex.balance != 0 || (corner.members & bit) != 0;
+  corner.members |= static_cast<std::uint8_t>(bit | (beyond ? CornerNote::kBeyond : 0));
+  if ((vertex.marks & VertexNote::kThree) == 0) corner.idle |= bit;
 }
 
-/// Proves C and R for a cluster away from boundaries. Up to three vertices with V - E + F = 1 are connected, so the
-/// cluster is one component. Around it the ring takes `ring_triangles` steps; when as many distinct neighbour clusters
-/// begin one, it is a simple cycle.
+/// Away from boundaries the sums prove C and R: the ring takes `ring_triangles` steps, and when as many distinct
+/// neighbour clusters begin one, it is a simple cycle. That the cluster is no danger to its neighbours' Q comes with
+/// it.
 bool plainly_collapses(const CornerNote& note) {
-  return note.members <= 3 && note.members + note.inner_triangles == note.inner_half_edges / 2 + 1 &&
-         note.ring_triangles >= 3 && std::popcount(note.ring) == note.ring_triangles;
+  return (note.members & CornerNote::kBeyond) == 0 && note.ring_triangles >= 3 &&
+         std::popcount(note.ring) == note.ring_triangles && plain_shape(note);
 }
 
 void fold_members(Window& window, std::int64_t slab) {

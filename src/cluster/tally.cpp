@@ -29,6 +29,17 @@ struct Tables {
   std::array<Ref, 2> tag;
 };
 
+/// The bit of CornerNote::edges for members in directions 2 * axis + side.
+constexpr std::array<std::uint8_t, 64> make_pair_bits() {
+  std::array<std::uint8_t, 64> bits{};
+  std::uint8_t bit = 0;
+  for (std::size_t a = 0; a < 6; ++a) {
+    for (std::size_t b = a + 1; b < 6; ++b) bits[8 * a + b] = bits[8 * b + a] = bit++;
+  }
+  return bits;
+}
+constexpr std::array<std::uint8_t, 64> kPairBits = make_pair_bits();
+
 /// Counts one triangle. `kBorder`: its indices may lie in the next slab.
 template <ClusterMode mode, bool kBorder>
 inline void count_triangle(const Tables& tables, const IsoTriangle& triangle) {
@@ -49,7 +60,7 @@ inline void count_triangle(const Tables& tables, const IsoTriangle& triangle) {
   }
   const bool e0 = corner[0] == corner[1], e1 = corner[1] == corner[2], e2 = corner[2] == corner[0];
   const bool three = !(e0 || e1 || e2);
-  const auto marks = static_cast<std::uint16_t>(VertexNote::kUsed | (three ? VertexNote::kThree : 0));
+  const auto marks = static_cast<std::uint8_t>(VertexNote::kUsed | (three ? VertexNote::kThree : 0));
   std::array<CornerNote*, 3> note;
   for (std::size_t k = 0; k < 3; ++k) {
     vertex[k]->marks |= marks;
@@ -65,7 +76,8 @@ inline void count_triangle(const Tables& tables, const IsoTriangle& triangle) {
     vertex[k]->balance ^= ref[after] ^ ref[before];
     note[k]->ring |= static_cast<std::uint64_t>(three) << note[after]->slot;
     note[k]->ring_triangles = static_cast<std::uint16_t>(note[k]->ring_triangles + three);
-    note[k]->inner_half_edges = static_cast<std::uint16_t>(note[k]->inner_half_edges + inner[k]);
+    const std::uint8_t bit = kPairBits[8 * vertex[k]->direction + vertex[after]->direction];
+    note[k]->edges = static_cast<std::uint16_t>(note[k]->edges | inner[k] << bit);
   }
   if (e0 && e1) ++note[0]->inner_triangles;
 }
@@ -210,6 +222,7 @@ void lay_out(SlabRecord& record, std::shared_ptr<const IsoSlab> iso) {
       bad_slab(record.slab, "isovertex " + std::to_string(v) + " names a corner beyond the slab's " +
                                 std::to_string(corners.size()));
     }
+    record.vertices[v].direction = static_cast<std::uint8_t>(2 * (vertex.axis % 3) + (vertex.near_high ? 1 : 0));
     record.vertices[v].corner = vertex.near_high ? vertex.high.bits : vertex.low.bits;
     if (record.vertices[v].crossing()) record.crossing.push_back(static_cast<std::uint32_t>(v));
   }
