@@ -25,10 +25,11 @@ struct ActiveBucket {
 using Batch = std::vector<std::shared_ptr<const ActiveBucket>>;
 
 struct FeedSettings {
+  float radius_scale = 1;               ///< multiplies estimated radii; given ones are scaled when read in
   float blend = 1;                      ///< H
   double cell_ratio = 0.9;              ///< a cell is split while larger than this times its smallest radius
   bool cell_follows_support = true;     ///< the smallest R_i = H r_i counts, else the smallest r_i
-  bool fixed_cell = false;           ///< every sample asks for the finest level
+  bool fixed_cell = false;              ///< every sample asks for the finest level
   float max_radius = 0;                 ///< samples with a larger r_i are left out, steps; 0: none
   std::size_t cache_bytes = 64u << 20;  ///< memory for samples kept between uses
 };

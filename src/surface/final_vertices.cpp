@@ -16,8 +16,12 @@ struct Corner {
 
 using Vec3 = Eigen::Vector3d;
 
-Vec3 position(const SurfaceCorner& c) { return {double{c.position[0]}, double{c.position[1]}, double{c.position[2]}}; }
-Vec3 to_vec(const std::array<float, 3>& v) { return {double{v[0]}, double{v[1]}, double{v[2]}}; }
+Vec3 position(const SurfaceCorner& c) {
+  return Eigen::Vector3i(c.position[0], c.position[1], c.position[2]).cast<double>();
+}
+Vec3 to_vec(const std::array<float, 3>& v) {
+  return {double{v[0]}, double{v[1]}, double{v[2]}};
+}
 
 Vec3 clustered(const SurfaceCorner& c, float chord) {
   const float shift = std::clamp(chord * c.curvature * c.cell * c.cell, -0.25F * c.cell, 0.25F * c.cell);
@@ -55,7 +59,8 @@ void place_vertices(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* n
           out.attributes[c][i] = (1 - v.t) * (*a.attributes)[c][a.index] + v.t * (*b.attributes)[c][b.index];
         }
       } else {
-        p = v.kind == FinalVertex::Kind::corner ? clustered(*a.corner, chord) : Vec3(position(*a.corner) + to_vec(v.position));
+        p = v.kind == FinalVertex::Kind::corner ? clustered(*a.corner, chord)
+                                                : Vec3(position(*a.corner) + to_vec(v.position));
         for (std::size_t c = 0; c < attributes; ++c) out.attributes[c][i] = (*a.attributes)[c][a.index];
       }
       const Vec3 world = frame.to_world(p);

@@ -8,8 +8,8 @@
 namespace lamina {
 
 /// `here` is the finished slab, `next` the one above (null at the end). `chord`: SurfaceSettings::chord.
-/// A clustered vertex goes to its corner's projected point, moved outward by chord * curvature * cell^2 (at most a quarter
-/// of a cell), which makes up for triangles cutting inside a curved surface.
+/// A clustered vertex goes to its corner's projected point, moved outward by chord * curvature * cell^2 (at most a
+/// quarter of a cell), which makes up for triangles cutting inside a curved surface.
 void place_vertices(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, const Frame& frame, float chord,
                     VertexBatch& out);
 

@@ -12,8 +12,8 @@
 namespace lamina {
 namespace {
 
-constexpr std::size_t kChunk = 1u << 15;           ///< rows a piece
-constexpr std::uint64_t kBucketSamples = 1u << 15; ///< samples a bucket should hold
+constexpr std::size_t kChunk = 1u << 15;            ///< rows a piece
+constexpr std::uint64_t kBucketSamples = 1u << 15;  ///< samples a bucket should hold
 constexpr std::uint64_t kMaxBuckets = 4096;
 
 struct Piece {
@@ -75,7 +75,8 @@ StoreSettings store_settings(const Survey& survey, const Frame& frame, const std
 Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, double radius_scale,
                 const std::string& directory, const RunContext& run) {
   const PointSourceInfo& info = source.info();
-  SlabStoreWriter writer({info.has_radius, info.has_quality, info.attributes}, store_settings(survey, frame, directory));
+  SlabStoreWriter writer({info.has_radius, info.has_quality, info.attributes},
+                         store_settings(survey, frame, directory));
   constexpr std::int32_t kMax = std::numeric_limits<std::int32_t>::max();
   constexpr std::int32_t kMin = std::numeric_limits<std::int32_t>::min();
   Extent extent{{kMax, kMin, kMax, kMin}, kMax, kMin};
@@ -103,9 +104,10 @@ Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, d
   };
   constexpr std::size_t kInFlight = 8;
   tbb::parallel_pipeline(
-      kInFlight, tbb::make_filter<void, std::shared_ptr<Piece>>(tbb::filter_mode::serial_in_order, take) &
-                     tbb::make_filter<std::shared_ptr<Piece>, std::shared_ptr<Piece>>(tbb::filter_mode::parallel, convert) &
-                     tbb::make_filter<std::shared_ptr<Piece>, void>(tbb::filter_mode::serial_in_order, append));
+      kInFlight,
+      tbb::make_filter<void, std::shared_ptr<Piece>>(tbb::filter_mode::serial_in_order, take) &
+          tbb::make_filter<std::shared_ptr<Piece>, std::shared_ptr<Piece>>(tbb::filter_mode::parallel, convert) &
+          tbb::make_filter<std::shared_ptr<Piece>, void>(tbb::filter_mode::serial_in_order, append));
   if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
   return {writer.finish(), extent};
 }

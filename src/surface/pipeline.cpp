@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "diffuse/diffuse.h"
 #include "lamina/error.h"
 #include "project/finish.h"
 #include "refine/refine.h"
@@ -19,6 +20,7 @@ ProjectSettings project_settings(const SurfaceSettings& s) {
   ProjectSettings p;
   p.fit = s.fit == FitMode::sphere ? Fit::sphere : Fit::plane;
   p.steps = s.steps;
+  p.centres = s.diffuse;
   return p;
 }
 
@@ -52,7 +54,8 @@ void Pipeline::mark(const ActiveBucket& bucket) {
   constexpr std::size_t kPiece = 4096;
   const std::size_t n = bucket.samples.size();
   const auto [low, high] = std::minmax_element(bucket.samples.z.begin(), bucket.samples.z.end());
-  for (covered_ = std::min(covered_, resolved_.lattice.slab_of(*low)); covered_ <= resolved_.lattice.slab_of(*high); ++covered_) {
+  for (covered_ = std::min(covered_, resolved_.lattice.slab_of(*low)); covered_ <= resolved_.lattice.slab_of(*high);
+       ++covered_) {
     window_.cover(covered_);
   }
   tbb::parallel_for(std::size_t{0}, (n + kPiece - 1) / kPiece, [&](std::size_t piece) {
@@ -74,7 +77,10 @@ void Pipeline::refine_to(std::int32_t slab) {
 }
 
 void Pipeline::project_to(std::int32_t slab) {
-  for (; projected_ <= std::min(slab, last_); ++projected_) projector_.project(window_, projected_, feed_);
+  for (; projected_ <= std::min(slab, last_); ++projected_) {
+    projector_.project(window_, projected_, feed_);
+    if (settings_.diffuse) diffuse_slab(window_, projected_);
+  }
 }
 
 void Pipeline::finish_to(std::int32_t slab) {
@@ -139,7 +145,9 @@ void Pipeline::run(const RunContext& run, Stopwatch& watch) {
     const std::int32_t top = std::min(step + settings_.window - 1, last_);  // slabs to triangulate in this step
     const std::int64_t marked = (std::int64_t{top} + 3 + kReachSlabs + 1) * height;
     const std::int64_t needed = (std::int64_t{top} + 3 + 1) * height + static_cast<std::int64_t>(ahead) + 1;
-    watch.time("radii", [&] { feed_.prepare(std::max(marked, needed), [&](const ActiveBucket& b) { watch.time("mark", [&] { mark(b); }); }); });
+    watch.time("radii", [&] {
+      feed_.prepare(std::max(marked, needed), [&](const ActiveBucket& b) { watch.time("mark", [&] { mark(b); }); });
+    });
     watch.time("refine", [&] { refine_to(top + 3); });
     watch.time("project", [&] { project_to(top + 3); });
     watch.time("finish", [&] { finish_to(top + 2); });
@@ -148,7 +156,8 @@ void Pipeline::run(const RunContext& run, Stopwatch& watch) {
     watch.time("cluster and write", [&] { write_finished(); });
     retire();
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
-    if (run.progress) run.progress({"surface", feed_.released(), resolved_.plan.samples, top - first_ + 1, last_ - first_ + 1});
+    if (run.progress)
+      run.progress({"surface", feed_.released(), resolved_.plan.samples, top - first_ + 1, last_ - first_ + 1});
   }
 }
 

@@ -17,10 +17,12 @@ constexpr std::uint64_t kSurveySamples = 1u << 18;  ///< samples whose radii are
 constexpr double kMainCell = 0.64;
 constexpr int kDefaultLevels = 4;
 constexpr int kMaxLevels = 12;
-constexpr std::int32_t kMinSteps = 64;        ///< fixed-point steps a finest cell must have for exact enough positions
-constexpr double kMaxCells = 1 << 20;         ///< finest cells from the origin, the limit of the lattice's keys
+constexpr std::int32_t kMinSteps = 64;  ///< fixed-point steps a finest cell must have for exact enough positions
+constexpr double kMaxCells = 1 << 20;   ///< finest cells from the origin, the limit of the lattice's keys
 
-[[noreturn]] void usage(const std::string& message) { throw Error(ExitCode::usage, message); }
+[[noreturn]] void usage(const std::string& message) {
+  throw Error(ExitCode::usage, message);
+}
 
 void require(bool ok, const char* option, const char* range) {
   if (!ok) usage(fmt::format("{} must be {}", option, range));
@@ -40,8 +42,8 @@ Levels choose_levels(const SurfaceSettings& s, double ratio, const RadiusSurvey&
   return {std::ldexp(main, -std::min(finer, count - 1)), count};
 }
 
-/// Counting cells of 16 samples are four spacings, two radii wide: the finest begin at half of that for the finest cells'
-/// radius, and the coarsest serve the radius of the coarsest cells.
+/// Counting cells of 16 samples are four spacings, two radii wide: the finest begin at half of that for the finest
+/// cells' radius, and the coarsest serve the radius of the coarsest cells.
 void set_counting_cells(const SurfaceSettings& s, const RadiusSurvey& survey, Resolved& out) {
   constexpr double kHalfWidth = 1.15;
   out.radii.min_samples = s.density;
@@ -58,19 +60,22 @@ void set_counting_cells(const SurfaceSettings& s, const RadiusSurvey& survey, Re
   out.radii.finest_cell = static_cast<std::int32_t>(std::clamp(std::lrint(cell), 1L, 1L << 24));
 }
 
-std::uint64_t expected_memory(const SurfaceSettings& s, const Resolved& r, const SlabStore& store, std::size_t attributes) {
+std::uint64_t expected_memory(const SurfaceSettings& s, const Resolved& r, const SlabStore& store,
+                              std::size_t attributes) {
   // The densest slab, from the store's own counts.
   double per_step = 0;
   for (std::size_t b = 0; b < store.buckets(); ++b) {
     if (store.count(b) == 0) continue;
-    per_step = std::max(per_step, static_cast<double>(store.count(b)) / (double{store.z_upper(b)} - store.z_lower(b) + 1));
+    per_step = std::max(per_step, static_cast<double>(store.count(b)) /
+                                      static_cast<double>(std::int64_t{store.z_upper(b)} - store.z_lower(b) + 1));
   }
   const double per_slab = std::min(per_step * r.lattice.slab_height(), static_cast<double>(store.total()));
-  // A sample stands for a quarter of its radius squared of surface; around each cell of surface lie some four and a half
-  // corners, and one and a half cells cross it. Coefficients: docs/performance.md.
+  // A sample stands for a quarter of its radius squared of surface; around each cell of surface lie some four and a
+  // half corners, and one and a half cells cross it. Coefficients: docs/performance.md.
   const double main_cell = kMainCell * r.feed.cell_ratio * (r.feed.cell_follows_support ? s.blend : 1.0);
   const double cells = r.feed.fixed_cell ? 1.0 : 0.25 / (main_cell * main_cell);
-  const double corner_bytes = 4.5 * cells * (4.0 * (kFirstAttribute + static_cast<double>(attributes)) + 12);
+  const double corner_bytes =
+      4.5 * cells * (4.0 * (static_cast<double>(kFirstAttribute) + static_cast<double>(attributes)) + 12);
   const double surface_bytes = 1.5 * cells * (56 + 4.0 * static_cast<double>(attributes) + 2 * 12 + 1.5 * 16);
   const double window = per_slab * ((3.0 + s.window) * corner_bytes + (5.0 + s.window) * surface_bytes);
   const double cached = std::min(static_cast<double>(r.feed.cache_bytes),
@@ -102,7 +107,8 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
     for (float* r : {&survey.low, &survey.median, &survey.high}) *r *= static_cast<float>(s.radius_scale);
   }
   if (!(survey.median > 0)) {
-    throw Error(ExitCode::empty, fmt::format("{}: no sampling density can be estimated: the samples lie at too few places", s.input));
+    throw Error(ExitCode::empty,
+                fmt::format("{}: no sampling density can be estimated: the samples lie at too few places", s.input));
   }
   const double max_radius = resolve(s.max_radius, survey.median * frame.step, s.blend) / frame.step;
   if (max_radius > 0) {
@@ -124,12 +130,15 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
     out.feed.cell_ratio = s.cell.value;
     levels = choose_levels(s, s.cell.value * (out.feed.cell_follows_support ? s.blend : 1.0), survey);
   }
-  const double reach = std::max({std::abs(double{bounds.x_min}), std::abs(double{bounds.x_max}), std::abs(double{bounds.y_min}),
-                                 std::abs(double{bounds.y_max}), std::abs(double{bounds.z_min}), std::abs(double{bounds.z_max})});
+  double reach = 0;
+  for (const std::int32_t end : {bounds.x_min, bounds.x_max, bounds.y_min, bounds.y_max, bounds.z_min, bounds.z_max}) {
+    reach = std::max(reach, std::abs(static_cast<double>(end)));
+  }
   const double smallest = std::max(static_cast<double>(kMinSteps), reach / kMaxCells);
   if (levels.finest < smallest) {
     if (s.cell.unit == Length::Unit::world) {
-      usage(fmt::format("--cell {}: too small for a cloud of this extent; the least is {:.3g}", s.cell.value, smallest * frame.step));
+      usage(fmt::format("--cell {}: too small for a cloud of this extent; the least is {:.3g}", s.cell.value,
+                        smallest * frame.step));
     }
     // Detail finer than the lattice can address: the finest level ends there.
     const int skip = static_cast<int>(std::ceil(std::log2(smallest / levels.finest)));
@@ -138,7 +147,8 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
   }
   // A lattice much coarser than the cloud adds nothing and would overflow the fixed-point range.
   constexpr double kMaxSlab = 1 << 28;
-  if (levels.finest > kMaxSlab) usage(fmt::format("--cell: larger than the whole cloud ({:.3g})", levels.finest * frame.step));
+  if (levels.finest > kMaxSlab)
+    usage(fmt::format("--cell: larger than the whole cloud ({:.3g})", levels.finest * frame.step));
   while (std::ldexp(levels.finest, levels.count - 1) > kMaxSlab) --levels.count;
 
   out.lattice.cell = static_cast<std::int32_t>(std::lrint(levels.finest));
@@ -148,8 +158,11 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
 
   SurfacePlan& plan = out.plan;
   plan.samples = store.total();
-  plan.extent = {(double{bounds.x_max} - bounds.x_min) * frame.step, (double{bounds.y_max} - bounds.y_min) * frame.step,
-                 (double{bounds.z_max} - bounds.z_min) * frame.step};
+  const auto length = [&](std::int32_t low, std::int32_t high) {
+    return static_cast<double>(std::int64_t{high} - low) * frame.step;
+  };
+  plan.extent = {length(bounds.x_min, bounds.x_max), length(bounds.y_min, bounds.y_max),
+                 length(bounds.z_min, bounds.z_max)};
   plan.radius_low = survey.low * frame.step;
   plan.radius_median = survey.median * frame.step;
   plan.radius_high = survey.high * frame.step;

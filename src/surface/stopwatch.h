@@ -18,7 +18,8 @@ class Stopwatch {
     timespec t{};
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
     const auto wall = std::chrono::steady_clock::now().time_since_epoch();
-    return {std::chrono::duration<double>(wall).count(), static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec)};
+    return {std::chrono::duration<double>(wall).count(),
+            static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec)};
   }
 
   /// Runs `work` and books its time on a stage.

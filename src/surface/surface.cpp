@@ -34,8 +34,8 @@ std::string temporary_directory(const SurfaceSettings& settings, const RunContex
   return parent.empty() ? "." : parent;
 }
 
-/// Float positions keep a hundredth of a cell as long as the coordinates are below some ten thousand cells; georeferenced
-/// ones are not.
+/// Float positions keep a hundredth of a cell as long as the coordinates are below some ten thousand cells;
+/// georeferenced ones are not.
 bool needs_double(const Survey& survey, double finest_cell) {
   const double largest = std::max(survey.low.cwiseAbs().maxCoeff(), survey.high.cwiseAbs().maxCoeff());
   return largest * 0x1p-24 > 0.01 * finest_cell;
@@ -81,9 +81,10 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
       stats.rejected.push_back({"radius above --max-radius", feed.counts().undersampled, 0});
     }
     if (sink.triangles() == 0) {
-      throw Error(ExitCode::empty, fmt::format("{}: no surface came out; the samples lie too far apart for their radii (try "
-                                               "--blend or --particlescale above 1)",
-                                               settings.input));
+      throw Error(ExitCode::empty,
+                  fmt::format("{}: no surface came out; the samples lie too far apart for their radii (try "
+                              "--blend or --particlescale above 1)",
+                              settings.input));
     }
     watch.time("commit", [&] { sink.commit(); });
     stats.vertices = sink.vertices();

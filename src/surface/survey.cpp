@@ -105,11 +105,16 @@ Partial look_at_all(PointSource& source, const RunContext& run) {
 
 const char* describe(Defect defect) {
   switch (defect) {
-    case Defect::none: return "usable";
-    case Defect::position: return "non-finite position";
-    case Defect::normal: return "zero or non-finite normal";
-    case Defect::radius: return "radius not positive";
-    case Defect::quality: return "quality negative or non-finite";
+    case Defect::none:
+      return "usable";
+    case Defect::position:
+      return "non-finite position";
+    case Defect::normal:
+      return "zero or non-finite normal";
+    case Defect::radius:
+      return "radius not positive";
+    case Defect::quality:
+      return "quality negative or non-finite";
   }
   return "";
 }
@@ -139,20 +144,25 @@ Survey survey_input(PointSource& source, BadSamples bad, const RunContext& run) 
   Survey survey{p.usable, p.rejected, p.first_row, p.low, p.high, {}};
   for (int k = 1; k < kDefects; ++k) {
     if (p.rejected[k] == 0) continue;
-    const std::string what = fmt::format("{}: {} of {} samples have a {}, the first is row {} (counted from 0)", info.path,
-                                         p.rejected[k], info.count, describe(static_cast<Defect>(k)), p.first_row[k]);
-    if (bad == BadSamples::refuse) throw Error(ExitCode::unreadable, what + "; clean the file or use --bad-samples drop");
+    const std::string what =
+        fmt::format("{}: {} of {} samples have a {}, the first is row {} (counted from 0)", info.path, p.rejected[k],
+                    info.count, describe(static_cast<Defect>(k)), p.first_row[k]);
+    if (bad == BadSamples::refuse)
+      throw Error(ExitCode::unreadable, what + "; clean the file or use --bad-samples drop");
     run.warn(what + "; dropped");
   }
-  if (p.usable == 0) throw Error(ExitCode::empty, fmt::format("{}: none of its {} samples is usable", info.path, info.count));
+  if (p.usable == 0)
+    throw Error(ExitCode::empty, fmt::format("{}: none of its {} samples is usable", info.path, info.count));
   const Eigen::Vector3d extent = p.high - p.low;
   if (!(extent.maxCoeff() > 0)) {
-    throw Error(ExitCode::empty, fmt::format("{}: {}; a surface needs samples at different places", info.path,
-                                             p.usable == 1 ? "only one usable sample"
-                                                           : fmt::format("all {} usable samples lie at one place", p.usable)));
+    throw Error(ExitCode::empty,
+                fmt::format("{}: {}; a surface needs samples at different places", info.path,
+                            p.usable == 1 ? "only one usable sample"
+                                          : fmt::format("all {} usable samples lie at one place", p.usable)));
   }
   if (!std::isfinite(extent.squaredNorm())) {
-    throw Error(ExitCode::unreadable, fmt::format("{}: coordinates span more than double precision can square", info.path));
+    throw Error(ExitCode::unreadable,
+                fmt::format("{}: coordinates span more than double precision can square", info.path));
   }
   const Eigen::Vector3d mean = p.sum / static_cast<double>(p.usable);
   survey.covariance = p.products / static_cast<double>(p.usable) - mean * mean.transpose();

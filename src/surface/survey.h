@@ -21,7 +21,7 @@ struct Survey {
   std::uint64_t usable = 0;
   std::array<std::uint64_t, kDefects> rejected{};
   std::array<std::uint64_t, kDefects> first_row{};
-  Eigen::Vector3d low, high;     ///< bounding box, input coordinates
+  Eigen::Vector3d low, high;  ///< bounding box, input coordinates
   Eigen::Matrix3d covariance;
 };
 
