@@ -286,7 +286,7 @@ std::string outcome_on_small_disk(const std::string& where, const std::function<
   });
 }
 
-TEST(MeshSink, FullDiskIsReportedWherverItFills) {
+TEST(MeshSink, FullDiskIsReportedWhereverItFills) {
   const test::TemporaryFolder small;
   const test::TemporaryFolder large;
   // Vertices too many; faces too many for the temporary folder; each fits but not both together.

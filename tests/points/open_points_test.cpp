@@ -1,4 +1,5 @@
 // Whole files through open_points: every format, type and order against an independent writer; damage; real scans.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -234,6 +235,26 @@ TEST(OpenPoints, ReadsStandardInputFromAPipe) {
     writer.join();
     ::close(ends[0]);
   }
+}
+
+TEST(OpenPoints, StandardInputFromAFileNeedsNoCopy) {
+  const test::TemporaryFolder folder;
+  const std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 1\nproperty int x\nproperty int y\nproperty int z\nend_header\n1 2 3\n";
+  const int file = ::open(test::write_file(folder / "a.ply", "skip" + text).c_str(), O_RDONLY);
+  {
+    const test::Redirected standard_input(STDIN_FILENO, file);
+    EXPECT_THAT(refusal("-", folder / "none"), HasSubstr("standard input: is not a PLY file"));
+    ::lseek(file, 4, SEEK_SET);  // begun: taken like a pipe
+    EXPECT_EQ(open_points("-", folder.path())->info().count, 1);
+  }
+  ::close(file);
+  const int whole = ::open(test::write_file(folder / "a.ply", text).c_str(), O_RDONLY);
+  {
+    const test::Redirected standard_input(STDIN_FILENO, whole);
+    EXPECT_EQ(open_points("-", folder / "none")->info().count, 1);
+  }
+  ::close(whole);
 }
 
 TEST(OpenPoints, StandardInputErrorsNameIt) {
