@@ -131,6 +131,8 @@ void run_render(const RenderOptions& o) {
   } else {
     draw_mesh(renderer, o, context);
   }
+  if (renderer.blank())
+    context.warn(o.input + ": nothing of it is in the picture; is the zoom's place inside the model?");
   write_png(renderer.finish(), o.output);
 }
 

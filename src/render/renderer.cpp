@@ -155,6 +155,10 @@ std::uint64_t Renderer::boundary_edges() const {
   return impl_->boundary;
 }
 
+bool Renderer::blank() const {
+  return impl_->canvas.blank();
+}
+
 Image Renderer::finish() const {
   return impl_->arena.execute([&] { return impl_->canvas.resolve(impl_->settings.supersample); });
 }

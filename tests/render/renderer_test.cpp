@@ -165,6 +165,7 @@ TEST(Render, ZoomFillsThePictureAndCutsWhatHides) {
   renderer.draw(far);
   const Image image = renderer.finish();
   for (const int at : {0, 50, 99}) EXPECT_GT(image.at(at, at)[2], image.at(at, at)[0] + 60);
+  EXPECT_FALSE(renderer.blank());
   s.zoom->radius = 2;  // reaches beyond the near square now, a quarter of the picture wide
   const Image wider = render(near, s);
   EXPECT_NEAR(static_cast<double>(count_covered(wider)), 25 * 25, 60);

@@ -49,6 +49,12 @@ TEST_F(RenderTool, CountsTheBoundary) {
   EXPECT_THAT(outcome.err, HasSubstr("marked 0 boundary edges"));
 }
 
+TEST_F(RenderTool, WarnsOfAnEmptyPicture) {
+  const auto outcome = run_lamina({"render", mesh_, "-o", picture_, "--zoom", "50,0,0,1", "--quiet"});
+  EXPECT_EQ(outcome.code, 0);
+  EXPECT_THAT(outcome.err, HasSubstr("nothing of it is in the picture"));
+}
+
 TEST_F(RenderTool, AnswersBadOptions) {
   const std::vector<std::vector<std::string>> wrong{
       {"--size", "0x5"}, {"--size", "64"},      {"--view", "1,2,3"},    {"--view", "1,91"},      {"--zoom", "0,0,0,-1"},
