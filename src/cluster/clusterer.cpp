@@ -20,6 +20,7 @@ struct Clusterer::Impl {
   ClusterCounts counts;
   Window window;
   std::deque<FinalSlab> finished;
+  FinalSlab spare;  ///< storage of the slab the caller handed back at its last pop
   std::uint64_t next_number = 0;
   std::int64_t first = 0, last = 0;  ///< pushed slabs
   bool begun = false, ended = false;
@@ -53,7 +54,7 @@ void Clusterer::Impl::advance(std::shared_ptr<const IsoSlab> iso) {
   if (slab - 2 < first) return;
   decide(slab - 2);
   if (slab - 3 < first) return;
-  FinalSlab out;
+  FinalSlab out = std::move(spare);
   cluster::number(window, slab - 3, next_number, out, counts);
   finished.push_back(std::move(out));
   window.at(slab - 3).iso.reset();
@@ -91,7 +92,8 @@ void Clusterer::finish() {
 
 bool Clusterer::pop(FinalSlab& out) {
   if (impl_->finished.empty()) return false;
-  out = std::move(impl_->finished.front());
+  std::swap(out, impl_->finished.front());
+  impl_->spare = std::move(impl_->finished.front());
   impl_->finished.pop_front();
   return true;
 }

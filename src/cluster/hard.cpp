@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "cluster/patch.h"
-#include "cluster/piece_test.h"
 
 namespace lamina::cluster {
 namespace {
@@ -19,9 +18,9 @@ Ref corner_ref(const SlabRecord& record, const HardCluster& hard) {
 }
 
 /// Members in mesh order: those of the slab below first.
-std::vector<Ref> members_of(const Window& window, const SlabRecord& record, const HardCluster& hard) {
+void list_members(const Window& window, const SlabRecord& record, const HardCluster& hard, std::vector<Ref>& members) {
   const Ref own = corner_ref(record, hard);
-  std::vector<Ref> members;
+  members.clear();
   for (const HardTriangle& t : triangles_of(record, hard)) {
     for (const Ref v : t.vertex) {
       if (window.corner_of(v) == own) members.push_back(v);
@@ -33,7 +32,6 @@ std::vector<Ref> members_of(const Window& window, const SlabRecord& record, cons
     return a_here != b_here ? b_here : a < b;
   });
   members.erase(std::unique(members.begin(), members.end()), members.end());
-  return members;
 }
 
 std::uint32_t root(std::vector<std::uint32_t>& parent, std::uint32_t i) {
@@ -81,12 +79,14 @@ std::array<float, 3> place(const Window& window, const SlabRecord& record, const
 
 }  // namespace
 
-void split_pieces(Window& window, const SlabRecord& record, HardCluster& hard) {
-  const std::vector<Ref> members = members_of(window, record, hard);
+void split_pieces(Window& window, const SlabRecord& record, HardCluster& hard, HardScratch& scratch) {
+  std::vector<Ref>& members = scratch.members;
+  std::vector<std::uint32_t>& parent = scratch.parent;
+  list_members(window, record, hard, members);
   const auto index_of = [&](Ref v) {
     return static_cast<std::uint32_t>(std::find(members.begin(), members.end(), v) - members.begin());
   };
-  std::vector<std::uint32_t> parent(members.size());
+  parent.resize(members.size());
   std::iota(parent.begin(), parent.end(), 0U);
   for (const HardTriangle& t : triangles_of(record, hard)) {
     std::uint32_t first = kNone;
@@ -106,9 +106,11 @@ void split_pieces(Window& window, const SlabRecord& record, HardCluster& hard) {
   hard.pieces.assign(pieces, {});
 }
 
-void veto_neighbours(Window& window, const SlabRecord& record, const HardCluster& hard) {
+void veto_neighbours(Window& window, const SlabRecord& record, const HardCluster& hard, HardScratch& scratch) {
   const Ref own = corner_ref(record, hard);
-  std::vector<std::uint64_t> steps;  // neighbour cluster and the vertex of this one that begins a step of its ring
+  std::vector<std::uint64_t>& steps =
+      scratch.steps;  // neighbour cluster and the vertex of this one that begins a step of its ring
+  steps.clear();
   for (const HardTriangle& t : triangles_of(record, hard)) {
     const std::array<Ref, 3> corner{window.corner_of(t.vertex[0]), window.corner_of(t.vertex[1]),
                                     window.corner_of(t.vertex[2])};
@@ -127,22 +129,22 @@ void veto_neighbours(Window& window, const SlabRecord& record, const HardCluster
   }
 }
 
-Verdict judge(const Window& window, const SlabRecord& record, HardCluster& hard) {
+Verdict judge(const Window& window, const SlabRecord& record, HardCluster& hard, HardScratch& scratch) {
   const Ref corner = corner_ref(record, hard);
-  std::vector<StarTriangle> all, star;
+  std::vector<StarTriangle>&all = scratch.all, &star = scratch.star;
+  all.clear();
   for (const HardTriangle& t : triangles_of(record, hard)) {
     StarTriangle& s = all.emplace_back();
     s.vertex = t.vertex;
     for (std::size_t k = 0; k < 3; ++k) s.label[k] = label_of(window, t.vertex[k]);
   }
-  PieceScratch scratch;
   bool any = false;
   for (std::size_t piece = 0; piece < hard.pieces.size(); ++piece) {
     const std::uint64_t own = static_cast<std::uint64_t>(corner) << 16 | piece;
     star.clear();
     std::copy_if(all.begin(), all.end(), std::back_inserter(star),
                  [own](const StarTriangle& t) { return t.label[0] == own || t.label[1] == own || t.label[2] == own; });
-    if (!collapses(star, own, scratch)) continue;
+    if (!collapses(star, own, scratch.piece)) continue;
     any = true;
     hard.pieces[piece].collapses = true;
     if (hard.pieces.size() > 1) hard.pieces[piece].position = place(window, record, hard, star, own);

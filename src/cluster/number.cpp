@@ -9,47 +9,66 @@ namespace {
 
 constexpr std::size_t kLeastTriangles = 1 << 15;
 
-/// Appends vertices and counts their global numbers up.
+/// Writes vertices and counts their global numbers up.
 class Numberer {
  public:
-  Numberer(std::uint64_t& next, FinalSlab& out) : next_(next), out_(out) {}
+  /// `room`: at most so many vertices come.
+  Numberer(std::uint64_t next, std::size_t room, FinalSlab& out) : next_(next), out_(out) { out.vertices.resize(room); }
 
-  std::uint32_t add(const FinalVertex& vertex) {
-    if (next_ >= kNone) {
+  /// The number `vertex` gets if it counts.
+  std::uint32_t add(const FinalVertex& vertex, bool counts = true) {
+    out_.vertices[size_] = vertex;
+    const auto number = static_cast<std::uint32_t>(next_ + size_);
+    size_ += counts ? 1 : 0;
+    return number;
+  }
+  /// Returns the next free number.
+  std::uint64_t close() {
+    out_.vertices.resize(size_);
+    if (next_ + size_ > kNone) {
       throw Error(ExitCode::budget, "clustering: slab " + std::to_string(out_.slab) +
                                         ": the mesh has more than 4294967295 vertices; use larger cells or split the "
                                         "input");
     }
-    out_.vertices.push_back(vertex);
-    return static_cast<std::uint32_t>(next_++);
+    return next_ + size_;
   }
+  [[nodiscard]] std::size_t size() const { return size_; }
 
  private:
-  std::uint64_t& next_;
+  std::uint64_t next_;
+  std::size_t size_ = 0;
   FinalSlab& out_;
 };
 
+FinalVertex at_corner(std::uint32_t corner) {
+  FinalVertex vertex;
+  vertex.kind = FinalVertex::Kind::corner;
+  vertex.corner = vertex.other = {corner};
+  return vertex;
+}
+
 void number_corners(SlabRecord& here, Numberer& numberer, ClusterCounts& counts) {
+  std::uint64_t patches = 0;
+  const std::size_t first = numberer.size();
   for (std::uint32_t c = 0; c < here.corners.size(); ++c) {
     const Verdict verdict = here.verdicts[c];
-    if (verdict == Verdict::corner) {
-      FinalVertex vertex;
-      vertex.kind = FinalVertex::Kind::corner;
-      vertex.corner = vertex.other = {c};
-      here.seats[c] = numberer.add(vertex);
-      ++counts.collapsed;
-    } else if (verdict == Verdict::split) {
-      for (Piece& piece : here.hard[here.seats[c]].pieces) {
-        if (!piece.collapses) continue;
-        FinalVertex vertex;
-        vertex.kind = FinalVertex::Kind::patch;
-        vertex.corner = vertex.other = {c};
-        vertex.position = piece.position;
-        piece.number = numberer.add(vertex);
-        ++counts.patches;
-      }
+    if (verdict != Verdict::split) [[likely]] {  // written whether or not it counts: half the corners do, at random
+      const bool collapses = verdict == Verdict::corner;
+      const std::uint32_t number = numberer.add(at_corner(c), collapses);
+      here.seats[c] = collapses ? number : here.seats[c];
+      continue;
+    }
+    for (Piece& piece : here.hard[here.seats[c]].pieces) {
+      if (!piece.collapses) continue;
+      FinalVertex vertex = at_corner(c);
+      vertex.kind = FinalVertex::Kind::patch;
+      vertex.position = piece.position;
+      piece.number = numberer.add(vertex);
+      ++patches;
     }
   }
+  counts.patches += patches;
+  counts.collapsed += numberer.size() - first - patches;
 }
 
 /// The number of the vertex its cluster collapsed to.
@@ -159,9 +178,13 @@ void emit_inner(const SlabRecord& here, FinalSlab& out) {
 void number(Window& window, std::int64_t slab, std::uint64_t& next_number, FinalSlab& out, ClusterCounts& counts) {
   SlabRecord& here = window.at(slab);
   out.slab = slab;
-  Numberer numberer(next_number, out);
+  out.triangles.clear();
+  std::size_t pieces = 0;
+  for (const HardCluster& hard : here.hard) pieces += hard.pieces.size();
+  Numberer numberer(next_number, here.corners.size() + here.vertices.size() + pieces + 1, out);
   number_corners(here, numberer, counts);
   number_isovertices(window, slab, numberer, counts);
+  next_number = numberer.close();
   emit_border(window, slab - 1, out);
   emit_inner(here, out);
   counts.corners += static_cast<std::uint64_t>(

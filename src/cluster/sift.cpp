@@ -11,6 +11,7 @@ namespace lamina::cluster {
 namespace {
 
 constexpr std::size_t kLeast = 1 << 13;
+constexpr std::size_t kLeastHard = 64;
 /// Folds a used vertex into its cluster's note.
 void fold(const VertexNote& vertex, CornerNote& corner) {
   if (!vertex.used()) return;
@@ -132,6 +133,15 @@ void gather_triangles(Window& window, std::int64_t slab) {
   }
 }
 
+template <class Fn>
+void for_hard(SlabRecord& here, const Fn& fn) {
+  for_chunks(here.hard.size(), chunk_count(here.hard.size(), kLeastHard),
+             [&](std::size_t, std::size_t begin, std::size_t end) {
+               HardScratch scratch;
+               for (std::size_t h = begin; h < end; ++h) fn(here.hard[h], scratch);
+             });
+}
+
 }  // namespace
 
 void sift(Window& window, std::int64_t slab) {
@@ -140,9 +150,9 @@ void sift(Window& window, std::int64_t slab) {
   list_hard(here);
   mark_vertices(window, slab);
   gather_triangles(window, slab);
-  tbb::parallel_for(std::size_t{0}, here.hard.size(), [&](std::size_t h) {
-    split_pieces(window, here, here.hard[h]);
-    veto_neighbours(window, here, here.hard[h]);
+  for_hard(here, [&](HardCluster& hard, HardScratch& scratch) {
+    split_pieces(window, here, hard, scratch);
+    veto_neighbours(window, here, hard, scratch);
   });
 }
 
@@ -151,9 +161,8 @@ void decide(Window& window, std::int64_t slab) {
   for (std::size_t c = 0; c < here.corners.size(); ++c) {
     if (here.vetoes[c] != 0 && here.verdicts[c] == Verdict::corner) here.verdicts[c] = Verdict::kept;
   }
-  tbb::parallel_for(std::size_t{0}, here.hard.size(), [&](std::size_t h) {
-    HardCluster& hard = here.hard[h];
-    here.verdicts[hard.corner] = judge(window, here, hard);
+  for_hard(here, [&](HardCluster& hard, HardScratch& scratch) {
+    here.verdicts[hard.corner] = judge(window, here, hard, scratch);
   });
 }
 

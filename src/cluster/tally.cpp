@@ -1,7 +1,5 @@
 #include "cluster/tally.h"
 
-#include <cmath>
-
 #include "cluster/chunks.h"
 
 namespace lamina::cluster {
@@ -9,6 +7,7 @@ namespace {
 
 constexpr std::uint32_t kNext = SlabIndex::kNextSlab;
 constexpr std::size_t kLeastTriangles = 1 << 14;
+constexpr double kPositive = 4294967296.0;  // makes positions positive, so that truncation rounds down
 
 /// Two corners of one cell differ by at most one lattice step per axis, so their slots differ on a lattice of one
 /// level; equal slots elsewhere only send a cluster to the exact test.
@@ -16,7 +15,7 @@ std::uint8_t slot_of(const SurfaceCorner& corner) {
   const double scale = corner.cell > 0 ? 1.0 / static_cast<double>(corner.cell) : 1.0;
   unsigned slot = 0;
   for (const std::int32_t p : corner.position) {
-    const auto step = static_cast<std::int64_t>(std::floor(p * scale));
+    const auto step = static_cast<std::uint64_t>(static_cast<std::int64_t>(p * scale + kPositive));
     slot = (slot << 2) | static_cast<unsigned>(step & 3);
   }
   return static_cast<std::uint8_t>(slot);
@@ -207,14 +206,18 @@ void lay_out(SlabRecord& record, std::shared_ptr<const IsoSlab> iso) {
   record.border.clear();
   record.hard.clear();
   record.hard_triangles.clear();
-  record.corners.assign(corners.size(), {});
+  record.corners.resize(corners.size());
   record.verdicts.assign(corners.size(), Verdict::kept);
   record.vetoes.assign(corners.size(), 0);
   record.seats.assign(corners.size(), kNone);
-  record.vertices.assign(vertices.size(), {});
+  record.vertices.resize(vertices.size());
   for_chunks(corners.size(), chunk_count(corners.size(), kLeastTriangles),
              [&](std::size_t, std::size_t begin, std::size_t end) {
-               for (std::size_t c = begin; c < end; ++c) record.corners[c].slot = slot_of(corners[c]);
+               for (std::size_t c = begin; c < end; ++c) {
+                 CornerNote note;
+                 note.slot = slot_of(corners[c]);
+                 record.corners[c] = note;
+               }
              });
   for (std::size_t v = 0; v < vertices.size(); ++v) {
     const IsoVertex& vertex = vertices[v];
@@ -222,9 +225,11 @@ void lay_out(SlabRecord& record, std::shared_ptr<const IsoSlab> iso) {
       bad_slab(record.slab, "isovertex " + std::to_string(v) + " names a corner beyond the slab's " +
                                 std::to_string(corners.size()));
     }
-    record.vertices[v].direction = static_cast<std::uint8_t>(2 * (vertex.axis % 3) + (vertex.near_high ? 1 : 0));
-    record.vertices[v].corner = vertex.near_high ? vertex.high.bits : vertex.low.bits;
-    if (record.vertices[v].crossing()) record.crossing.push_back(static_cast<std::uint32_t>(v));
+    VertexNote note;
+    note.direction = static_cast<std::uint8_t>(2 * (vertex.axis % 3) + (vertex.near_high ? 1 : 0));
+    note.corner = vertex.near_high ? vertex.high.bits : vertex.low.bits;
+    record.vertices[v] = note;
+    if (note.crossing()) record.crossing.push_back(static_cast<std::uint32_t>(v));
   }
 }
 

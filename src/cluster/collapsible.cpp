@@ -1,4 +1,4 @@
-#include "cluster/piece_test.h"
+#include "cluster/collapsible.h"
 
 #include <algorithm>
 
