@@ -180,11 +180,12 @@ void CellOctree::find_radii(std::int64_t begin, std::int64_t end) {
 //   any cell with enough), except at the coarsest level, where every count is taken for what it is;
 // - neighbours that are refined further, having a child with enough samples, do not bound at this level but through
 //   their children, and so only the samples close to these. Otherwise a step in density would shorten the radii of the
-//   sparse side over the width of one of its own cells, and open a crack there: beside a part 64 times as dense, 11 %
-//   of the samples in a band got less than half their radius, against 2.6 % like this;
+//   sparse side over the width of one of its own cells, and open a crack there: on a plane whose halves differ 64 times
+//   in density, 11 % of the sparse half's samples got less than half their radius, against 2.6 % like this;
 // - for the same reason samples are bounded at every level from the finest up to the one their radius comes from: those
 //   of a clipped cell lie against the cells it was clipped from, whose finest levels tell the density there. What is
-//   left are radii up to 1.65 times the mean one on planes and spheres, where the unbounded ones reached 18 and more.
+//   left are radii up to 1.7 times twice the spacing on uniform planes and spheres, where unbounded ones reached 18 and
+//   48, and up to 3.4 times in single cells along a step in density.
 void CellOctree::find_block_radii(int level, std::uint32_t index, ZRange range) {
   CellBlocks& blocks = levels_[static_cast<std::size_t>(level)];
   CellBlock& block = blocks[index];
