@@ -79,9 +79,9 @@ int run_program(int argc, const char* const* argv, const std::vector<AddTool>& t
   app.require_subcommand(1);
   app.get_formatter()->column_width(34);
   app.get_formatter()->label("SUBCOMMAND", "TOOL");
-  app.get_formatter()->label("Subcommands", "Tools");
   try {
     for (const AddTool add : tools) add(app);
+    for (CLI::App* tool : app.get_subcommands({})) tool->group("Tools");
     cancel_on_signals();
     app.parse(argc, argv);
     return exit_code(ExitCode::ok);

@@ -20,17 +20,19 @@ struct TriangleMesh {
 /// What to do with vertices whose coordinates are NaN or infinite.
 enum class NonFinite {
   refuse,  ///< Error(unreadable) naming the first
-  keep,    ///< read as they stand: for `check`, which counts them
+  keep,    ///< read as they stand, from PLY: for `check`, which counts them; other formats have no words for them
 };
 
 /// Reads OBJ, OFF, PLY or STL, each also as .gz, by extension and content; STL's equal positions are welded. PLY keeps
-/// double positions and every scalar property of its vertices (lists are passed over); the other formats go through
-/// OpenMesh, which holds positions as floats, and bring normals and colours. Every face is kept, non-manifold ones too.
-/// A file without faces gives a mesh without triangles. Throws Error(unreadable) naming the file, the place and what is
-/// wrong: missing, truncated, counts that lie, a face naming a vertex that is not there, a polygon of fewer than three.
+/// every scalar property of its vertices (lists are passed over); the other formats bring normals
+/// and colours. Positions keep double precision, except in STL, whose own precision is float. Every face is
+/// kept, non-manifold ones too. A file without faces gives a mesh without triangles. Throws Error(unreadable) naming
+/// the file, the place and what is wrong: missing, truncated, counts that lie, a face naming a vertex that is not
+/// there, a polygon of fewer than three.
 TriangleMesh read_mesh(const std::string& path, NonFinite non_finite = NonFinite::refuse);
 
-/// Writes OBJ, OFF, STL or PLY by extension; beside, then renamed. Throws Error(budget) when it cannot be written.
+/// Writes PLY, OBJ, OFF or STL by extension; beside, then renamed. Positions read back as the same bits (as floats from
+/// STL). Throws Error(budget) when the file cannot be written, Error(usage) for another extension.
 void write_mesh(const TriangleMesh& mesh, const std::string& path);
 
 }  // namespace lamina

@@ -70,6 +70,8 @@ class Renderer {
 
   /// Boundary edges drawn so far (per mesh, not per view); 0 unless RenderSettings::mark_boundary.
   [[nodiscard]] std::uint64_t boundary_edges() const;
+  /// True as long as nothing is to be seen, such as when a zoom looks beside the model.
+  [[nodiscard]] bool blank() const;
   [[nodiscard]] Image finish() const;
 
  private:

@@ -63,6 +63,7 @@ void SampleFeed::learn(std::vector<float> radii, const OnReady& on_ready) {
   Known& known = known_[ready_];
   for (float& r : radii) {
     ++counts_.samples;
+    if (estimator_ != nullptr) r *= settings_.radius_scale;
     if (settings_.max_radius > 0 && r > settings_.max_radius) {
       ++counts_.undersampled;
       r = 0;
@@ -92,7 +93,7 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
     // q_i is proportional to the sampling density 1 / r^2 (METHOD 3.1), scaled by the finest cell to stay near one.
     const float q = r > 0 ? finest / r : 0.0F;
     out.weight[i] = q * q * (out.samples.quality.empty() ? 1.0F : out.samples.quality[i]);
-    out.level[i] = level_for(static_cast<double>(r) * ratio, lattice_);
+    out.level[i] = settings_.fixed_cell ? std::uint8_t{0} : level_for(static_cast<double>(r) * ratio, lattice_);
   }
 }
 
@@ -142,6 +143,7 @@ Batch SampleFeed::load(const std::vector<std::size_t>& batch) {
 
 void SampleFeed::release(std::int64_t z) {
   while (first_ < ready_ && (store_.count(first_) == 0 || store_.z_upper(first_) < z)) {
+    released_ += store_.count(first_);
     known_.erase(first_);
     const auto hit = std::find_if(cache_.begin(), cache_.end(), [&](const auto& e) { return e.first == first_; });
     if (hit != cache_.end()) {

@@ -25,9 +25,11 @@ struct ActiveBucket {
 using Batch = std::vector<std::shared_ptr<const ActiveBucket>>;
 
 struct FeedSettings {
+  float radius_scale = 1;               ///< multiplies estimated radii; given ones are scaled when read in
   float blend = 1;                      ///< H
   double cell_ratio = 0.9;              ///< a cell is split while larger than this times its smallest radius
   bool cell_follows_support = true;     ///< the smallest R_i = H r_i counts, else the smallest r_i
+  bool fixed_cell = false;              ///< every sample asks for the finest level
   float max_radius = 0;                 ///< samples with a larger r_i are left out, steps; 0: none
   std::size_t cache_bytes = 64u << 20;  ///< memory for samples kept between uses
 };
@@ -55,6 +57,7 @@ class SampleFeed {
   [[nodiscard]] Batch load(const std::vector<std::size_t>& batch);
   /// Forgets buckets that end below z.
   void release(std::int64_t z);
+  [[nodiscard]] std::uint64_t released() const { return released_; }  ///< samples forgotten so far
   [[nodiscard]] const FeedCounts& counts() const { return counts_; }
   /// Largest influence a sample can have, steps: the look-ahead that prepare() needs.
   [[nodiscard]] float support_limit() const { return support_limit_; }
@@ -80,6 +83,7 @@ class SampleFeed {
   std::unordered_map<std::size_t, Known> known_;
   std::list<std::pair<std::size_t, std::shared_ptr<const ActiveBucket>>> cache_;  ///< most recently used first
   std::size_t cached_bytes_ = 0;
+  std::uint64_t released_ = 0;
   FeedCounts counts_;
 };
 

@@ -1,18 +1,15 @@
-// OBJ, OFF and STL through OpenMesh's readers, extended the way OpenMesh means it: an importer of our own. A halfedge
+// OBJ and STL through OpenMesh's readers, extended the way OpenMesh means it: an importer of our own. A halfedge
 // mesh would drop the faces that make a mesh non-manifold, the very faces `check` is asked about; plain arrays keep
 // them.
 #include <fmt/format.h>
 
 #include <OpenMesh/Core/IO/importer/BaseImporter.hh>
 #include <OpenMesh/Core/IO/reader/OBJReader.hh>
-#include <OpenMesh/Core/IO/reader/OFFReader.hh>
 #include <OpenMesh/Core/IO/reader/STLReader.hh>
-#include <OpenMesh/Core/System/omstream.hh>
-#include <cmath>
-#include <cstring>
-#include <mutex>
+#include <algorithm>
 
 #include "lamina/error.h"
+#include "meshes/openmesh_quiet.h"
 #include "meshes/readers.h"
 #include "meshes/text_census.h"
 
@@ -115,28 +112,14 @@ class ArrayImporter final : public om::IO::BaseImporter {
   const std::string& path_;
 };
 
-/// OpenMesh reports on a stream of its own; what went wrong reaches the user as our one line instead. Its readers keep
-/// their state in singletons, so one at a time.
-class QuietOpenMesh {
- public:
-  QuietOpenMesh() : lock_(mutex()) {
-    omerr().disable();
-    omlog().disable();
-  }
-  ~QuietOpenMesh() {
-    omerr().enable();
-    omlog().enable();
-  }
-  QuietOpenMesh(const QuietOpenMesh&) = delete;
-  QuietOpenMesh& operator=(const QuietOpenMesh&) = delete;
-
- private:
-  static std::mutex& mutex() {
-    static std::mutex m;
-    return m;
-  }
-  std::lock_guard<std::mutex> lock_;
-};
+/// Text formats do not say whether their colours reach to 1 or to 255: the largest value does.
+void settle_colour_range(TriangleMesh& mesh) {
+  const bool bytes = std::any_of(mesh.attributes.begin(), mesh.attributes.end(), [](const auto& channel) {
+    return std::any_of(channel.begin(), channel.end(), [](float c) { return c > 1; });
+  });
+  if (bytes)
+    for (auto& a : mesh.layout) a.type = ScalarType::uint8;
+}
 
 bool run_reader(std::istream& in, om::IO::BaseImporter& importer, TextFormat format, bool binary) {
   om::IO::Options options = om::IO::Options::VertexNormal | om::IO::Options::VertexColor;
@@ -144,8 +127,6 @@ bool run_reader(std::istream& in, om::IO::BaseImporter& importer, TextFormat for
   switch (format) {
     case TextFormat::obj:
       return om::IO::OBJReader().read(in, importer, options);
-    case TextFormat::off:
-      return om::IO::OFFReader().read(in, importer, options);
     case TextFormat::stl:
       return om::IO::STLReader().read(in, importer, options);
   }
@@ -156,7 +137,7 @@ bool run_reader(std::istream& in, om::IO::BaseImporter& importer, TextFormat for
 
 TriangleMesh read_with_openmesh(FileBuffer& file, const std::string& path, TextFormat format) {
   // OpenMesh's readers pass over what they do not understand: count first what the file holds.
-  const TextCensus census = take_census(file, path, format);
+  TextCensus census = take_census(file, path, format);
   std::istream in(&file);
   in.seekg(0);
   ArrayImporter importer(path);
@@ -164,17 +145,18 @@ TriangleMesh read_with_openmesh(FileBuffer& file, const std::string& path, TextF
   const bool read = run_reader(in, importer, format, census.binary);
   file.require_sound();
   if (!read) throw Error(ExitCode::unreadable, fmt::format("{}: damaged or not the format its name says", path));
-  if (census.vertices && importer.mesh.positions.size() != *census.vertices)
-    throw Error(ExitCode::unreadable,
-                fmt::format("{}: {} of its {} vertices can be read; look for lines that are not three numbers", path,
-                            importer.mesh.positions.size(), *census.vertices));
+  if (format == TextFormat::obj && importer.mesh.positions.size() != census.positions.size())
+    throw Error(ExitCode::unreadable, fmt::format("{}: {} of its {} vertices can be read", path,
+                                                  importer.mesh.positions.size(), census.positions.size()));
   if (census.faces && importer.faces != *census.faces)
     throw Error(ExitCode::unreadable,
                 fmt::format("{}: {} of the {} faces it promises can be read: the file is cut short or damaged", path,
                             importer.faces, *census.faces));
   TriangleMesh mesh = std::move(importer.mesh);
+  if (format == TextFormat::obj) mesh.positions = std::move(census.positions);
   if (!mesh.normals.empty()) mesh.normals.resize(mesh.positions.size());
   for (auto& a : mesh.attributes) a.resize(mesh.positions.size());
+  settle_colour_range(mesh);
   return mesh;
 }
 

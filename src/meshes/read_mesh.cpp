@@ -1,24 +1,14 @@
 #include <fmt/format.h>
 
-#include <cctype>
 #include <cmath>
-#include <filesystem>
 
 #include "lamina/error.h"
 #include "lamina/mesh.h"
+#include "meshes/format_name.h"
 #include "meshes/readers.h"
 
 namespace lamina {
 namespace {
-
-/// Extension in lower case, the one before .gz where there is one.
-std::string format_of(const std::string& path) {
-  std::filesystem::path p(path);
-  if (p.extension() == ".gz") p = p.stem();
-  std::string e = p.extension().string();
-  for (char& c : e) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return e;
-}
 
 TriangleMesh read_by_format(meshes::FileBuffer& file, const std::string& path) {
   std::istream in(&file);
@@ -29,10 +19,10 @@ TriangleMesh read_by_format(meshes::FileBuffer& file, const std::string& path) {
   if (magic.empty()) throw Error(ExitCode::unreadable, fmt::format("{}: is empty", path));
   in.clear();
   in.seekg(0);
-  const std::string format = format_of(path);
+  const std::string format = meshes::format_name(path);
   if (magic == "ply\n" || magic == "ply\r" || format == ".ply") return meshes::read_ply(file, path);
   if (format == ".obj") return meshes::read_with_openmesh(file, path, meshes::TextFormat::obj);
-  if (format == ".off") return meshes::read_with_openmesh(file, path, meshes::TextFormat::off);
+  if (format == ".off") return meshes::read_off(file, path);
   if (format == ".stl") return meshes::read_with_openmesh(file, path, meshes::TextFormat::stl);
   throw Error(
       ExitCode::unreadable,

@@ -12,7 +12,11 @@ namespace lamina::meshes {
 /// positions to float and forgets attributes it does not know. Throws Error(unreadable).
 TriangleMesh read_ply(FileBuffer& file, const std::string& path);
 
-enum class TextFormat { obj, off, stl };
+/// Ours as well: OpenMesh's reader takes a stream's colours and normals only when it has opened the same file by name
+/// before.
+TriangleMesh read_off(FileBuffer& file, const std::string& path);
+
+enum class TextFormat { obj, stl };
 
 /// Through OpenMesh's reader of the format, every face kept. Throws Error(unreadable).
 TriangleMesh read_with_openmesh(FileBuffer& file, const std::string& path, TextFormat format);

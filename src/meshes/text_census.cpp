@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <bit>
+#include <cmath>
 #include <cstring>
-#include <sstream>
+#include <istream>
 
 #include "lamina/error.h"
+#include "meshes/line_reader.h"
 
 namespace lamina::meshes {
 namespace {
@@ -16,44 +17,35 @@ namespace {
   throw Error(ExitCode::unreadable, fmt::format("{}: {}", path, what));
 }
 
-std::string_view trimmed(const std::string& line) {
-  const auto first = line.find_first_not_of(" \t\r");
-  if (first == std::string::npos) return {};
-  return std::string_view(line).substr(first, line.find_last_not_of(" \t\r") - first + 1);
-}
-
+/// True for a line of the OBJ keyword `letter`.
 bool keyword(std::string_view line, char letter) {
   return line.size() > 1 && line[0] == letter && (line[1] == ' ' || line[1] == '\t');
 }
 
+/// The three coordinates `text` begins with. OpenMesh stops at a number it cannot read: so must we, by name.
+std::array<double, 3> position(std::string_view text, const std::string& path, std::uint64_t line) {
+  std::array<double, 3> p{};
+  for (double& c : p) {
+    const auto value = next_number(text);
+    if (!value || !std::isfinite(*value)) fail(path, fmt::format("line {}: a vertex needs three finite numbers", line));
+    c = *value;
+  }
+  return p;
+}
+
 TextCensus census_obj(std::istream& in, const std::string& path) {
-  TextCensus census{0, 0, false};
+  TextCensus census;
+  census.faces = 0;
   std::string line;
   for (std::uint64_t number = 1; std::getline(in, line); ++number) {
     const auto text = trimmed(line);
-    if (keyword(text, 'v')) ++*census.vertices;
+    if (keyword(text, 'v')) census.positions.push_back(position(text.substr(1), path, number));
     if (keyword(text, 'f')) ++*census.faces;
     if (!text.empty() && text.back() == '\\' && text[0] != '#')
       fail(path, fmt::format("line {} is continued on the next: join the lines, or convert to PLY", number));
   }
-  if (*census.vertices == 0) fail(path, "holds no vertices: not an OBJ file?");
+  if (census.positions.empty()) fail(path, "holds no vertices: not an OBJ file?");
   return census;
-}
-
-/// The counts follow the keyword, on its line or on the next that is neither empty nor a comment.
-TextCensus census_off(std::istream& in, const std::string& path) {
-  std::string line, words;
-  for (int i = 0; i < 1000 && std::getline(in, line); ++i) {
-    line.resize(std::min(line.find('#'), line.size()));
-    const auto text = trimmed(line);
-    if (i == 0 && text.find("OFF") == std::string_view::npos) fail(path, "not an OFF file (no \"OFF\" at its start)");
-    if (text.find("BINARY") != std::string_view::npos) fail(path, "binary OFF is not supported: convert to PLY");
-    words += std::string(text) + ' ';
-    std::istringstream counts(words.substr(words.find("OFF") + 3));
-    std::uint64_t v = 0, f = 0;
-    if (counts >> v >> f) return {v, f, false};
-  }
-  fail(path, "its OFF header has no counts of vertices and faces");
 }
 
 /// A binary file may begin with "solid" too: its length decides.
@@ -70,7 +62,7 @@ TextCensus census_stl(std::istream& in, const std::string& path) {
     in.read(skipped.data(), skipped.size());
     rest += static_cast<std::uint64_t>(in.gcount());
   }
-  if (whole_head && rest == 50 * std::uint64_t{count}) return {std::nullopt, count, true};
+  if (whole_head && rest == 50 * std::uint64_t{count}) return {count, {}, true};
   if (std::string_view(head.data(), 5) != "solid")
     fail(path, whole_head ? fmt::format("its header promises {} triangles but {} bytes follow instead of {}: the file "
                                         "is cut short or damaged",
@@ -78,7 +70,7 @@ TextCensus census_stl(std::istream& in, const std::string& path) {
                           : "not an STL file");
   in.clear();
   in.seekg(0);
-  TextCensus census{std::nullopt, 0, false};
+  TextCensus census{0, {}, false};
   bool ended = false;
   for (std::string line; std::getline(in, line);) {
     const auto text = trimmed(line);
@@ -98,9 +90,6 @@ TextCensus take_census(FileBuffer& file, const std::string& path, TextFormat for
   switch (format) {
     case TextFormat::obj:
       census = census_obj(in, path);
-      break;
-    case TextFormat::off:
-      census = census_off(in, path);
       break;
     case TextFormat::stl:
       census = census_stl(in, path);

@@ -7,6 +7,7 @@
 #include <atomic>
 #include <utility>
 
+#include "project/shared_corners.h"
 #include "project/tile_samples.h"
 
 namespace lamina {
@@ -26,7 +27,8 @@ struct TileState {
 
 struct Work {
   Tile tile;
-  int begin = 0, end = 0;  ///< leaf layers of the slab
+  Projected* points = nullptr;  ///< the block's corners, or its cell centres
+  int begin = 0, end = 0;       ///< leaf layers of the slab
 };
 
 }  // namespace
@@ -46,14 +48,20 @@ void list_queries(const Work& work, std::vector<Query>& out) {
   out.clear();
   std::uint32_t value = 0;
   for (int z = work.begin; z < work.end; ++z) {
-    const std::uint64_t shared = work.tile.leaf->shared.words[z];
-    for (std::uint64_t w = work.tile.leaf->near.words[z]; w != 0; w &= w - 1, ++value) {
+    const bool corners = work.points == work.tile.leaf;
+    const std::uint64_t shared = corners ? work.tile.leaf->shared.words[z] : 0;
+    for (std::uint64_t w = work.points->near.words[z]; w != 0; w &= w - 1, ++value) {
       const int bit = std::countr_zero(w);
       if (((shared >> bit) & 1U) != 0) continue;
       out.push_back({value, static_cast<std::uint8_t>(bit & 7), static_cast<std::uint8_t>(bit >> 3),
                      static_cast<std::uint8_t>(z)});
     }
   }
+}
+
+/// Cell centres lie half a cell above their corner.
+float shift_of(const ProjectSettings& settings) {
+  return settings.centres ? 0.5F : 0.0F;
 }
 
 std::size_t groups_of(const std::vector<Query>& queries) {
@@ -70,15 +78,15 @@ void clear_sums(TileState& state, std::size_t groups, std::size_t channels) {
   for (std::size_t g = 0; g < groups; ++g) state.sums[g * channels + kNearest].v.fill(1e30F);
 }
 
-void start(TileState& state, const std::vector<Query>& queries, std::size_t channels) {
+void start(TileState& state, const std::vector<Query>& queries, std::size_t channels, float shift) {
   const std::size_t groups = groups_of(queries);
   state.points.resize(groups);
   for (std::size_t g = 0; g < groups; ++g) {
     for (int l = 0; l < kLanes; ++l) {
       const Query& q = query_of(queries, g, l);
-      state.points[g].x[l] = q.x;
-      state.points[g].y[l] = q.y;
-      state.points[g].z[l] = q.z;
+      state.points[g].x[l] = static_cast<float>(q.x) + shift;
+      state.points[g].y[l] = static_cast<float>(q.y) + shift;
+      state.points[g].z[l] = static_cast<float>(q.z) + shift;
     }
   }
   clear_sums(state, groups, channels);
@@ -95,14 +103,14 @@ void accumulate(const Kernel& kernel, const RowSamples& rows, TileState& state, 
   }
 }
 
-FitInput fit_input(const TileState& state, const std::vector<Query>& queries, std::size_t g, Fit fit) {
+FitInput fit_input(const TileState& state, const std::vector<Query>& queries, std::size_t g, Fit fit, float shift) {
   FitInput in;
   in.sphere = fit == Fit::sphere;
   for (int l = 0; l < kLanes; ++l) {
     const Query& q = query_of(queries, g, l);
-    in.offset.x[l] = static_cast<float>(q.x) - state.points[g].x[l];
-    in.offset.y[l] = static_cast<float>(q.y) - state.points[g].y[l];
-    in.offset.z[l] = static_cast<float>(q.z) - state.points[g].z[l];
+    in.offset.x[l] = static_cast<float>(q.x) + shift - state.points[g].x[l];
+    in.offset.y[l] = static_cast<float>(q.y) + shift - state.points[g].y[l];
+    in.offset.z[l] = static_cast<float>(q.z) + shift - state.points[g].z[l];
   }
   return in;
 }
@@ -111,17 +119,19 @@ FitInput fit_input(const TileState& state, const std::vector<Query>& queries, st
 constexpr float kStepLimit = 1.5F;
 
 /// Moves the query points to the projected points for the next step.
-void advance(const Kernel& kernel, TileState& state, const std::vector<Query>& queries, std::size_t channels, Fit fit) {
+void advance(const Kernel& kernel, const ProjectSettings& settings, TileState& state, const std::vector<Query>& queries,
+             std::size_t channels) {
+  const float shift = shift_of(settings);
   FitOutput out{};
   for (std::size_t g = 0; g < state.points.size(); ++g) {
-    kernel.fit(&state.sums[g * channels], fit_input(state, queries, g, fit), out);
+    kernel.fit(&state.sums[g * channels], fit_input(state, queries, g, settings.fit, shift), out);
     for (int l = 0; l < kLanes; ++l) {
       const Query& q = query_of(queries, g, l);
       const float d = out.distance[l];
       if (state.sums[g * channels + kW][l] <= 0 || d > kStepLimit || d < -kStepLimit) continue;
-      state.points[g].x[l] = static_cast<float>(q.x) - d * out.nx[l];
-      state.points[g].y[l] = static_cast<float>(q.y) - d * out.ny[l];
-      state.points[g].z[l] = static_cast<float>(q.z) - d * out.nz[l];
+      state.points[g].x[l] = static_cast<float>(q.x) + shift - d * out.nx[l];
+      state.points[g].y[l] = static_cast<float>(q.y) + shift - d * out.ny[l];
+      state.points[g].z[l] = static_cast<float>(q.z) + shift - d * out.nz[l];
     }
   }
   clear_sums(state, state.points.size(), channels);
@@ -135,14 +145,14 @@ struct Tally {
 Tally store(const Kernel& kernel, const ProjectSettings& settings, const Window& window, int level, const Work& work,
             const TileState& state, const std::vector<Query>& queries) {
   const std::size_t channels = kSums + static_cast<std::size_t>(window.attributes());
-  CornerBlock& leaf = *work.tile.leaf;
-  CornerValues& values = leaf.values[window.brick_of(level, work.begin)];
+  Projected& points = *work.points;
+  CornerValues& values = points.values[window.brick_of(level, work.begin)];
   const auto cell = static_cast<float>(window.lattice().cell_size(level));
   Tally tally;
   FitOutput out{};
   for (std::size_t g = 0; g < state.points.size(); ++g) {
     const Lanes* sums = &state.sums[g * channels];
-    kernel.fit(sums, fit_input(state, queries, g, settings.fit), out);
+    kernel.fit(sums, fit_input(state, queries, g, settings.fit, shift_of(settings)), out);
     for (std::size_t i = g * kLanes; i < std::min(queries.size(), (g + 1) * kLanes); ++i) {
       const int l = static_cast<int>(i - g * kLanes);
       const Query& q = queries[i];
@@ -151,10 +161,10 @@ Tally store(const Kernel& kernel, const ProjectSettings& settings, const Window&
       if (sums[kW][l] <= 0 || !has_normal || sums[kNearest][l] > 1) continue;
       const bool good =
           out.reach[l] <= settings.good_reach && sums[kSeen][l] >= static_cast<float>(settings.good_samples);
-      leaf.seen.set(offset);
+      points.seen.set(offset);
       ++tally.seen;
       if (good) {
-        leaf.good.set(offset);
+        points.good.set(offset);
         ++tally.good;
       }
       values.channel(kDistance)[q.value] = out.distance[l] * cell;
@@ -171,44 +181,26 @@ Tally store(const Kernel& kernel, const ProjectSettings& settings, const Window&
   return tally;
 }
 
-/// Tiles of a level with corners to hold values in a slab; allocates the values.
-std::vector<Work> list_work(Window& window, int level, std::int32_t slab) {
+/// Tiles of a level with points to project in a slab; allocates their values.
+std::vector<Work> list_work(Window& window, int level, std::int32_t slab, bool centres) {
   std::vector<Work> work;
   for (const Tile& t : window.tiles(level, slab)) {
-    const std::int32_t first = window.lattice().first_layer(level, slab) - t.block.z * 8;
-    Work w{t, std::max(first, 0), std::min(8, first + window.lattice().layers(level))};
-    std::uint32_t near = 0;
-    for (int z = w.begin; z < w.end; ++z) near += static_cast<std::uint32_t>(std::popcount(t.leaf->near.words[z]));
     t.leaf->task = CornerBlock::kNoTask;
-    if (near == 0) continue;
-    t.leaf->values[window.brick_of(level, w.begin)].allocate(near, window.channels());
+    const std::int32_t first = window.lattice().first_layer(level, slab) - t.block.z * 8;
+    Work w{t, t.leaf, std::max(first, 0), std::min(8, first + window.lattice().layers(level))};
+    if (centres) {
+      std::uint64_t any = 0;
+      for (int z = w.begin; z < w.end; ++z) any |= t.leaf->cells.words[z] & t.leaf->close.words[z];
+      if (any == 0) continue;
+      if (t.leaf->centres == nullptr) t.leaf->centres = std::make_shared<Projected>();
+      w.points = t.leaf->centres.get();
+      for (int z = w.begin; z < w.end; ++z) w.points->near.words[z] = t.leaf->cells.words[z] & t.leaf->close.words[z];
+    }
+    if (!allocate_values(window, level, *w.points, w.begin, w.end)) continue;
     t.leaf->task = static_cast<std::uint32_t>(work.size());
     work.push_back(w);
   }
   return work;
-}
-
-/// Takes over the values of corners that the next finer level holds.
-void copy_shared(Window& window, int level, const Work& work) {
-  CornerBlock& leaf = *work.tile.leaf;
-  CornerValues& values = leaf.values[window.brick_of(level, work.begin)];
-  for (int z = work.begin; z < work.end; ++z) {
-    for (std::uint64_t w = leaf.shared.words[z] & leaf.near.words[z]; w != 0; w &= w - 1) {
-      const int bit = std::countr_zero(w);
-      const int offset = z * 64 + bit;
-      const Cell fine{(work.tile.block.x * 8 + (bit & 7)) * 2, (work.tile.block.y * 8 + (bit >> 3)) * 2,
-                      (work.tile.block.z * 8 + z) * 2};
-      const CornerBlock* from = std::as_const(window).probe(level - 1, block_of(fine));
-      const int o = offset_in_block(fine);
-      if (!from->seen.test(o)) continue;
-      leaf.seen.set(offset);
-      leaf.good.assign(offset, from->good.test(o));
-      const CornerValues& source = from->values[window.brick_of(level - 1, o >> 6)];
-      const std::uint32_t at = from->value_index(o, window.brick_layers(level - 1));
-      const std::uint32_t to = leaf.value_index(offset, window.brick_layers(level));
-      for (int c = 0; c < window.channels(); ++c) values.channel(c)[to] = source.channel(c)[at];
-    }
-  }
 }
 
 }  // namespace
@@ -231,7 +223,7 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
   std::atomic<std::uint64_t> seen = 0;
   std::atomic<std::uint64_t> good = 0;
   for (int level = 0; level < window.levels(); ++level) {
-    const std::vector<Work> work = list_work(window, level, slab);
+    const std::vector<Work> work = list_work(window, level, slab, settings_.centres);
     if (work.empty()) continue;
     const std::int32_t first = lattice.first_layer(level, slab);
     const std::int32_t end = first + lattice.layers(level);
@@ -244,7 +236,7 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
       const float halo = batches.size() == 1 || step > 0 ? level_margin : 0.0F;
       for (std::size_t b = 0; b < batches.size(); ++b) {
         const Batch batch = feed.load(batches[b]);
-        const TileBins bins = bin_samples(window, level, batch, first, end, work.size(), halo);
+        const TileBins bins = bin_samples(window, level, batch, first, end, work.size(), halo, shift_of(settings_));
         tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t t) {
           Scratch::Local& local = scratch_->local.local();
           list_queries(work[t], local.queries);
@@ -252,9 +244,9 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
           TileState& state = kept.empty() ? local.state : kept[t];
           if (b == 0) {
             if (step == 0) {
-              start(state, local.queries, channels);
+              start(state, local.queries, channels, shift_of(settings_));
             } else {
-              advance(kernel_, state, local.queries, channels, settings_.fit);
+              advance(kernel_, settings_, state, local.queries, channels);
             }
           }
           local.rows.gather(lattice, level, work[t].tile.block, batch, bins.index.data() + bins.begin[t],
@@ -263,7 +255,7 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
           if (b + 1 < batches.size()) return;
           if (batches.size() == 1) {
             for (int more = 1; more < settings_.steps; ++more) {
-              advance(kernel_, state, local.queries, channels, settings_.fit);
+              advance(kernel_, settings_, state, local.queries, channels);
               accumulate(kernel_, local.rows, state, channels);
             }
           } else if (step + 1 < settings_.steps) {
@@ -276,8 +268,9 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
         });
       }
     }
-    if (level > 0) {
-      tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t t) { copy_shared(window, level, work[t]); });
+    if (level > 0 && !settings_.centres) {
+      tbb::parallel_for(std::size_t{0}, work.size(),
+                        [&](std::size_t t) { copy_shared(window, level, work[t].tile, work[t].begin, work[t].end); });
     }
     for (const Work& w : work) w.tile.leaf->task = CornerBlock::kNoTask;
   }

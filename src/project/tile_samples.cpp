@@ -29,18 +29,18 @@ std::int32_t floor_cell(double x) {
 }
 
 void bin_piece(const Window& window, int level, const Piece& piece, std::int32_t first, std::int32_t end, float margin,
-               std::vector<Entry>& out) {
+               double shift, std::vector<Entry>& out) {
   const double inv = 1.0 / window.lattice().cell_size(level);
   const LocalSamples& s = piece.bucket->samples;
   for (std::size_t i = piece.begin; i < piece.end; ++i) {
     if (piece.bucket->support[i] <= 0) continue;
     const double reach = (static_cast<double>(piece.bucket->support[i]) + static_cast<double>(margin)) * inv;
-    const double z = s.z[i] * inv;
+    const double z = s.z[i] * inv - shift;
     const std::int32_t z0 = std::max(ceil_cell(z - reach), first);
     const std::int32_t z1 = std::min(floor_cell(z + reach), end - 1);
     if (z0 > z1) continue;
-    const double x = s.x[i] * inv;
-    const double y = s.y[i] * inv;
+    const double x = s.x[i] * inv - shift;
+    const double y = s.y[i] * inv - shift;
     const std::int32_t x0 = ceil_cell(x - reach) >> 3;
     const std::int32_t x1 = floor_cell(x + reach) >> 3;
     const std::int32_t y0 = ceil_cell(y - reach) >> 3;
@@ -60,7 +60,7 @@ void bin_piece(const Window& window, int level, const Piece& piece, std::int32_t
 }  // namespace
 
 TileBins bin_samples(const Window& window, int level, const Batch& batch, std::int32_t first, std::int32_t end,
-                     std::size_t tiles, float margin) {
+                     std::size_t tiles, float margin, double shift) {
   std::vector<Piece> pieces;
   std::uint32_t base = 0;
   for (const auto& bucket : batch) {
@@ -70,7 +70,7 @@ TileBins bin_samples(const Window& window, int level, const Batch& batch, std::i
   }
   std::vector<std::vector<Entry>> entries(pieces.size());
   tbb::parallel_for(std::size_t{0}, pieces.size(),
-                    [&](std::size_t p) { bin_piece(window, level, pieces[p], first, end, margin, entries[p]); });
+                    [&](std::size_t p) { bin_piece(window, level, pieces[p], first, end, margin, shift, entries[p]); });
   TileBins bins;
   bins.begin.assign(tiles + 1, 0);
   for (const auto& piece : entries) {

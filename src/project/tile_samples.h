@@ -16,10 +16,11 @@ struct TileBins {
   std::vector<std::uint32_t> index;
 };
 
-/// Bins a batch into the tiles of a level: a sample goes to every tile that has a corner (of the layers [first, end))
-/// within its support + margin. Tiles are found by CornerBlock::task. Deterministic for any number of threads.
+/// Bins a batch into the tiles of a level: a sample goes to every tile that has a lattice point (of the layers [first,
+/// end)) within its support + margin. Points lie `shift` cells above the corners (0: corners, 0.5: cell centres). Tiles
+/// are found by CornerBlock::task. Deterministic for any number of threads.
 TileBins bin_samples(const Window& window, int level, const Batch& batch, std::int32_t first, std::int32_t end,
-                     std::size_t tiles, float margin);
+                     std::size_t tiles, float margin, double shift);
 
 /// A tile's samples sorted by rows of cells (z, then y; inside a row in the order of the batch).
 class RowSamples {

@@ -234,4 +234,14 @@ void place_corners(Window& window, std::int32_t slab) {
   }
 }
 
+std::uint64_t count_cells(const Window& window, int level, std::int32_t slab) {
+  std::uint64_t n = 0;
+  for (const Tile& t : window.tiles(level, slab)) {
+    const LeafLayers layers = leaf_layers(window, level, slab, t.block);
+    for (int z = layers.begin; z < layers.end; ++z)
+      n += static_cast<std::uint64_t>(std::popcount(t.leaf->cells.words[z]));
+  }
+  return n;
+}
+
 }  // namespace lamina

@@ -24,4 +24,7 @@ void refine_slab(Window& window, std::int32_t slab);
 /// The slab and the one below must be refined.
 void place_corners(Window& window, std::int32_t slab);
 
+/// Leaf cells of a slab at a level.
+std::uint64_t count_cells(const Window& window, int level, std::int32_t slab);
+
 }  // namespace lamina

@@ -43,6 +43,10 @@ float decode(std::uint8_t encoded) {
   return tables().decode[encoded];
 }
 
+bool Canvas::blank() const {
+  return std::none_of(colour_.begin(), colour_.end(), [](const auto& sample) { return sample[3] != 0; });
+}
+
 Image Canvas::resolve(int supersample) const {
   Image image{width_ / supersample, height_ / supersample, {}};
   const auto row_bytes = 3 * static_cast<std::size_t>(image.width);

@@ -35,6 +35,8 @@ class Canvas {
     depth_[index(x, y)] = depth;
     colour_[index(x, y)] = {encode(colour[0]), encode(colour[1]), encode(colour[2]), 1};
   }
+  /// Nothing was drawn yet.
+  [[nodiscard]] bool blank() const;
   /// Averages squares of `supersample` samples over the background.
   [[nodiscard]] Image resolve(int supersample) const;
 

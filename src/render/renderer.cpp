@@ -102,7 +102,7 @@ struct Renderer::Impl {
     const double area = extent.size(0) * extent.size(1) * view.scale * view.scale;
     const double spacing = std::sqrt(area / static_cast<double>(std::max<std::uint64_t>(framed, 1)));
     const double pixel = settings.supersample;
-    return std::clamp(0.8 * spacing, 0.5 * pixel, 6 * pixel) / view.scale;
+    return std::clamp(1.3 * spacing, 0.5 * pixel, 6 * pixel) / view.scale;
   }
 
   RenderSettings settings;
@@ -153,6 +153,10 @@ void Renderer::draw(const SampleBatch& points, const AttributeLayout& layout) {
 
 std::uint64_t Renderer::boundary_edges() const {
   return impl_->boundary;
+}
+
+bool Renderer::blank() const {
+  return impl_->canvas.blank();
 }
 
 Image Renderer::finish() const {

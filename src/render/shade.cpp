@@ -30,12 +30,12 @@ float byte_scale(ScalarType type) {
 }  // namespace
 
 Rgb lit(const Rgb& base, const Eigen::Vector3f& normal, bool back_face) {
-  static const Eigen::Vector3f key = Eigen::Vector3f(-0.40F, 0.50F, 0.77F).normalized();
+  static const Eigen::Vector3f key = Eigen::Vector3f(-0.48F, 0.58F, 0.66F).normalized();
   static const Eigen::Vector3f fill = Eigen::Vector3f(0.65F, -0.15F, 0.74F).normalized();
   static const Eigen::Vector3f half = (key + Eigen::Vector3f::UnitZ()).normalized();
   const float sky = 0.5F + 0.5F * normal.y();
   const float light =
-      0.12F + 0.14F * sky + 0.72F * std::max(0.0F, key.dot(normal)) + 0.16F * std::max(0.0F, fill.dot(normal));
+      0.05F + 0.12F * sky + 0.88F * std::max(0.0F, key.dot(normal)) + 0.14F * std::max(0.0F, fill.dot(normal));
   float shine = std::max(0.0F, half.dot(normal));
   for (int i = 0; i < 5; ++i) shine *= shine;
   const float graze = 1 - std::clamp(normal.z(), 0.0F, 1.0F);

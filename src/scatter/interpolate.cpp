@@ -20,37 +20,13 @@ std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh) {
   return normals;
 }
 
-/// What one unit of the type is worth on the scale 0-255.
-float scale_of(ScalarType type) {
-  switch (type) {
-    case ScalarType::float32:
-    case ScalarType::float64:
-      return 255.0F;
-    case ScalarType::int16:
-    case ScalarType::uint16:
-      return 255.0F / 65535.0F;
-    default:
-      return 1.0F;
-  }
-}
-
 }  // namespace
 
 MeshAttributes::MeshAttributes(const TriangleMesh& mesh)
     : mesh_(mesh),
       made_normals_(mesh.normals.empty() ? vertex_normals(mesh) : std::vector<std::array<float, 3>>{}),
-      normals_(mesh.normals.empty() ? made_normals_ : mesh.normals) {
-  std::array<std::optional<std::size_t>, 3> found;
-  for (std::size_t i = 0; i < mesh.layout.size(); ++i) {
-    const auto& name = mesh.layout[i].name;
-    if (name == "red") found[0] = i;
-    if (name == "green") found[1] = i;
-    if (name == "blue") found[2] = i;
-  }
-  if (!found[0] || !found[1] || !found[2]) return;
-  colours_ = {*found[0], *found[1], *found[2]};
-  colour_scale_ = scale_of(mesh.layout[*found[0]].type);
-}
+      normals_(mesh.normals.empty() ? made_normals_ : mesh.normals),
+      colours_(find_colours(mesh)) {}
 
 Vec3 MeshAttributes::normal(const SurfacePoint& at) const {
   const auto& c = mesh_.triangles[at.triangle];
@@ -66,10 +42,9 @@ std::array<float, 3> MeshAttributes::colour(const SurfacePoint& at) const {
   std::array<float, 3> out{};
   if (!colours_) return out;
   const auto& c = mesh_.triangles[at.triangle];
-  for (std::size_t k = 0; k < 3; ++k) {
-    const auto& channel = mesh_.attributes[(*colours_)[k]];
-    const double value = at.weights[0] * channel[c[0]] + at.weights[1] * channel[c[1]] + at.weights[2] * channel[c[2]];
-    out[k] = static_cast<float>(value) * colour_scale_;
+  for (std::size_t corner = 0; corner < 3; ++corner) {
+    const auto value = colours_->at(mesh_, c[corner]);
+    for (std::size_t k = 0; k < 3; ++k) out[k] += static_cast<float>(at.weights[corner]) * value[k];
   }
   return out;
 }

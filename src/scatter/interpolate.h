@@ -6,6 +6,7 @@
 
 #include "lamina/mesh.h"
 #include "meshes/area_sampler.h"
+#include "meshes/colours.h"
 
 namespace lamina::scatter_detail {
 
@@ -23,8 +24,7 @@ class MeshAttributes {
   const TriangleMesh& mesh_;
   std::vector<std::array<float, 3>> made_normals_;
   const std::vector<std::array<float, 3>>& normals_;
-  std::optional<std::array<std::size_t, 3>> colours_;  ///< which attributes are red, green, blue
-  float colour_scale_ = 1;
+  std::optional<meshes::ColourColumns> colours_;
 };
 
 }  // namespace lamina::scatter_detail

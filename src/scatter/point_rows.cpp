@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
-#include <cstring>
+
+#include "meshes/little_endian.h"
 
 namespace lamina::scatter_detail {
+
+using meshes::put_little;
 
 std::string ply_header(const RowLayout& layout, std::uint64_t count, const std::vector<std::string>& comments) {
   std::string h = "ply\nformat binary_little_endian 1.0\n";
@@ -22,26 +24,19 @@ std::string ply_header(const RowLayout& layout, std::uint64_t count, const std::
   return h + "end_header\n";
 }
 
-template <class T>
-void RowPacker::put(T value) {
-  std::array<char, sizeof(T)> raw;
-  std::memcpy(raw.data(), &value, sizeof(T));
-  if constexpr (std::endian::native == std::endian::big) std::reverse(raw.begin(), raw.end());
-  bytes_.append(raw.data(), raw.size());
-}
-
 void RowPacker::add(const std::array<double, 3>& position, const std::array<double, 3>& normal,
                     const std::array<float, 3>& colour, float confidence) {
   for (const double c : position) {
     if (layout_.double_positions)
-      put(c);
+      put_little(bytes_, c);
     else
-      put(static_cast<float>(c));
+      put_little(bytes_, static_cast<float>(c));
   }
-  for (const double c : normal) put(static_cast<float>(c));
+  for (const double c : normal) put_little(bytes_, static_cast<float>(c));
   if (layout_.colours)
-    for (const float c : colour) put(static_cast<std::uint8_t>(std::lround(std::clamp(c, 0.0F, 255.0F))));
-  if (layout_.confidence) put(confidence);
+    for (const float c : colour)
+      put_little(bytes_, static_cast<std::uint8_t>(std::lround(std::clamp(c, 0.0F, 255.0F))));
+  if (layout_.confidence) put_little(bytes_, confidence);
 }
 
 }  // namespace lamina::scatter_detail

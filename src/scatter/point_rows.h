@@ -26,8 +26,6 @@ class RowPacker {
   [[nodiscard]] const std::string& bytes() const { return bytes_; }
 
  private:
-  template <class T>
-  void put(T value);
   RowLayout layout_;
   std::string bytes_;
 };

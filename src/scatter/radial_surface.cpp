@@ -96,8 +96,8 @@ class DrapedFigure final : public RadialFunction {
  public:
   DrapedFigure() {
     constexpr std::uint64_t kChiselSeed = 0x63686973656Cull;
-    double waves = 3, height = 0.02;
-    for (std::uint64_t octave = 0; octave < kOctaves; ++octave, waves *= 2, height *= 0.45)
+    double waves = 3, height = 0.012;
+    for (std::uint64_t octave = 0; octave < kOctaves; ++octave, waves *= 2, height *= 0.5)
       for (std::uint64_t k = 0; k < kDirections; ++k) {
         CounterRng rng(kChiselSeed, octave * kDirections + k);
         const Vec3 d = random_direction(rng);

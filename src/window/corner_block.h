@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 namespace lamina {
@@ -58,7 +59,24 @@ struct LayerNumbers {
   std::uint32_t corner_base = 0;
 };
 
-struct CornerBlock {
+/// Points of a block that are projected, and what came of it.
+struct Projected {
+  BlockMask near;  ///< carry values (CornerValues): close enough to samples to be projected
+  BlockMask seen;  ///< subset of near: samples contributed; an edge with such an end is valid
+  BlockMask good;  ///< subset of seen: own value is trusted; other corners are extended from good neighbours
+  std::array<CornerValues, 8> values;  ///< by slab inside the leaf, Window::brick_of()
+
+  /// Index of a corner in CornerValues of its brick (`brick_layers` = layers of a slab inside a leaf, a power of two <=
+  /// 8). Meaningful only where near.test(offset).
+  [[nodiscard]] std::uint32_t value_index(int offset, int brick_layers) const {
+    const int z = offset >> 6;
+    std::uint32_t n = 0;
+    for (int w = z & ~(brick_layers - 1); w < z; ++w) n += static_cast<std::uint32_t>(std::popcount(near.words[w]));
+    return n + static_cast<std::uint32_t>(std::popcount(near.words[z] & ((std::uint64_t{1} << (offset & 63)) - 1)));
+  }
+};
+
+struct CornerBlock : Projected {
   static constexpr std::uint32_t kNoTask = ~std::uint32_t{0};
   std::uint32_t task = kNoTask;  ///< number of the block in the list a stage works through, while it does
 
@@ -73,9 +91,6 @@ struct CornerBlock {
   // Corners.
   BlockMask corners;   ///< of the leaf cells in `cells`, of this level
   BlockMask shared;    ///< subset of corners: held by a finer level too, whose value counts
-  BlockMask near;      ///< corners that carry values (CornerValues): close enough to samples to be projected
-  BlockMask seen;      ///< subset of near: samples contributed; an edge with such an end is valid
-  BlockMask good;      ///< subset of seen: own value is trusted; other corners are extended from good neighbours
   BlockMask positive;  ///< sign of every corner in `corners` (outside), set when the slab is finished
 
   // Minimal edges with a sign change, by axis, keyed by their lower corner; written by extraction.
@@ -84,16 +99,8 @@ struct CornerBlock {
   BlockMask surface;                  ///< corners at an end of a crossing edge
   std::array<LayerNumbers, 8> numbers{};
 
-  std::array<CornerValues, 8> values;  ///< by slab inside the leaf, see brick_of()
-
-  /// Index of a corner in CornerValues of its brick (`brick_layers` = layers of a slab inside a leaf, a power of two <=
-  /// 8). Meaningful only where near.test(offset).
-  [[nodiscard]] std::uint32_t value_index(int offset, int brick_layers) const {
-    const int z = offset >> 6;
-    std::uint32_t n = 0;
-    for (int w = z & ~(brick_layers - 1); w < z; ++w) n += static_cast<std::uint32_t>(std::popcount(near.words[w]));
-    return n + static_cast<std::uint32_t>(std::popcount(near.words[z] & ((std::uint64_t{1} << (offset & 63)) - 1)));
-  }
+  /// Cell centres, where diffusion projects those instead of the corners; shared so that a block can be copied.
+  std::shared_ptr<Projected> centres;
 };
 
 }  // namespace lamina

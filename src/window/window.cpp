@@ -18,6 +18,12 @@ openvdb::Coord leaf_origin(const Block& b) {
 /// Beyond this many entries a layer's lookup table costs more memory than it saves time.
 constexpr std::int64_t kTableLimit = std::int64_t{1} << 22;
 
+std::size_t value_bytes(const Projected& points) {
+  std::size_t bytes = 0;
+  for (const CornerValues& v : points.values) bytes += sizeof(float) * v.data.capacity();
+  return bytes;
+}
+
 /// Removes a leaf, and with the last layer of leaves below it every inner node that has seen its time.
 void retire_branch(CornerTree& tree, const openvdb::Coord& origin) {
   using Upper = CornerTree::RootNodeType::ChildNodeType;
@@ -155,7 +161,10 @@ std::vector<Tile> Window::tiles(int level, std::int32_t slab) const {
 void Window::retire_values(std::int32_t slab) {
   for (int level = 0; level < levels(); ++level) {
     const int brick = brick_of(level, lattice_.first_layer(level, slab) & 7);
-    for (const Tile& t : tiles(level, slab)) t.leaf->values[brick] = {};
+    for (const Tile& t : tiles(level, slab)) {
+      t.leaf->values[brick] = {};
+      if (t.leaf->centres != nullptr) t.leaf->centres->values[brick] = {};
+    }
   }
 }
 
@@ -186,7 +195,8 @@ std::size_t Window::memory() const {
       bytes += layer.table.capacity() * sizeof(CornerBlock*);
       for (const Tile& t : layer.tiles) {
         bytes += sizeof(CornerLeaf);
-        for (const CornerValues& v : t.leaf->values) bytes += sizeof(float) * v.data.capacity();
+        bytes += value_bytes(*t.leaf);
+        if (t.leaf->centres != nullptr) bytes += sizeof(Projected) + value_bytes(*t.leaf->centres);
       }
     }
   }

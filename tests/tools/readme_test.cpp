@@ -23,7 +23,7 @@ std::map<std::string, Options> readme_tables() {
   while (std::getline(lines, line)) {
     if (line.starts_with("#")) section = line.substr(line.find(' ') + 1);
     if (!line.starts_with("| `-")) continue;
-    const std::string cell = line.substr(0, line.find(" |", 2));
+    const std::string cell = line.substr(0, line.find(" | ", 2));
     for (auto it = std::sregex_iterator(cell.begin(), cell.end(), option); it != std::sregex_iterator(); ++it) {
       tables[section].insert(it->str());
     }

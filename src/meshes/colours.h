@@ -1,0 +1,24 @@
+// Finding a mesh's colours among its attributes.
+#pragma once
+#include <array>
+#include <cstddef>
+#include <optional>
+
+#include "lamina/mesh.h"
+
+namespace lamina::meshes {
+
+/// Which attributes are red, green, blue, and what brings their type's range to 0-255.
+struct ColourColumns {
+  std::array<std::size_t, 3> columns{};
+  float scale = 1;
+  [[nodiscard]] std::array<float, 3> at(const TriangleMesh& mesh, std::size_t vertex) const {
+    return {scale * mesh.attributes[columns[0]][vertex], scale * mesh.attributes[columns[1]][vertex],
+            scale * mesh.attributes[columns[2]][vertex]};
+  }
+};
+
+/// Empty unless the mesh has all three.
+std::optional<ColourColumns> find_colours(const TriangleMesh& mesh);
+
+}  // namespace lamina::meshes

@@ -1,0 +1,26 @@
+#include "render/boundary.h"
+
+#include <gtest/gtest.h>
+
+#include "render/shapes.h"
+
+namespace lamina::render_detail {
+namespace {
+
+TEST(BoundaryEdges, AreThoseOfOneTriangle) {
+  EXPECT_TRUE(boundary_edges(test::sphere(1, 9)).empty());
+  const std::vector<Edge> sides{{0, 1}, {0, 3}, {1, 2}, {2, 3}};
+  EXPECT_EQ(boundary_edges(test::square(1, 0, {0, 0, 0})), sides);
+  EXPECT_TRUE(boundary_edges({}).empty());
+}
+
+TEST(BoundaryEdges, AnEdgeOfThreeTrianglesIsNone) {
+  TriangleMesh mesh;
+  mesh.positions.resize(5);
+  mesh.triangles = {{0, 1, 2}, {1, 0, 3}, {0, 1, 4}};
+  for (const Edge& edge : boundary_edges(mesh)) EXPECT_NE(edge, (Edge{0, 1}));
+  EXPECT_EQ(boundary_edges(mesh).size(), 6u);
+}
+
+}  // namespace
+}  // namespace lamina::render_detail
