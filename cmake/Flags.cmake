@@ -8,6 +8,10 @@ target_compile_options(lamina_flags INTERFACE
   -ffp-contract=off
   # Lets the compiler vectorise the kernels; neither changes a value.
   -fno-math-errno -fno-trapping-math)
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  # The oldest processor the kernels run on; masks are counted everywhere, and this has an instruction for it.
+  target_compile_options(lamina_flags INTERFACE -march=x86-64-v2)
+endif()
 if(LAMINA_WERROR)
   target_compile_options(lamina_flags INTERFACE -Werror)
 endif()

@@ -45,32 +45,39 @@ Quadrants around_edges(int axis, const Slice& below, const Slice& here) {
 
 void find_crossing(const TileView& tile) {
   CornerBlock& leaf = tile.leaf();
-  const bool may_split = tile.level > 0;
-  Slice cells_below(tile, &CornerBlock::cells, tile.begin - 1);
-  Slice split_below = may_split ? Slice(tile, &CornerBlock::split, tile.begin - 1) : Slice();
-  Slice positive(tile, &CornerBlock::positive, tile.begin);
-  Slice corners(tile, &CornerBlock::corners, tile.begin);
+  // The word of a mask at (x + dx, y + dy, z).
+  const auto shifted = [&](BlockMask CornerBlock::*mask, int dx, int dy, int z) {
+    const CornerBlock* b = tile.neighbour(dx, dy, 0);
+    const std::uint64_t beyond = b == nullptr ? 0 : (b->*mask).words[z];
+    const std::uint64_t here = (leaf.*mask).words[z];
+    return dx > 0 ? bits::shift_x(0, here, beyond, -1) : bits::shift_y(0, here, beyond, -1);
+  };
   for (int z = tile.begin; z < tile.end; ++z) {
-    const Slice cells(tile, &CornerBlock::cells, z);
-    const Slice split = may_split ? Slice(tile, &CornerBlock::split, z) : Slice();
-    const Slice positive_above(tile, &CornerBlock::positive, z + 1);
-    const Slice corners_above(tile, &CornerBlock::corners, z + 1);
-    const std::array<std::uint64_t, 3> change = {
-        (positive.here() ^ positive.at<1, 0>()) & corners.here() & corners.at<1, 0>(),
-        (positive.here() ^ positive.at<0, 1>()) & corners.here() & corners.at<0, 1>(),
-        (positive.here() ^ positive_above.here()) & corners.here() & corners_above.here()};
     for (int axis = 0; axis < 3; ++axis) {
-      std::uint64_t edges = change[axis];
-      if (edges != 0) edges &= around_edges(axis, cells_below, cells).any();
-      if (edges != 0 && may_split) edges &= ~around_edges(axis, split_below, split).any();
-      leaf.crossing[axis].words[z] = edges;
+      leaf.crossing[axis].words[z] = 0;
       leaf.accepted[axis].words[z] = 0;
     }
     leaf.surface.words[z] = 0;
-    cells_below = cells;
-    split_below = split;
-    positive = positive_above;
-    corners = corners_above;
+    const std::uint64_t corners = leaf.corners.words[z];
+    if (corners == 0) continue;
+    const std::uint64_t positive = leaf.positive.words[z];
+    const CornerBlock* above = tile.neighbour(0, 0, (z + 1) >> 3);
+    std::array<std::uint64_t, 3> change = {
+        (positive ^ shifted(&CornerBlock::positive, 1, 0, z)) & corners & shifted(&CornerBlock::corners, 1, 0, z),
+        (positive ^ shifted(&CornerBlock::positive, 0, 1, z)) & corners & shifted(&CornerBlock::corners, 0, 1, z), 0};
+    if (above != nullptr) {
+      change[2] = (positive ^ above->positive.words[(z + 1) & 7]) & corners & above->corners.words[(z + 1) & 7];
+    }
+    if ((change[0] | change[1] | change[2]) == 0) continue;
+    const Slice cells_below(tile, &CornerBlock::cells, z - 1);
+    const Slice cells(tile, &CornerBlock::cells, z);
+    for (int axis = 0; axis < 3; ++axis) change[axis] &= around_edges(axis, cells_below, cells).any();
+    if (tile.level > 0) {
+      const Slice split_below(tile, &CornerBlock::split, z - 1);
+      const Slice split(tile, &CornerBlock::split, z);
+      for (int axis = 0; axis < 3; ++axis) change[axis] &= ~around_edges(axis, split_below, split).any();
+    }
+    for (int axis = 0; axis < 3; ++axis) leaf.crossing[axis].words[z] = change[axis];
   }
 }
 

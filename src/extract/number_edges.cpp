@@ -37,43 +37,49 @@ void assign_numbers(const Window& window, const std::vector<TileView>& views, Is
   out.corner_attributes.assign(static_cast<std::size_t>(window.attributes()), std::vector<float>(corners));
 }
 
-/// A corner's own value, where it may be trusted: what corner_value() answers there, without its search.
-bool own_value(const CornerBlock& leaf, int offset, int brick_layers, int attributes, CornerValue& value,
-               float* extra) {
-  if (!leaf.good.test(offset) || !leaf.near.test(offset)) return false;
-  const CornerValues& values = leaf.values[(offset >> 6) / brick_layers];
-  const float* v = values.data.data() + leaf.value_index(offset, brick_layers);
-  const std::size_t n = values.count;
-  value = {v[kDistance * n], {v[kNormalX * n], v[kNormalY * n], v[kNormalZ * n]}, v[kCurvature * n], v[kReach * n]};
-  for (int a = 0; a < attributes; ++a) extra[a] = v[(kFirstAttribute + a) * n];
-  return true;
-}
-
+/// Fills in the tile's surface corners. Trusted corners are read here, which is what corner_value() answers for them in
+/// the finest level that holds them, without its search.
 void fill_corners(const Window& window, const TileView& tile, IsoSlab& out) {
   const CornerBlock& leaf = tile.leaf();
   const int attributes = window.attributes();
   const int brick_layers = window.brick_layers(tile.level);
   std::vector<float> extra(static_cast<std::size_t>(attributes));
+  std::uint32_t rank = 0;  // in its brick, of the layer's first corner with a value
   for (int z = tile.begin; z < tile.end; ++z) {
+    if (z % brick_layers == 0) rank = 0;
+    const std::uint64_t near = leaf.near.words[z];
+    const std::uint64_t trusted = near & leaf.good.words[z];
+    const std::uint64_t seen = leaf.seen.words[z];
+    const CornerValues& values = leaf.values[z / brick_layers];
+    const std::size_t n = values.count;
     std::uint32_t id = leaf.numbers[z].corner_base;
     for_bits(leaf.surface.words[z], [&](int bit) {
-      const int offset = z * 64 + bit;
-      const Cell cell = tile.cell(offset);
+      const Cell cell = tile.cell(z * 64 + bit);
       SurfaceCorner& c = out.corners[id];
       c.position = window.lattice().position(tile.level, cell);
       c.cell = static_cast<float>(window.lattice().cell_size(tile.level));
+      const std::uint64_t one = std::uint64_t{1} << bit;
       CornerValue value;
-      if (own_value(leaf, offset, brick_layers, attributes, value, extra.data()) ||
-          corner_value(window, tile.level, cell, value, extra.data())) {
+      bool valued = true;
+      if ((trusted & one) != 0) {
+        const float* v = values.data.data() + rank + std::popcount(near & (one - 1));
+        value = {
+            v[kDistance * n], {v[kNormalX * n], v[kNormalY * n], v[kNormalZ * n]}, v[kCurvature * n], v[kReach * n]};
+        for (int a = 0; a < attributes; ++a) extra[a] = v[(kFirstAttribute + a) * n];
+      } else {
+        valued = corner_value(window, tile.level, cell, value, extra.data());
+      }
+      if (valued) {
         for (int i = 0; i < 3; ++i) c.offset[i] = -value.distance * value.normal[i];
         c.normal = value.normal;
         c.distance = value.distance;
         c.curvature = value.curvature;
-        c.reach = leaf.seen.test(offset) ? value.reach : -1.0F;
+        c.reach = (seen & one) != 0 ? value.reach : -1.0F;
         for (int a = 0; a < attributes; ++a) out.corner_attributes[a][id] = extra[a];
       }
       ++id;
     });
+    rank += static_cast<std::uint32_t>(std::popcount(near));
   }
 }
 
