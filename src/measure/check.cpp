@@ -1,7 +1,5 @@
 #include "lamina/check.h"
 
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -11,6 +9,7 @@
 #include "measure/edge_table.h"
 #include "measure/union_find.h"
 #include "meshes/vec3.h"
+#include "meshes/with_threads.h"
 
 namespace lamina {
 namespace {
@@ -151,8 +150,7 @@ CheckReport check_mesh(const TriangleMesh& mesh, const RunContext& run) {
   if (mesh.triangles.size() > 0xFFFFFFFFu / 3)
     throw Error(ExitCode::unreadable, "check: meshes of more than 1,431,655,765 triangles are not supported");
   CheckReport report;
-  tbb::task_arena arena(run.threads > 0 ? run.threads : tbb::task_arena::automatic);
-  arena.execute([&] { report = check(mesh); });
+  meshes::with_threads(run.threads, [&] { report = check(mesh); });
   return report;
 }
 

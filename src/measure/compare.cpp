@@ -1,7 +1,6 @@
 #include "lamina/compare.h"
 
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include "measure/triangle_bvh.h"
 #include "meshes/area_sampler.h"
 #include "meshes/counter_rng.h"
+#include "meshes/with_threads.h"
 
 namespace lamina {
 namespace {
@@ -95,8 +95,7 @@ CompareResult compare(const TriangleMesh& a, const TriangleMesh& b, const Compar
     throw Error(ExitCode::unreadable, "compare: neither side has triangles; one of the two must be a mesh");
   CompareResult result;
   result.diagonal = diagonal_of(b);
-  tbb::task_arena arena(run.threads > 0 ? run.threads : tbb::task_arena::automatic);
-  arena.execute([&] {
+  meshes::with_threads(run.threads, [&] {
     if (!b.triangles.empty()) result.a_to_b = measure_side(a, b, settings, 0);
     if (!a.triangles.empty()) result.b_to_a = measure_side(b, a, settings, 1);
   });

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
-#include <tbb/task_arena.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,6 +11,7 @@
 #include "meshes/counter_rng.h"
 #include "meshes/output_file.h"
 #include "meshes/vec3.h"
+#include "meshes/with_threads.h"
 #include "scatter/interpolate.h"
 #include "scatter/point_rows.h"
 #include "scatter/waves.h"
@@ -60,12 +60,16 @@ class Scanner {
 
   /// The grid spacing at which all views together see about `count` samples.
   [[nodiscard]] double spacing_for(std::uint64_t count) const {
-    constexpr int kTrialRows = 400;
+    constexpr int kTrialRows = 160;
     const double trial = 2 * reach_ / kTrialRows;
-    std::uint64_t seen = 0;
+    std::uint64_t seen = 0, hits = 0;
     for (int view = 0; view < settings_.views; ++view)
-      for (const auto& row : look(view, trial)) seen += row.size();
-    if (seen == 0)
+      for (const auto& row : look(view, trial)) {
+        seen += row.samples.size();
+        hits += row.hits;
+      }
+    // A few rays slip through between the triangles: what they see is not the mesh.
+    if (seen == 0 || seen < hits / 1000)
       throw Error(ExitCode::empty, "scan: no ray hits the mesh's outside; are its triangles turned inside out?");
     return trial * std::sqrt(static_cast<double>(seen) / static_cast<double>(count));
   }
@@ -75,7 +79,10 @@ class Scanner {
     std::array<float, 3> colour;
     float confidence;
   };
-  using Row = std::vector<Sample>;
+  struct Row {
+    std::vector<Sample> samples;
+    std::uint64_t hits = 0;  ///< rays that met the mesh, seen or not
+  };
 
   [[nodiscard]] std::vector<Row> look(int number, double spacing) const {
     const View view = view_number(number, settings_.views);
@@ -96,6 +103,7 @@ class Scanner {
     const Vec3 origin = centre_ + x * view.right + y * view.up + (2 * reach_) * view.towards;
     const auto hit = tree_.first_hit(origin, -1.0 * view.towards);
     if (!hit) return;
+    ++row.hits;
     const auto& c = mesh_.triangles[hit->triangle];
     const Vec3 a = mesh_.positions[c[0]];
     const SurfacePoint at{hit->triangle, hit->weights};
@@ -106,8 +114,8 @@ class Scanner {
     CounterRng rng(settings_.seed, ray);
     const double error = settings_.noise * spacing * bell(rng);
     const Vec3 shaken = normal + settings_.normal_noise * Vec3{bell(rng), bell(rng), bell(rng)};
-    row.push_back({origin - (hit->distance + error) * view.towards, unit(shaken), attributes_.colour(at),
-                   static_cast<float>(facing)});
+    row.samples.push_back({origin - (hit->distance + error) * view.towards, unit(shaken), attributes_.colour(at),
+                           static_cast<float>(facing)});
   }
 
   const ScanSettings& settings_;
@@ -134,15 +142,14 @@ ScanReport scan(const TriangleMesh& mesh, const ScanSettings& settings, const st
                 const RunContext& run) {
   require_sane(mesh, settings);
   ScanReport report;
-  tbb::task_arena arena(run.threads > 0 ? run.threads : tbb::task_arena::automatic);
-  arena.execute([&] {
+  meshes::with_threads(run.threads, [&] {
     const Scanner scanner(mesh, settings);
     report.spacing = scanner.spacing_for(settings.count);
     const scatter_detail::RowLayout layout{false, scanner.has_colour(), true};
     scatter_detail::RowPacker rows(layout);
     for (int view = 0; view < settings.views; ++view)
       for (const auto& row : scanner.look(view, report.spacing))
-        for (const auto& s : row) {
+        for (const auto& s : row.samples) {
           rows.add(s.position, s.normal, s.colour, s.confidence);
           ++report.samples;
         }

@@ -11,6 +11,7 @@
 #include "lamina/error.h"
 #include "meshes/counter_rng.h"
 #include "meshes/output_file.h"
+#include "meshes/with_threads.h"
 #include "scatter/attempt_seed.h"
 #include "scatter/point_rows.h"
 
@@ -121,9 +122,8 @@ ScatterReport scatter(const Surface& surface, const ScatterSettings& settings, c
     return rows;
   };
   const auto write = [&](const scatter_detail::RowPacker& rows) { out.write(rows.bytes()); };
-  tbb::task_arena arena(run.threads > 0 ? run.threads : tbb::task_arena::automatic);
-  arena.execute([&] {
-    const auto in_flight = static_cast<std::size_t>(2 * arena.max_concurrency());
+  meshes::with_threads(run.threads, [&] {
+    const auto in_flight = static_cast<std::size_t>(2 * tbb::this_task_arena::max_concurrency());
     tbb::parallel_pipeline(
         in_flight, tbb::make_filter<void, std::uint64_t>(tbb::filter_mode::serial_in_order, first_of_chunk) &
                        tbb::make_filter<std::uint64_t, scatter_detail::RowPacker>(tbb::filter_mode::parallel, make) &
