@@ -4,28 +4,59 @@
 #include <memory>
 
 #include "lamina/error.h"
+#include "lamina/scan.h"
 #include "lamina/scatter.h"
 #include "tool.h"
 
 namespace lamina::tools {
 namespace {
 
+constexpr const char* kAmphora = "amphora";
+
+std::vector<std::string> known_shapes() {
+  auto names = shape_names();
+  names.emplace_back(kAmphora);
+  return names;
+}
+
 struct ScatterOptions {
   std::string mesh, shape, output;
   bool colour = false;
   ScatterSettings settings;
+  ScanSettings scan;
   RunContext run;
   bool quiet = false;
 };
 
-void run_scatter(const ScatterOptions& o) {
-  TriangleMesh mesh;
-  if (o.shape.empty()) mesh = read_mesh(o.mesh);
-  const auto surface = o.shape.empty() ? mesh_surface(mesh) : shape_surface(o.shape, o.colour);
-  const ScatterReport report = scatter(*surface, o.settings, o.output, o.run);
+void scatter_over(const ScatterOptions& o, const Surface& surface) {
+  const ScatterReport report = scatter(surface, o.settings, o.output, o.run);
   if (!o.quiet)
     fmt::print(stderr, "{} samples on an area of {:.6g}, spacing {:.6g}\n", o.settings.count, report.area,
                report.spacing);
+}
+
+void scan_mesh(const ScatterOptions& o, const TriangleMesh& mesh) {
+  ScanSettings settings = o.scan;
+  settings.count = o.settings.count;
+  settings.seed = o.settings.seed;
+  const ScanReport report = scan(mesh, settings, o.output, o.run);
+  if (!o.quiet)
+    fmt::print(stderr, "{} samples from {} views, grid spacing {:.6g}\n", report.samples, settings.views,
+               report.spacing);
+}
+
+void run_scatter(const ScatterOptions& o, bool scanning) {
+  const bool amphora = o.shape == kAmphora;
+  if (!o.shape.empty() && !amphora) {
+    if (scanning) throw Error(ExitCode::usage, fmt::format("--scan wants a mesh or --shape {}", kAmphora));
+    scatter_over(o, *shape_surface(o.shape, o.colour));
+    return;
+  }
+  const TriangleMesh mesh = amphora ? amphora_mesh() : read_mesh(o.mesh);
+  if (scanning)
+    scan_mesh(o, mesh);
+  else
+    scatter_over(o, *mesh_surface(mesh));
 }
 
 }  // namespace
@@ -36,9 +67,10 @@ void add_scatter(CLI::App& app) {
   auto o = std::make_shared<ScatterOptions>();
   auto* mesh = tool->add_option("MESH", o->mesh, "mesh to sample: .ply .obj .off .stl, each also as .gz");
   auto* shape = tool->add_option("--shape", o->shape, "a procedural shape instead of a mesh")
-                    ->check(CLI::IsMember(shape_names()));
+                    ->check(CLI::IsMember(known_shapes()));
   mesh->excludes(shape);
-  tool->add_flag("--colour,--color", o->colour, "give the shape an analytic pattern of colours (a mesh brings its own)")
+  tool->add_flag("--colour,--color", o->colour,
+                 "give the shape an analytic pattern of colours (a mesh and the amphora bring their own)")
       ->needs(shape);
   tool->add_option("-o,--output", o->output, "points to write: binary little-endian PLY, - for standard output")
       ->required();
@@ -52,11 +84,17 @@ void add_scatter(CLI::App& app) {
           "D: let the density fall D-fold, evenly by octaves, along the longest axis (spacing grows by sqrt(D))")
       ->capture_default_str();
   tool->add_flag("--double", o->settings.double_positions, "write double positions");
+  auto* scanning = tool->add_option(
+      "--scan", o->scan.views,
+      "VIEWS: instead of scattering, scan the mesh (or the amphora) from so many sides; adds confidence");
+  tool->add_option("--scan-noise", o->scan.noise, "range noise, standard deviation in grid spacings")
+      ->capture_default_str()
+      ->needs(scanning);
   tool->add_option("--threads", o->run.threads, "0: all")->capture_default_str();
   tool->add_flag("--quiet", o->quiet, "no summary");
-  tool->callback([o] {
+  tool->callback([o, scanning] {
     if (o->mesh.empty() && o->shape.empty()) throw CLI::RequiredError("MESH or --shape");
-    run_scatter(*o);
+    run_scatter(*o, scanning->count() > 0);
   });
 }
 

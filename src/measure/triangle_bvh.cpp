@@ -241,7 +241,9 @@ std::optional<RayHit> TriangleBvh::first_hit(const Vec3& origin, const Vec3& dir
       const double u = dot(ao, q) / det;
       const Vec3 s = cross(ao, ab);
       const double v = dot(direction, s) / det, t = dot(ac, s) / det;
-      if (u < 0 || v < 0 || u + v > 1 || !(t > 0) || (best && t >= best->distance)) continue;
+      if (u < 0 || v < 0 || u + v > 1 || !(t > 0)) continue;
+      // Of triangles hit at the same place the first of the mesh counts: no matter how the tree was walked.
+      if (best && (t > best->distance || (t == best->distance && order_[i] > best->triangle))) continue;
       best = RayHit{t, order_[i], {1 - u - v, u, v}};
     }
   }
