@@ -22,11 +22,11 @@ struct VertexBatch {
 };
 
 struct MeshSinkSettings {
-  std::string path;            ///< final name; "-" is standard output; links are followed, pipes and devices written to
-  std::string tmp_dir;         ///< for the face file; empty: next to the output (standard output: the system's)
-  AttributeLayout attributes;  ///< written after the normals in their own types; integers are rounded and clamped
-  bool double_positions = false;      ///< `property double x` where float would lose precision
-  std::vector<std::string> comments;  ///< one header line each, beside the signature
+  std::string path{};     ///< final name; "-" is standard output; links are followed, pipes and devices written to
+  std::string tmp_dir{};  ///< for the face file; empty: next to the output (standard output: the system's)
+  AttributeLayout attributes{};   ///< written after the normals in their own types; integers are rounded and clamped
+  bool double_positions = false;  ///< `property double x` where float would lose precision
+  std::vector<std::string> comments{};  ///< one header line each, beside the signature
 };
 
 /// Binary little-endian PLY: x y z nx ny nz and the attributes per vertex, `list uchar int vertex_indices` per face.

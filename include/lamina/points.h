@@ -38,8 +38,8 @@ class PointSource {
   PointSourceInfo info_;
 };
 
-/// Opens a point file by its content (PLY so far: ascii, binary little and big endian). "-" is standard input; it and
-/// other pipes are first spooled to an unlinked file in `tmp_dir` (empty: the system's temporary folder).
+/// Opens a point file by its content (PLY so far: ascii, binary little and big endian). "-" is standard input; pipes
+/// are first spooled to an unlinked file in `tmp_dir` (empty: the system's temporary folder).
 ///
 /// Properties of element `vertex`: x y z; nx ny nz; radius (else pscale); quality (else confidence); every other one is
 /// an attribute, carried as float: integers beyond 2^24 and doubles are rounded to it. Positions in an ascii file keep

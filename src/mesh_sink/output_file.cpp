@@ -20,12 +20,17 @@ namespace fs = std::filesystem;
   throw Error(ExitCode::budget, fmt::format("{}: cannot be written: {}", name, why));
 }
 
-/// The file a link stands for, so that the link stays and its file is replaced.
+/// The file a link stands for (it need not exist yet), so that the link stays and its file is replaced.
 std::string follow_links(const std::string& path) {
+  constexpr int kMostLinks = 40;  // the kernel's limit
+  fs::path target = path;
   std::error_code error;
-  if (!fs::is_symlink(path, error)) return path;
-  const fs::path target = fs::weakly_canonical(path, error);
-  return error ? path : target.string();
+  for (int i = 0; i < kMostLinks && fs::is_symlink(target, error); ++i) {
+    const fs::path next = fs::read_symlink(target, error);
+    if (error) return path;
+    target = next.is_absolute() ? next : target.parent_path() / next;
+  }
+  return target.string();
 }
 
 /// Creates the hidden file; a number is added when a run that was killed left one behind.
@@ -62,7 +67,7 @@ OutputFile::OutputFile(const std::string& path, const std::string& tmp_dir) : na
   const fs::path final_path(path_);
   if ((exists && S_ISDIR(status.st_mode)) || !final_path.has_filename()) refuse(name_, "it is a directory");
   // Renaming would replace a write-protected file all the same.
-  if (exists && ::access(path_.c_str(), W_OK) != 0) refuse(name_, system_message(errno));
+  if (exists && ::faccessat(AT_FDCWD, path_.c_str(), W_OK, AT_EACCESS) != 0) refuse(name_, system_message(errno));
   directory_ = final_path.has_parent_path() ? final_path.parent_path().string() : ".";
   file_ = create_partial(final_path, partial_);
   if (!file_) {

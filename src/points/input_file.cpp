@@ -58,20 +58,23 @@ std::size_t InputFile::read(std::uint64_t offset, void* data, std::size_t size) 
 }
 
 InputFile open_input(const std::string& path, const std::string& tmp_dir) {
-  if (path == "-") return spool(STDIN_FILENO, "standard input", tmp_dir);
-  Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  const bool standard = path == "-";
+  const std::string name = standard ? "standard input" : path;
+  Descriptor file(standard ? ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0) : ::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   struct stat status {};
   if (!file || ::fstat(file.get(), &status) != 0) {
-    throw Error(ExitCode::unreadable, fmt::format("{}: cannot be opened: {}", path, system_message(errno)));
+    throw Error(ExitCode::unreadable, fmt::format("{}: cannot be opened: {}", name, system_message(errno)));
   }
   if (S_ISDIR(status.st_mode)) {
-    throw Error(ExitCode::unreadable, fmt::format("{}: is a directory; name a point file", path));
+    throw Error(ExitCode::unreadable, fmt::format("{}: is a directory; name a point file", name));
   }
-  if (!S_ISREG(status.st_mode)) return spool(file.get(), path, tmp_dir);
+  // Standard input may be a file, too; one that another program has read the beginning of counts as a pipe.
+  const bool whole_file = S_ISREG(status.st_mode) && ::lseek(file.get(), 0, SEEK_CUR) == 0;
+  if (!whole_file) return spool(file.get(), name, tmp_dir);
   ::posix_fadvise(file.get(), 0, 0, POSIX_FADV_SEQUENTIAL);
-  InputFile input{std::move(file), static_cast<std::uint64_t>(status.st_size), path};
+  InputFile input{std::move(file), static_cast<std::uint64_t>(status.st_size), name};
   char start[512];
-  require_ply({start, input.read(0, start, sizeof start)}, path);
+  require_ply({start, input.read(0, start, sizeof start)}, name);
   return input;
 }
 

@@ -18,7 +18,8 @@ struct InputFile {
   std::size_t read(std::uint64_t offset, void* data, std::size_t size) const;
 };
 
-/// Opens a regular file, or spools "-" (standard input), a pipe or a device to an unlinked file in `tmp_dir`.
+/// Opens a file, or "-" for standard input; what is not a regular file read from its beginning (a pipe, a device) is
+/// spooled to an unlinked file in `tmp_dir`.
 /// What does not begin like a PLY is refused before it is spooled.
 InputFile open_input(const std::string& path, const std::string& tmp_dir);
 

@@ -1,0 +1,89 @@
+#include "points/ply_header.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "files/temporary_folder.h"
+#include "lamina/error.h"
+#include "lamina/points.h"
+
+namespace lamina {
+namespace {
+
+using testing::HasSubstr;
+
+std::string refusal(const std::string& text) {
+  try {
+    parse_ply_header(text, "a.ply");
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::unreadable);
+    return e.what();
+  }
+  return "nothing";
+}
+
+TEST(PlyHeader, IsRead) {
+  const std::string text =
+      "ply\r\nformat   binary_big_endian\t1.0 \r\ncomment element x\r\nobj_info y\r\n\r\nelement vertex 12\r\n"
+      "property float32 x\r\nproperty uint8 red\r\nelement face 3\r\nproperty list uchar int "
+      "vertex_indices\r\nend_header\r\n";
+  const PlyHeader header = parse_ply_header(text + "\nmore", "a.ply");
+  EXPECT_EQ(header.format, PlyFormat::big_endian);
+  EXPECT_EQ(header.bytes, text.size());
+  EXPECT_EQ(header.lines, 11);
+  EXPECT_EQ(header.line_end, '\n');
+  ASSERT_EQ(header.elements.size(), 2);
+  EXPECT_EQ(header.elements[0].name, "vertex");
+  EXPECT_EQ(header.elements[0].count, 12);
+  EXPECT_EQ(header.elements[0].properties[1].name, "red");
+  EXPECT_EQ(header.elements[0].properties[1].type, ScalarType::uint8);
+  EXPECT_EQ(header.elements[0].row_bytes(), 5);
+  EXPECT_FALSE(header.elements[0].has_list());
+  EXPECT_TRUE(header.elements[1].has_list());
+  EXPECT_EQ(header.elements[1].properties[0].list_count, ScalarType::uint8);
+  EXPECT_EQ(header.elements[1].properties[0].type, ScalarType::int32);
+}
+
+TEST(PlyHeader, LinesMayEndInCarriageReturnAlone) {
+  const std::string text = "ply\rformat binary_little_endian 1.0\relement vertex 1\rproperty uchar x\rend_header\r";
+  const PlyHeader header = parse_ply_header(text + "\n", "a.ply");  // the data's first byte looks like a line feed
+  EXPECT_EQ(header.bytes, text.size());
+  EXPECT_EQ(header.line_end, '\r');
+}
+
+TEST(PlyHeader, ErrorsNameFileAndLine) {
+  const std::string start = "ply\nformat ascii 1.0\n";
+  EXPECT_THAT(refusal("ply\nformat utf8 1.0\n"), HasSubstr("a.ply, line 2: format 'utf8' is not supported"));
+  EXPECT_THAT(refusal("ply\nformat ascii 2.0\n"), HasSubstr("a.ply, line 2: PLY version '2.0'"));
+  EXPECT_THAT(refusal("ply\nformat ascii\n"), HasSubstr("a version expected"));
+  EXPECT_THAT(refusal("ply\nelement vertex 0\nend_header\n"),
+              HasSubstr("a.ply, line 3: the header ends without a format"));
+  EXPECT_THAT(refusal(start + "element vertex -1\n"),
+              HasSubstr("a.ply, line 3: the count of element 'vertex' is '-1'"));
+  EXPECT_THAT(refusal(start + "element vertex 99999999999999999999\n"), HasSubstr("a whole number expected"));
+  EXPECT_THAT(refusal(start + "element vertex 10 20\n"), HasSubstr("'20' is too much here"));
+  EXPECT_THAT(refusal(start + "element vertex\n"), HasSubstr("a count expected, the line ends"));
+  EXPECT_THAT(refusal(start + "property float x\n"), HasSubstr("a property before the first element"));
+  EXPECT_THAT(refusal(start + "element v 1\nproperty half x\n"), HasSubstr("a.ply, line 4: 'half' is no PLY type"));
+  EXPECT_THAT(refusal(start + "element v 1\nproperty list float int x\n"), HasSubstr("of an integer type"));
+  EXPECT_THAT(refusal(start + "elements\n"), HasSubstr("'elements' is no keyword"));
+  EXPECT_THAT(refusal(start + std::string(300, '\x01') + "\n"),
+              HasSubstr("'????????????????????????????????????????...'"));
+  EXPECT_THAT(refusal(start + "element vertex 0\nend_header"), HasSubstr("no end_header"));
+}
+
+TEST(PlyHeader, EndIsSoughtInTheFirstMegabyteOnly) {
+  const test::TemporaryFolder folder;
+  std::string text = "ply\nformat ascii 1.0\n";
+  while (text.size() < 3u << 20) text += "comment a long story\n";
+  const std::string path = test::write_file(folder / "long.ply", text + "element vertex 0\nend_header\n");
+  try {
+    open_points(path);
+    FAIL();
+  } catch (const Error& e) {
+    EXPECT_THAT(e.what(), HasSubstr("long.ply: no end_header in the first 1048576 bytes"));
+  }
+}
+
+}  // namespace
+}  // namespace lamina

@@ -1,0 +1,91 @@
+#include "points/ply_rows.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "lamina/error.h"
+
+namespace lamina {
+namespace {
+
+using testing::HasSubstr;
+
+PlyHeader header_with(const std::string& vertex_properties) {
+  return parse_ply_header(
+      "ply\nformat binary_little_endian 1.0\nelement camera 1\nproperty float x\nelement vertex 5\n" +
+          vertex_properties + "end_header\n",
+      "a.ply");
+}
+
+const std::string kXyz = "property double x\nproperty double y\nproperty double z\n";
+
+std::string refusal(const PlyHeader& header) {
+  try {
+    understand_vertices(header, "a.ply", "a.ply");
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::unreadable);
+    EXPECT_THAT(e.what(), HasSubstr("a.ply: "));
+    return e.what();
+  }
+  return "nothing";
+}
+
+TEST(PlyRows, PropertiesGetTheirRoles) {
+  const PlyRows rows = understand_vertices(
+      header_with("property uchar red\nproperty float confidence\n" + kXyz +
+                  "property float quality\nproperty float pscale\n"
+                  "property float nx\nproperty float ny\nproperty float nz\nproperty float radius\n"),
+      "-", "standard input");
+  EXPECT_EQ(rows.element, 1);
+  EXPECT_EQ(rows.info.path, "-");
+  EXPECT_EQ(rows.info.count, 5);
+  EXPECT_TRUE(rows.info.has_normals && rows.info.has_radius && rows.info.has_quality && rows.info.double_precision);
+  EXPECT_EQ(rows.info.attributes,
+            (AttributeLayout{
+                {"red", ScalarType::uint8}, {"confidence", ScalarType::float32}, {"pscale", ScalarType::float32}}));
+  EXPECT_EQ(rows.stride, 1 + 4 + 24 + 8 + 12 + 4);
+  EXPECT_EQ(rows.columns[3].role, Role::y);
+  EXPECT_EQ(rows.columns[3].offset, 1 + 4 + 8);
+  EXPECT_EQ(rows.columns[5].role, Role::quality);
+  EXPECT_EQ(rows.columns[6].attribute, 2);
+}
+
+TEST(PlyRows, AlternativeNamesServeWhenAlone) {
+  const PlyRows rows =
+      understand_vertices(header_with(kXyz + "property float pscale\nproperty float confidence\n"), "a", "a");
+  EXPECT_TRUE(rows.info.has_radius && rows.info.has_quality);
+  EXPECT_FALSE(rows.info.has_normals);
+  EXPECT_TRUE(rows.info.attributes.empty());
+}
+
+TEST(PlyRows, RefusesWhatMakesNoPoints) {
+  EXPECT_THAT(refusal(header_with("property float x\nproperty float y\n")),
+              HasSubstr("no property 'z'; points need x y z"));
+  EXPECT_THAT(refusal(header_with(kXyz + "property float nx\nproperty float nz\n")),
+              HasSubstr("normals are incomplete"));
+  EXPECT_THAT(refusal(header_with(kXyz + "property list uchar int ids\n")),
+              HasSubstr("property 'ids' of the vertices is a list"));
+  EXPECT_THAT(refusal(header_with(kXyz + "property float y\n")),
+              HasSubstr("property 'y' of the vertices is there twice"));
+  EXPECT_THAT(refusal(header_with(kXyz + "element vertex 3\n")), HasSubstr("two elements 'vertex'"));
+  const auto without = parse_ply_header("ply\nformat ascii 1.0\nelement face 1\nelement edge 0\nend_header\n", "a.ply");
+  EXPECT_THAT(refusal(without), HasSubstr("no element 'vertex'; its elements are: 'face', 'edge'"));
+}
+
+TEST(PlyRows, BatchKeepsOnlyWhatTheSourceHas) {
+  const PlyRows rows = understand_vertices(header_with(kXyz + "property uchar red\n"), "a", "a");
+  SampleBatch batch;
+  batch.nx.resize(9);
+  batch.radius.resize(9);
+  batch.attributes.resize(4);
+  const auto targets = prepare_batch(rows, 3, 2, batch);
+  EXPECT_EQ(batch.first, 3);
+  EXPECT_EQ(batch.size(), 2);
+  EXPECT_TRUE(batch.nx.empty() && batch.radius.empty());
+  ASSERT_EQ(batch.attributes.size(), 1);
+  EXPECT_EQ(targets[1].wide, batch.y.data());
+  EXPECT_EQ(targets[3].narrow, batch.attributes[0].data());
+}
+
+}  // namespace
+}  // namespace lamina
