@@ -11,13 +11,17 @@ enum class ScalarType { int8, uint8, int16, uint16, int32, uint32, float32, floa
 constexpr int byte_size(ScalarType t) {
   switch (t) {
     case ScalarType::int8:
-    case ScalarType::uint8: return 1;
+    case ScalarType::uint8:
+      return 1;
     case ScalarType::int16:
-    case ScalarType::uint16: return 2;
+    case ScalarType::uint16:
+      return 2;
     case ScalarType::int32:
     case ScalarType::uint32:
-    case ScalarType::float32: return 4;
-    case ScalarType::float64: return 8;
+    case ScalarType::float32:
+      return 4;
+    case ScalarType::float64:
+      return 8;
   }
   return 0;
 }

@@ -20,10 +20,10 @@ struct FinalVertex {
   enum class Kind : std::uint8_t {
     isovertex,  ///< an isovertex that stayed: on its edge, interpolated between `corner` (low) and `other` (high) at t
     corner,     ///< a collapsed component: at the projected point of `corner`
-    patch,      ///< one of several collapsed components of a corner: quadric placement `position`; attributes of `corner`
+    patch,  ///< one of several collapsed components of a corner: quadric placement `position`; attributes of `corner`
   };
   Kind kind = Kind::isovertex;
-  SlabIndex corner, other;        ///< relative to FinalSlab::slab
+  SlabIndex corner, other;  ///< relative to FinalSlab::slab
   float t = 0;
   std::array<float, 3> position{};  ///< patch: offset from `corner`'s position, in steps
 };
@@ -40,7 +40,8 @@ struct ClusterCounts {
 struct FinalSlab {
   std::int64_t slab = 0;
   std::vector<FinalVertex> vertices;
-  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< global vertex numbers; their vertices are out already or are here
+  std::vector<std::array<std::uint32_t, 3>>
+      triangles;  ///< global vertex numbers; their vertices are out already or are here
 };
 
 /// Sliding clusterer: push iso slabs in ascending order without gaps (empty ones included), pop finished slabs.

@@ -8,9 +8,9 @@ namespace lamina {
 
 /// local = rotation * (world - origin) / step, rounded to integers; axis 2 (z) is the sweep axis.
 struct Frame {
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();       ///< input coordinates, centre of the cloud's bounding box
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity(); ///< rows are the local axes in input coordinates
-  double step = 1;                                        ///< input units per fixed-point step (a power of two)
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();        ///< input coordinates, centre of the cloud's bounding box
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< rows are the local axes in input coordinates
+  double step = 1;                                         ///< input units per fixed-point step (a power of two)
 
   [[nodiscard]] Eigen::Vector3d to_local(const Eigen::Vector3d& world) const {
     return rotation * (world - origin) / step;

@@ -6,7 +6,8 @@
 
 namespace lamina {
 
-/// An index into this slab's table, or (top bit set) into the next slab's: a slab's cells reach the next one's first plane.
+/// An index into this slab's table, or (top bit set) into the next slab's: a slab's cells reach the next one's first
+/// plane.
 struct SlabIndex {
   static constexpr std::uint32_t kNextSlab = 0x80000000u;
   std::uint32_t bits = 0;
@@ -25,25 +26,37 @@ struct SurfaceCorner {
   float distance = 0;                      ///< signed distance of the corner, in steps
   float curvature = 0;                     ///< signed mean curvature of the fit, 1/steps; 0 for the plane fit
   float cell = 0;                          ///< edge length of the finest incident cell, in steps
+  /// |projected point - weighted average of the samples| / local support radius; negative where no sample contributes
+  /// and the value is extended from neighbours. A corner without any value has a zero normal.
+  float reach = -1;
 };
 
 /// An isovertex: a minimal edge whose ends have different signs. Owned by the slab that holds the edge's lower end.
+/// Invalid ones (rims of open surfaces) are listed too, but no triangle uses them. A loop that cannot be triangulated
+/// by chords gets a centre vertex: its two corners are any two of the loop's, chosen so that the point at `t` between
+/// them comes close to the loop's mean.
 struct IsoVertex {
+  static constexpr std::uint8_t kCentre = 3;  ///< `axis` of a centre vertex
   SlabIndex low, high;  ///< SurfaceCorner at the lower and upper end
   float t = 0.5F;       ///< position along the edge from low to high, in (0, 1)
-  std::uint8_t axis = 0;
-  std::uint8_t level = 0;
+  std::uint8_t axis = 0;   ///< of the edge, or kCentre
+  std::uint8_t level = 0;  ///< of the edge; of the cell for a centre vertex
   bool near_high = false;  ///< belongs to the cluster of the upper end (t > 0.5)
+  /// Quadrants around the edge without surface, 4 bits: with u, v the axes after `axis` in cyclic order, bit 0 is the
+  /// side (u-, v-), 1 (u+, v-), 2 (u+, v+), 3 (u-, v+). 0: an inner vertex of the mesh. Complete once the vertex's slab
+  /// is triangulated.
+  std::uint8_t open = 0;
 };
 
 using IsoTriangle = std::array<SlabIndex, 3>;  ///< counter-clockwise seen from outside (positive side)
 
 struct IsoSlab {
   std::int64_t slab = 0;
-  std::vector<SurfaceCorner> corners;                  ///< in canonical order (level, tile, corner)
-  std::vector<std::vector<float>> corner_attributes;   ///< one array per attribute, parallel to corners
-  std::vector<IsoVertex> vertices;                     ///< in canonical order
-  std::vector<IsoTriangle> triangles;                  ///< of the slab's cells, in canonical order
+  std::vector<SurfaceCorner> corners;                 ///< in canonical order (level, tile, layer)
+  std::vector<std::vector<float>> corner_attributes;  ///< one array per attribute, parallel to corners
+  /// In canonical order; behind the edges' come centre vertices (by cell), then copies that separate fans.
+  std::vector<IsoVertex> vertices;
+  std::vector<IsoTriangle> triangles;                 ///< of the slab's cells, in canonical order
 };
 
 }  // namespace lamina

@@ -21,9 +21,9 @@ struct Progress {
 
 /// Plain settings; a default-constructed context is silent, uncancellable and uses every core.
 struct RunContext {
-  int threads = 0;               ///< 0: as many as the machine has
-  std::size_t max_memory = 0;    ///< bytes, 0: no limit
-  std::string tmp_dir;           ///< empty: next to the output
+  int threads = 0;             ///< 0: as many as the machine has
+  std::size_t max_memory = 0;  ///< bytes, 0: no limit
+  std::string tmp_dir;         ///< empty: next to the output
   std::function<void(const Progress&)> progress;
   std::function<void(LogLevel, std::string_view)> log;
   const std::atomic<bool>* cancel = nullptr;  ///< set by the caller, e.g. from a signal handler

@@ -18,22 +18,25 @@ struct LocalSamples {
   std::vector<float> quality;                  ///< when the input gave one
   std::vector<std::vector<float>> attributes;  ///< one array per attribute
   [[nodiscard]] std::size_t size() const { return x.size(); }
-  void clear();
-  void reserve(std::size_t n);
+  void clear();                 ///< no samples; keeps memory and the number of attributes
+  void reserve(std::size_t n);  ///< positions, normals and the attributes there are
 };
 
 struct StoreLayout {
   bool has_radius = false;
   bool has_quality = false;
-  AttributeLayout attributes;  ///< stored in their own type: 8-bit colours cost a byte
+  AttributeLayout attributes;  ///< stored in their own type: 8-bit colours cost a byte. Integers are rounded and
+                               ///< clamped to their range, NaN becomes 0; float64 is stored as the float it arrives as
 };
 
 struct StoreSettings {
-  std::string directory;                       ///< where the temporary file goes
-  std::int32_t z_min = 0;                      ///< bucket 0 begins here; lower samples go to bucket 0
-  std::int32_t bucket_height = 1;              ///< steps, > 0
-  std::size_t buckets = 1;                     ///< samples above the last bucket go to the last
-  std::size_t buffer_bytes = 32u << 20;        ///< memory for all unwritten samples together
+  std::string directory;                 ///< where the temporary file goes
+  std::int32_t z_min = 0;                ///< bucket 0 begins here; lower samples go to bucket 0
+  std::int32_t bucket_height = 1;        ///< steps, > 0
+  std::size_t buckets = 1;               ///< samples above the last bucket go to the last
+  std::size_t buffer_bytes = 32u << 20;  ///< memory for all unwritten samples together, compression included; in
+                                         ///< random order 32 KB per bucket make blocks of about 1200 coloured samples,
+                                         ///< 8 KB of 280 (a block costs 16 bytes of index)
 };
 
 /// What the finished store holds. Order inside a bucket is the order of append().
@@ -42,13 +45,17 @@ class SlabStore {
   ~SlabStore();
   SlabStore(SlabStore&&) noexcept;
   SlabStore& operator=(SlabStore&&) noexcept;
+  [[nodiscard]] const StoreLayout& layout() const;
   [[nodiscard]] std::size_t buckets() const;
   [[nodiscard]] std::uint64_t count(std::size_t bucket) const;
-  [[nodiscard]] std::int32_t z_lower(std::size_t bucket) const;  ///< smallest z stored in the bucket (exact)
-  [[nodiscard]] std::int32_t z_upper(std::size_t bucket) const;  ///< largest z stored in the bucket (exact)
+  [[nodiscard]] std::int32_t z_lower(
+      std::size_t bucket) const;  ///< smallest z stored in the bucket (exact); greatest int32 when it is empty
+  [[nodiscard]] std::int32_t z_upper(
+      std::size_t bucket) const;  ///< largest z stored in the bucket (exact); least int32 when it is empty
   [[nodiscard]] std::uint64_t total() const;
   [[nodiscard]] std::uint64_t disk_bytes() const;
-  /// Decompresses one bucket into `out`; safe from several threads. Throws Error(budget) on a read failure.
+  /// Decompresses one bucket into `out` (resized to it); safe from several threads. Throws Error(budget) naming the
+  /// directory when the file cannot be read or is damaged.
   void read(std::size_t bucket, LocalSamples& out) const;
 
  private:
@@ -66,8 +73,10 @@ class SlabStoreWriter {
   ~SlabStoreWriter();
   SlabStoreWriter(const SlabStoreWriter&) = delete;
   SlabStoreWriter& operator=(const SlabStoreWriter&) = delete;
-  /// Appends samples in order. Throws Error(budget) when the disk is full, naming directory and bytes written.
+  /// Appends samples in order; their arrays must be those of the layout (else Error(internal)). Throws Error(budget)
+  /// when the disk is full, naming directory and bytes written.
   void append(const LocalSamples& samples);
+  /// Writes what is left; the writer is spent afterwards (a further append or finish throws Error(internal)).
   SlabStore finish();
 
  private:

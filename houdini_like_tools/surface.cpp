@@ -1,0 +1,154 @@
+// lamina surface: oriented points in, streamed triangle mesh out.
+#include "lamina/surface.h"
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "console.h"
+#include "lamina/error.h"
+#include "tool.h"
+
+namespace lamina::tools {
+namespace {
+
+struct SurfaceOptions {
+  SurfaceSettings settings;
+  RunOptions run;
+  std::string stats;
+};
+
+nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& settings) {
+  nlohmann::ordered_json j;
+  j["input"] = settings.input;
+  j["output"] = settings.output;
+  j["samples"] = s.samples_read;
+  j["samples_used"] = s.plan.samples;
+  j["vertices"] = s.vertices;
+  j["triangles"] = s.triangles;
+  j["levels"] = s.plan.levels;
+  j["leaf_cells_by_level"] = s.leaf_cells;
+  j["finest_cell"] = s.plan.finest_cell;
+  j["slab_height"] = s.plan.slab_height;
+  j["slabs"] = s.plan.slabs;
+  j["radius"] = {{"p01", s.plan.radius_low}, {"median", s.plan.radius_median}, {"p99", s.plan.radius_high}};
+  j["wall_seconds"] = s.wall;
+  j["cpu_seconds"] = s.cpu;
+  j["peak_memory_bytes"] = s.peak_memory;
+  j["expected_memory_bytes"] = s.plan.memory_bytes;
+  j["temporary_disk_bytes"] = s.disk_bytes;
+  for (const StageTime& t : s.stages) j["stages"].push_back({{"stage", t.stage}, {"wall", t.wall}, {"cpu", t.cpu}});
+  j["rejected"] = nlohmann::ordered_json::array();
+  for (const Rejected& r : s.rejected) {
+    j["rejected"].push_back({{"reason", r.reason}, {"count", r.count}, {"first_row", r.first_row}});
+  }
+  j["corners"] = {{"projected", s.corners}, {"seen", s.corners_seen}, {"trusted", s.corners_good}};
+  j["isosurface"] = {{"vertices", s.isovertices},
+                     {"triangles", s.isotriangles},
+                     {"crossing_cells", s.crossing_cells},
+                     {"general_cells", s.general_cells},
+                     {"rejected_loops", s.rejected_loops}};
+  j["clusters"] = {{"seen", s.clusters.corners},
+                   {"collapsed", s.clusters.collapsed},
+                   {"patches", s.clusters.patches},
+                   {"kept_isovertices", s.clusters.kept_isovertices},
+                   {"hard", s.clusters.hard}};
+  return j;
+}
+
+void run_surface(const SurfaceOptions& o) {
+  const RunContext context = make_context(o.run);
+  const SurfaceStats stats = reconstruct_surface(o.settings, context);
+  if (!o.settings.dry_run) {
+    context.info(fmt::format("{} vertices, {} triangles in {:.1f} s ({:.2f} M samples per CPU second, {:.0f} MB)",
+                             stats.vertices, stats.triangles, stats.wall,
+                             static_cast<double>(stats.samples_read) / stats.cpu * 1e-6,
+                             static_cast<double>(stats.peak_memory) * 1e-6));
+  }
+  if (o.stats.empty()) return;
+  std::ofstream file(o.stats);
+  file << to_json(stats, o.settings).dump(2) << '\n';
+  file.flush();
+  if (!file) throw Error(ExitCode::budget, o.stats + ": cannot write the statistics");
+}
+
+template <typename T>
+CLI::CheckedTransformer words(const std::map<std::string, T>& map) {
+  return CLI::CheckedTransformer(map, CLI::ignore_case);
+}
+
+}  // namespace
+
+void add_surface(CLI::App& app) {
+  auto* tool = app.add_subcommand("surface", "Reconstruct a triangle mesh from oriented points, streaming");
+  auto o = std::make_shared<SurfaceOptions>();
+  SurfaceSettings& s = o->settings;
+  tool->add_option("INPUT", s.input, "point file: PLY with positions and normals, - for standard input")->required();
+  auto* output = tool->add_option("-o,--output", s.output, "mesh to write: binary PLY, - for standard output");
+
+  const std::string samples = "Samples";
+  tool->add_option("--frame", s.frame, "pca: sweep along the dominant axis; axis: along the longest input axis")
+      ->transform(words<FrameMode>({{"pca", FrameMode::pca}, {"axis", FrameMode::axis}}))
+      ->option_text("pca|axis [pca]")
+      ->group(samples);
+  tool->add_option("--bad-samples", s.bad_samples, "non-finite, no normal, radius <= 0: leave out, or refuse the file")
+      ->transform(words<BadSamples>({{"drop", BadSamples::drop}, {"refuse", BadSamples::refuse}}))
+      ->option_text("drop|refuse [drop]")
+      ->group(samples);
+  tool->add_option("--particlescale", s.radius_scale, "multiplies every sample's radius, given or estimated")
+      ->capture_default_str()
+      ->group(samples);
+  tool->add_option("--density", s.density, "samples a counting cell needs to give a radius")
+      ->capture_default_str()
+      ->group(samples);
+  add_length(*tool, "--max-radius", s.max_radius, "discard samples with a larger radius as undersampled; 0: none")
+      ->group(samples);
+
+  const std::string fit = "Fit";
+  tool->add_option("--blend", s.blend, "H: the influence radius R is H times a sample's radius r")
+      ->capture_default_str()
+      ->group(fit);
+  tool->add_option("--steps", s.steps, "N: projection steps")->capture_default_str()->group(fit);
+  tool->add_option("--fit", s.fit, "surface fitted to the samples around a corner")
+      ->transform(words<FitMode>({{"plane", FitMode::plane}, {"sphere", FitMode::sphere}}))
+      ->option_text("plane|sphere [sphere]")
+      ->group(fit);
+  tool->add_flag("--diffuse", s.diffuse, "project cell centres and average them at the corners: smoother")->group(fit);
+
+  const std::string lattice = "Octree";
+  add_length(*tool, "--cell", s.cell, "largest leaf cell: a length, or times the smallest r or R around")
+      ->group(lattice);
+  tool->add_option("--levels", s.levels, "octree levels; 0: as the radii ask, at least 4")
+      ->capture_default_str()
+      ->group(lattice);
+
+  const std::string mesh = "Mesh";
+  tool->add_option(
+          "--boundary", s.boundary,
+          "reject where the projection lies farther than this (in R) from the average of its samples; 0: never")
+      ->capture_default_str()
+      ->group(mesh);
+  tool->add_option("--cluster", s.cluster, "vertex clustering; free may change the topology")
+      ->transform(words<ClusterMode>(
+          {{"none", ClusterMode::none}, {"free", ClusterMode::free}, {"preserving", ClusterMode::preserving}}))
+      ->option_text("none|free|preserving [preserving]")
+      ->group(mesh);
+  tool->add_option("--chord", s.chord, "outward shift of clustered vertices, times curvature and cell squared")
+      ->capture_default_str()
+      ->group(mesh);
+
+  tool->add_option("--window", s.window, "slabs each stage advances at once")->capture_default_str()->group("Run");
+  auto* dry = tool->add_flag("--dry-run", s.dry_run, "print levels, slabs, expected memory and disk; write nothing")
+                  ->group("Run");
+  tool->add_option("--stats", o->stats, "write counts, times and memory to this JSON file")->group("Run");
+  add_run_options(*tool, o->run);
+  tool->callback([o, output, dry] {
+    if (output->count() == 0 && dry->count() == 0) throw CLI::RequiredError("--output");
+    run_surface(*o);
+  });
+}
+
+}  // namespace lamina::tools

@@ -1,0 +1,43 @@
+// Integer geometry of the multi-level lattice: levels, cells, corners, slabs (METHOD 3.4; DESIGN "Lattice and levels").
+#pragma once
+#include <array>
+#include <cstdint>
+
+namespace lamina {
+
+/// Coordinates of a cell, or of a corner (the cell's lower end), in units of its level's cells. z is the sweep axis.
+struct Cell {
+  std::int32_t x = 0, y = 0, z = 0;
+  bool operator==(const Cell&) const = default;
+  auto operator<=>(const Cell&) const = default;
+  Cell operator+(const Cell& o) const { return {x + o.x, y + o.y, z + o.z}; }
+};
+
+/// Division rounding down; `b` > 0.
+constexpr std::int32_t floor_div(std::int32_t a, std::int32_t b) {
+  const std::int32_t q = a / b;
+  return q - static_cast<std::int32_t>(a % b != 0 && a < 0);
+}
+
+/// One global lattice; level 0 is the finest, sizes double per level, all levels share the origin (fixed-point zero).
+/// A slab is one layer of cells of the coarsest level.
+struct Lattice {
+  std::int32_t cell = 1;  ///< edge of a level-0 cell in fixed-point steps, >= 1
+  int levels = 4;         ///< number of levels, 1..12
+
+  [[nodiscard]] std::int32_t cell_size(int level) const { return cell << level; }
+  [[nodiscard]] std::int32_t slab_height() const { return cell << (levels - 1); }  ///< steps
+  [[nodiscard]] int layers(int level) const { return 1 << (levels - 1 - level); }  ///< level's cell layers in a slab
+  /// First layer (z coordinate of cells) of a slab at a level.
+  [[nodiscard]] std::int32_t first_layer(int level, std::int32_t slab) const { return slab * layers(level); }
+  /// Slab that owns a layer of cells or corners: the corner plane z = first_layer(level, s) belongs to slab s.
+  [[nodiscard]] std::int32_t slab_of_layer(int level, std::int32_t z) const { return z >> (levels - 1 - level); }
+  [[nodiscard]] std::int32_t slab_of(std::int32_t fixed_z) const { return floor_div(fixed_z, slab_height()); }
+  /// Fixed-point position of a corner.
+  [[nodiscard]] std::array<std::int32_t, 3> position(int level, const Cell& c) const {
+    const std::int32_t a = cell_size(level);
+    return {c.x * a, c.y * a, c.z * a};
+  }
+};
+
+}  // namespace lamina

@@ -1,0 +1,115 @@
+#include "extract/crossing.h"
+
+#include <atomic>
+
+namespace lamina {
+namespace {
+
+/// Corners at layer z with a subdivided cell among the eight around them: a finer level may hold them too.
+std::uint64_t beside_split(const Slice& below, const Slice& here) {
+  const auto four = [](const Slice& s) { return s.here() | s.at<-1, 0>() | s.at<0, -1>() | s.at<-1, -1>(); };
+  return four(below) | four(here);
+}
+
+void set_shared(std::uint64_t& word, std::uint64_t bits) {
+  if (bits != 0) std::atomic_ref(word).fetch_or(bits, std::memory_order_relaxed);
+}
+
+/// The finest level that holds a corner of `level`. Levels in between need not hold it: a leaf cell may lie beside one
+/// that is subdivided twice there.
+void mark_finest(Window& window, int level, Cell corner) {
+  CornerBlock* holder = window.probe(level, block_of(corner));
+  int offset = offset_in_block(corner);
+  while (level-- > 0) {
+    corner = {corner.x * 2, corner.y * 2, corner.z * 2};
+    CornerBlock* block = window.probe(level, block_of(corner));
+    if (block == nullptr || !block->corners.test(offset_in_block(corner))) continue;
+    holder = block;
+    offset = offset_in_block(corner);
+  }
+  set_shared(holder->surface.words[offset >> 6], std::uint64_t{1} << (offset & 63));
+}
+
+}  // namespace
+
+Quadrants around_edges(int axis, const Slice& below, const Slice& here) {
+  switch (axis) {
+    case 0:
+      return {{below.at<0, -1>(), below.here(), here.here(), here.at<0, -1>()}};
+    case 1:
+      return {{below.at<-1, 0>(), here.at<-1, 0>(), here.here(), below.here()}};
+    default:
+      return {{here.at<-1, -1>(), here.at<0, -1>(), here.here(), here.at<-1, 0>()}};
+  }
+}
+
+void find_crossing(const TileView& tile) {
+  CornerBlock& leaf = tile.leaf();
+  const bool may_split = tile.level > 0;
+  Slice cells_below(tile, &CornerBlock::cells, tile.begin - 1);
+  Slice split_below = may_split ? Slice(tile, &CornerBlock::split, tile.begin - 1) : Slice();
+  Slice positive(tile, &CornerBlock::positive, tile.begin);
+  Slice corners(tile, &CornerBlock::corners, tile.begin);
+  for (int z = tile.begin; z < tile.end; ++z) {
+    const Slice cells(tile, &CornerBlock::cells, z);
+    const Slice split = may_split ? Slice(tile, &CornerBlock::split, z) : Slice();
+    const Slice positive_above(tile, &CornerBlock::positive, z + 1);
+    const Slice corners_above(tile, &CornerBlock::corners, z + 1);
+    const std::array<std::uint64_t, 3> change = {
+        (positive.here() ^ positive.at<1, 0>()) & corners.here() & corners.at<1, 0>(),
+        (positive.here() ^ positive.at<0, 1>()) & corners.here() & corners.at<0, 1>(),
+        (positive.here() ^ positive_above.here()) & corners.here() & corners_above.here()};
+    for (int axis = 0; axis < 3; ++axis) {
+      std::uint64_t edges = change[axis];
+      if (edges != 0) edges &= around_edges(axis, cells_below, cells).any();
+      if (edges != 0 && may_split) edges &= ~around_edges(axis, split_below, split).any();
+      leaf.crossing[axis].words[z] = edges;
+      leaf.accepted[axis].words[z] = 0;
+    }
+    leaf.surface.words[z] = 0;
+    cells_below = cells;
+    split_below = split;
+    positive = positive_above;
+    corners = corners_above;
+  }
+}
+
+void mark_surface(const TileView& tile, Window& window) {
+  const auto crossing = [&](int axis, int dx, int dy, int z) {
+    const CornerBlock* b = tile.neighbour(dx, dy, z < 0 ? -1 : 0);
+    return b == nullptr ? std::uint64_t{0} : b->crossing[axis].words[z & 7];
+  };
+  CornerBlock& leaf = tile.leaf();
+  for (int z = tile.begin; z < tile.end; ++z) {
+    const std::uint64_t along_x = crossing(0, 0, 0, z);
+    const std::uint64_t along_y = crossing(1, 0, 0, z);
+    const std::uint64_t ends = along_x | bits::shift_x(crossing(0, -1, 0, z), along_x, 0, 1) | along_y |
+                               bits::shift_y(crossing(1, 0, -1, z), along_y, 0, 1) | crossing(2, 0, 0, z) |
+                               crossing(2, 0, 0, z - 1);
+    if (ends == 0) continue;
+    std::uint64_t shared = 0;
+    if (tile.level > 0) {
+      shared = ends & beside_split(Slice(tile, &CornerBlock::split, z - 1), Slice(tile, &CornerBlock::split, z));
+    }
+    set_shared(leaf.surface.words[z], ends & ~shared);
+    for_bits(shared, [&](int bit) { mark_finest(window, tile.level, tile.cell(z * 64 + bit)); });
+  }
+}
+
+std::uint32_t CornerPlace::number() const {
+  const std::uint64_t before = (std::uint64_t{1} << (offset & 63)) - 1;
+  return block->numbers[offset >> 6].corner_base +
+         static_cast<std::uint32_t>(std::popcount(block->surface.words[offset >> 6] & before));
+}
+
+CornerPlace surface_place(BlockCache& cache, int level, const Cell& corner) {
+  Cell c = corner;
+  for (int l = level; l >= 0; --l) {
+    const CornerBlock* block = cache.block(l, c);
+    if (block != nullptr && block->surface.test(offset_in_block(c))) return {block, offset_in_block(c)};
+    c = {c.x * 2, c.y * 2, c.z * 2};
+  }
+  return {};
+}
+
+}  // namespace lamina

@@ -1,0 +1,34 @@
+// Minimal edges with a sign change and the corners at their ends, as masks: the first half of numbering.
+#pragma once
+#include "extract/block_cache.h"
+#include "extract/tile_view.h"
+
+namespace lamina {
+
+/// Sets `crossing` in the tile's layers of the slab and clears `accepted` and `surface` there.
+void find_crossing(const TileView& tile);
+
+/// Sets `surface` for the corners of the tile's layers that end a crossing edge, edges from the layer below included.
+/// A corner that several levels hold is marked in the finest only, possibly in another tile: all tiles of the slab must
+/// have been through find_crossing(), and several may be marked at once.
+void mark_surface(const TileView& tile, Window& window);
+
+/// A corner's place in the table of its slab.
+struct CornerPlace {
+  const CornerBlock* block = nullptr;
+  int offset = 0;
+  [[nodiscard]] std::uint32_t number() const;
+};
+
+/// Where the corner of a crossing edge is marked: in `level` or a finer one. Its block is null when it is not.
+CornerPlace surface_place(BlockCache& cache, int level, const Cell& corner);
+
+/// Cells around the tile's edges of one axis at layer z, by quadrant (IsoVertex::open).
+struct Quadrants {
+  std::array<std::uint64_t, 4> words{};
+  [[nodiscard]] std::uint64_t any() const { return words[0] | words[1] | words[2] | words[3]; }
+};
+/// `below` and `here` are a mask of cells at layers z - 1 and z.
+Quadrants around_edges(int axis, const Slice& below, const Slice& here);
+
+}  // namespace lamina

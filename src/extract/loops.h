@@ -1,0 +1,77 @@
+// Loops of isovertices around a cell: from the sign changes along its faces to cycles, and from a cycle to triangles.
+// The rule is one of signs and of the face alone, so the two cells at a face draw the same lines on it.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+namespace lamina {
+
+/// Sides of a cell's face (axis, end) walked counter-clockwise seen from outside, in the face's axes u = axis + 1 and
+/// v = axis + 2 (cyclic).
+struct FaceSide {
+  int along;     ///< 0: the side runs along u, 1: along v
+  int at;        ///< 0 or 1: where it lies on the other axis
+  bool forward;  ///< walked upwards
+};
+inline constexpr std::array<std::array<FaceSide, 4>, 2> kFaceSides = {{
+    {{{1, 0, true}, {0, 1, true}, {1, 1, false}, {0, 0, false}}},  // the low end
+    {{{0, 0, true}, {1, 1, true}, {0, 1, false}, {1, 0, false}}},  // the high end
+}};
+
+/// Name and rank of an isovertex inside a cell: its edge's midpoint relative to the cell, in half finest cells.
+constexpr std::uint64_t loop_key(int x, int y, int z) {
+  return (static_cast<std::uint64_t>(z) << 32) | (static_cast<std::uint64_t>(y) << 16) | static_cast<std::uint64_t>(x);
+}
+
+/// A sign change met on the way around a face.
+struct FaceCrossing {
+  std::uint64_t key = 0;
+  bool rising = false;  ///< from negative to positive in walking direction
+};
+
+/// Links the crossings of a cell's faces and reads off the cycles. Reused from cell to cell.
+class LoopTracer {
+ public:
+  struct Loop {
+    std::uint32_t first = 0, count = 0;  ///< range of order()
+    bool closed = false;                 ///< false: a face of it could not be resolved
+  };
+
+  void clear();
+  /// The crossings of one undivided (part of a) face, in walking order: every rising one is linked with the next, so an
+  /// ambiguous face cuts off its positive runs.
+  void add_face(std::span<const FaceCrossing> cycle);
+  /// Crossings of a face whose signs are not all known: no links.
+  void add_unresolved(std::span<const FaceCrossing> cycle);
+  /// Finds the loops: open chains first, then the cycles in order of their smallest keys, each beginning with it.
+  void trace();
+
+  [[nodiscard]] const std::vector<std::uint64_t>& keys() const { return keys_; }  ///< distinct, ascending
+  [[nodiscard]] const std::vector<Loop>& loops() const { return loops_; }
+  [[nodiscard]] const std::vector<std::uint32_t>& order() const { return order_; }  ///< indices into keys()
+
+ private:
+  std::vector<std::uint64_t> keys_;
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> links_;  ///< from, to
+  std::vector<std::uint32_t> order_, next_;
+  std::vector<std::uint8_t> has_previous_, visited_;
+  std::vector<Loop> loops_;
+};
+
+struct LoopPoint {
+  std::array<float, 3> position{};
+  std::uint8_t faces = 0;  ///< of the cell's six closed faces, those that contain the point: bit 2 axis + end
+};
+
+/// Longest loop that is cut by chords; the effort grows with its cube.
+inline constexpr std::size_t kMaxChordLoop = 24;
+
+/// Triangulates a loop of at least three points with the shortest chords, none of which lies in a face of the cell
+/// (where the neighbour's could meet it). Appends indices into `loop`. False when there is no such way or the loop is
+/// longer than kMaxChordLoop: it wants a centre.
+bool cut_loop(std::span<const LoopPoint> loop, std::vector<std::array<std::uint8_t, 3>>& triangles);
+
+}  // namespace lamina

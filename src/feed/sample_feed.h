@@ -1,0 +1,90 @@
+// Hands the stages their samples: buckets of the store with radii, levels and weights, read again whenever they are
+// needed and kept only within a budget (METHOD 3.4: samples are re-streamed, never stored per cell).
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <memory>
+#include <unordered_map>
+#include <vector>
+
+#include "lamina/lattice.h"
+#include "lamina/radii.h"
+#include "lamina/slab_store.h"
+
+namespace lamina {
+
+/// A bucket's samples with what refinement and projection need of each.
+struct ActiveBucket {
+  LocalSamples samples;
+  std::vector<float> support;       ///< R_i = H r_i, steps; 0: the sample is left out
+  std::vector<float> weight;        ///< q_i
+  std::vector<std::uint8_t> level;  ///< coarsest level whose cells are small enough for the sample
+  float max_support = 0;            ///< largest R_i, steps
+};
+using Batch = std::vector<std::shared_ptr<const ActiveBucket>>;
+
+struct FeedSettings {
+  float radius_scale = 1;               ///< multiplies estimated radii; given ones are scaled when read in
+  float blend = 1;                      ///< H
+  double cell_ratio = 0.9;              ///< a cell is split while larger than this times its smallest radius
+  bool cell_follows_support = true;     ///< the smallest R_i = H r_i counts, else the smallest r_i
+  bool fixed_cell = false;              ///< every sample asks for the finest level
+  float max_radius = 0;                 ///< samples with a larger r_i are left out, steps; 0: none
+  std::size_t cache_bytes = 64u << 20;  ///< memory for samples kept between uses
+};
+
+struct FeedCounts {
+  std::uint64_t samples = 0;       ///< that have got a radius
+  std::uint64_t undersampled = 0;  ///< left out by max_radius
+  std::uint64_t clamped = 0;       ///< radius reduced to what the coarsest level can serve
+  std::uint64_t bucket_reads = 0;  ///< times a bucket was decompressed
+};
+
+/// Buckets go by ascending z: prepare() runs ahead, release() follows behind.
+class SampleFeed {
+ public:
+  SampleFeed(const SlabStore& store, const Lattice& lattice, const FeedSettings& settings, const RadiiSettings& radii,
+             bool given_radii);
+
+  /// Called for every bucket in ascending order once its radii are known.
+  using OnReady = std::function<void(const ActiveBucket&)>;
+  /// Makes sure the radii of all samples with z < limit are known.
+  void prepare(std::int64_t z_limit, const OnReady& on_ready);
+  /// Samples whose influence meets z in [lo, hi), batch after batch; how they are cut into batches depends on the cloud
+  /// alone. `margin` enlarges every influence (steps).
+  [[nodiscard]] std::vector<std::vector<std::size_t>> batches(std::int64_t lo, std::int64_t hi, float margin) const;
+  [[nodiscard]] Batch load(const std::vector<std::size_t>& batch);
+  /// Forgets buckets that end below z.
+  void release(std::int64_t z);
+  [[nodiscard]] std::uint64_t released() const { return released_; }  ///< samples forgotten so far
+  [[nodiscard]] const FeedCounts& counts() const { return counts_; }
+  /// Largest influence a sample can have, steps: the look-ahead that prepare() needs.
+  [[nodiscard]] float support_limit() const { return support_limit_; }
+
+ private:
+  struct Known {
+    std::vector<float> radius;  ///< r_i, steps
+    float max_support = 0;
+  };
+  void annotate(std::size_t bucket, ActiveBucket& out) const;
+  std::shared_ptr<const ActiveBucket> fetch(std::size_t bucket);
+  void learn(std::vector<float> radii, const OnReady& on_ready);
+
+  const SlabStore& store_;
+  Lattice lattice_;
+  FeedSettings settings_;
+  std::unique_ptr<RadiusEstimator> estimator_;  ///< null when the input gave radii
+  float support_limit_;
+  float radius_limit_;
+  std::size_t pushed_ = 0;  ///< buckets handed to the estimator
+  std::size_t ready_ = 0;   ///< buckets with known radii
+  std::size_t first_ = 0;   ///< first bucket not released
+  std::unordered_map<std::size_t, Known> known_;
+  std::list<std::pair<std::size_t, std::shared_ptr<const ActiveBucket>>> cache_;  ///< most recently used first
+  std::size_t cached_bytes_ = 0;
+  std::uint64_t released_ = 0;
+  FeedCounts counts_;
+};
+
+}  // namespace lamina

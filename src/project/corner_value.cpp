@@ -1,0 +1,81 @@
+#include "project/corner_value.h"
+
+#include <cmath>
+#include <utility>
+
+namespace lamina {
+namespace {
+
+struct Place {
+  const CornerBlock* block;
+  int offset;
+};
+
+Place place_of(const Window& window, int level, const Cell& corner) {
+  return {window.probe(level, block_of(corner)), offset_in_block(corner)};
+}
+
+/// Own value; the corner must be near and its slab projected.
+void own_value(const Window& window, int level, const Place& p, CornerValue& out, float* attributes, float weight) {
+  const CornerValues& values = p.block->values[window.brick_of(level, p.offset >> 6)];
+  const std::uint32_t i = p.block->value_index(p.offset, window.brick_layers(level));
+  out.distance = values.channel(kDistance)[i];
+  out.normal = {values.channel(kNormalX)[i], values.channel(kNormalY)[i], values.channel(kNormalZ)[i]};
+  out.curvature = values.channel(kCurvature)[i];
+  out.reach = values.channel(kReach)[i];
+  if (attributes == nullptr) return;
+  for (int c = 0; c < window.attributes(); ++c) attributes[c] += weight * values.channel(kFirstAttribute + c)[i];
+}
+
+bool has_values(const Window& window, int level, const Place& p) {
+  return p.block->values[window.brick_of(level, p.offset >> 6)].count != 0;
+}
+
+}  // namespace
+
+bool corner_value(const Window& window, int level, const Cell& corner, CornerValue& out, float* attributes) {
+  const Place here = place_of(window, level, corner);
+  if (here.block->shared.test(here.offset)) {
+    return corner_value(window, level - 1, {corner.x * 2, corner.y * 2, corner.z * 2}, out, attributes);
+  }
+  for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] = 0;
+  if (here.block->good.test(here.offset) && has_values(window, level, here)) {
+    own_value(window, level, here, out, attributes, 1);
+    return true;
+  }
+  const auto cell = static_cast<float>(window.lattice().cell_size(level));
+  CornerValue sum;
+  float total = 0;
+  for (int dz = -1; dz <= 1; ++dz) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const int m = (dx != 0) + (dy != 0) + (dz != 0);
+        if (m == 0) continue;
+        const Place p = place_of(window, level, corner + Cell{dx, dy, dz});
+        if (p.block == nullptr || !p.block->good.test(p.offset) || !has_values(window, level, p)) continue;
+        const float w = 1.0F / static_cast<float>(m * m);
+        CornerValue v;
+        own_value(window, level, p, v, attributes, w);
+        sum.distance +=
+            w * (v.distance - cell * (v.normal[0] * static_cast<float>(dx) + v.normal[1] * static_cast<float>(dy) +
+                                      v.normal[2] * static_cast<float>(dz)));
+        for (int k = 0; k < 3; ++k) sum.normal[k] += w * v.normal[k];
+        sum.curvature += w * v.curvature;
+        total += w;
+      }
+    }
+  }
+  if (total <= 0) return false;
+  const float inv = 1.0F / total;
+  const float length =
+      std::sqrt(sum.normal[0] * sum.normal[0] + sum.normal[1] * sum.normal[1] + sum.normal[2] * sum.normal[2]);
+  if (!(length > 1e-6F)) return false;
+  out.distance = sum.distance * inv;
+  for (int k = 0; k < 3; ++k) out.normal[k] = sum.normal[k] / length;
+  out.curvature = sum.curvature * inv;
+  out.reach = 0;
+  for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] *= inv;
+  return true;
+}
+
+}  // namespace lamina

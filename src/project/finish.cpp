@@ -1,0 +1,131 @@
+#include "project/finish.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace lamina {
+namespace {
+
+void gather_block(const Window& window, int level, const CornerBlock& from, int dx, int dy, int z, int to_z,
+                  CornerField& f) {
+  const int layers = window.brick_layers(level);
+  std::uint64_t w = from.good.words[z];
+  if (w == 0) return;
+  if (dx < 0) w &= 0x8080808080808080ULL;
+  if (dx > 0) w &= 0x0101010101010101ULL;
+  if (dy < 0) w &= 0xFF00000000000000ULL;
+  if (dy > 0) w &= 0x00000000000000FFULL;
+  if (w == 0) return;
+  const CornerValues& values = from.values[window.brick_of(level, z)];
+  if (values.count == 0) return;
+  const std::uint32_t base = from.value_index(z * 64, layers);
+  const std::uint64_t near = from.near.words[z];
+  const float* const d = values.channel(kDistance);
+  const float* const nx = values.channel(kNormalX);
+  const float* const ny = values.channel(kNormalY);
+  const float* const nz = values.channel(kNormalZ);
+  for (; w != 0; w &= w - 1) {
+    const int bit = std::countr_zero(w);
+    const std::uint32_t i = base + static_cast<std::uint32_t>(std::popcount(near & ((std::uint64_t{1} << bit) - 1)));
+    const int at =
+        (to_z + 1) * CornerField::kPlane + ((bit >> 3) + dy * 8 + 1) * CornerField::kRow + (bit & 7) + dx * 8 + 1;
+    f.distance[at] = d[i];
+    f.nx[at] = nx[i];
+    f.ny[at] = ny[i];
+    f.nz[at] = nz[i];
+    f.trusted[at] = 1.0F;
+  }
+}
+
+void gather_field(const Window& window, int level, const Block& b, int begin, int end, CornerField& f) {
+  for (auto* a : {&f.distance, &f.nx, &f.ny, &f.nz, &f.trusted}) {
+    std::fill(a->begin() + begin * CornerField::kPlane, a->begin() + (end + 2) * CornerField::kPlane, 0.0F);
+  }
+  for (int dz = -1; dz <= 1; ++dz) {
+    const int from = std::max(begin - 1, dz * 8);
+    const int to = std::min(end + 1, dz * 8 + 8);
+    if (from >= to) continue;
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        const CornerBlock* block = window.probe(level, {b.x + dx, b.y + dy, b.z + dz});
+        if (block == nullptr) continue;
+        for (int z = from; z < to; ++z) gather_block(window, level, *block, dx, dy, z - dz * 8, z, f);
+      }
+    }
+  }
+}
+
+std::uint64_t own_signs(const Window& window, int level, const CornerBlock& leaf, int z) {
+  std::uint64_t positive = 0;
+  const CornerValues& values = leaf.values[window.brick_of(level, z)];
+  std::uint32_t i = leaf.value_index(z * 64, window.brick_layers(level));
+  for (std::uint64_t w = leaf.near.words[z]; w != 0; w &= w - 1, ++i) {
+    if (values.channel(kDistance)[i] >= 0) positive |= w & (~w + 1);
+  }
+  return positive & leaf.good.words[z];
+}
+
+std::uint64_t finer_signs(const Window& window, int level, const Tile& t, int z) {
+  std::uint64_t out = 0;
+  for (int quarter = 0; quarter < 4; ++quarter) {
+    const int qx = quarter & 1;
+    const int qy = quarter >> 1;
+    const std::uint64_t shared = t.leaf->shared.words[z] & (0x0F0F0F0FULL << (qx * 4 + qy * 32));
+    for (std::uint64_t w = shared; w != 0; w &= w - 1) {
+      const int bit = std::countr_zero(w);
+      const Cell fine{(t.block.x * 8 + (bit & 7)) * 2, (t.block.y * 8 + (bit >> 3)) * 2, (t.block.z * 8 + z) * 2};
+      const CornerBlock* from = window.probe(level - 1, block_of(fine));
+      if (from->positive.test(offset_in_block(fine))) out |= w & (~w + 1);
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+void finish_slab(Window& window, std::int32_t slab, const Kernel& kernel) {
+  tbb::enumerable_thread_specific<CornerField> fields;
+  for (int level = 0; level < window.levels(); ++level) {
+    const std::vector<Tile> tiles = window.tiles(level, slab);
+    const auto cell = static_cast<float>(window.lattice().cell_size(level));
+    tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
+      const Tile& t = tiles[i];
+      const std::int32_t first = window.lattice().first_layer(level, slab) - t.block.z * 8;
+      const int begin = std::max(first, 0);
+      const int end = std::min(8, first + window.lattice().layers(level));
+      std::uint64_t any = 0;
+      for (int z = begin; z < end; ++z) any |= t.leaf->corners.words[z];
+      if (any == 0) return;
+      CornerField& field = fields.local();
+      bool gathered = false;
+      for (int z = begin; z < end; ++z) {
+        const std::uint64_t corners = t.leaf->corners.words[z];
+        if (corners == 0) continue;
+        const std::uint64_t shared = t.leaf->shared.words[z];
+        std::uint64_t positive = own_signs(window, level, *t.leaf, z) & ~shared;
+        if (shared != 0) positive |= finer_signs(std::as_const(window), level, t, z);
+        const std::uint64_t extended = corners & ~shared & ~t.leaf->good.words[z];
+        if (extended != 0 && !gathered) {
+          gather_field(window, level, t.block, begin, end, field);
+          gathered = true;
+        }
+        for (int y = 0; y < 8; ++y) {
+          const std::uint64_t row = (extended >> (8 * y)) & 0xFFU;
+          if (row == 0) continue;
+          Lanes sum{};
+          Lanes weight{};
+          kernel.extend(field, y, z, cell, sum, weight);
+          std::uint64_t bits = 0;
+          for (int l = 0; l < kLanes; ++l) bits |= static_cast<std::uint64_t>(!(sum[l] < 0)) << l;
+          positive |= (bits & row) << (8 * y);
+        }
+        t.leaf->positive.words[z] = positive & corners;
+      }
+    });
+  }
+}
+
+}  // namespace lamina

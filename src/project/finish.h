@@ -1,0 +1,15 @@
+// Finishing a projected slab: every corner gets a sign (DESIGN "Repair, not rejection"; METHOD 3.5).
+#pragma once
+#include <cstdint>
+
+#include "project/kernel.h"
+#include "window/window.h"
+
+namespace lamina {
+
+/// Sets `positive` of the slab's corners: the sign of their own trusted distance, else of the distance extended from
+/// trusted neighbours, else positive. A corner that a finer level holds takes that level's sign. The slabs below and
+/// above must be projected.
+void finish_slab(Window& window, std::int32_t slab, const Kernel& kernel);
+
+}  // namespace lamina

@@ -1,0 +1,94 @@
+// The kernel of the projection: weighted sums over samples at eight query points at once, and the fit made of them.
+// One source (kernel_body.h), compiled per processor kind; all kinds give the same bits (no fused multiply-add, no
+// reassociation, every query's sum in the order of the samples).
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace lamina {
+
+inline constexpr int kLanes = 8;
+
+/// Running sums at a query point x (METHOD 3.2), positions relative to x, lengths in cells of the level.
+/// With w = weight * max(0, 1 - |p - x|^2 / R^2)^4:
+enum Sum : int {
+  kW = 0,  ///< sum w
+  kPx,     ///< sum w p
+  kPy,
+  kPz,
+  kNx,  ///< sum w n
+  kNy,
+  kNz,
+  kPP,       ///< sum w p.p
+  kPN,       ///< sum w p.n
+  kWR,       ///< sum w R
+  kNearest,  ///< min |p - x|^2 / band^2, band = the sample's own
+  kSeen,     ///< number of samples with w > 0
+  kSums      ///< then one sum w c per attribute
+};
+
+/// Samples of a tile, structure of arrays, in cells of the level relative to the tile's origin.
+struct TileSamples {
+  std::vector<float> x, y, z, nx, ny, nz;
+  std::vector<float> support;       ///< R
+  std::vector<float> inv_support2;  ///< 1 / R^2
+  std::vector<float> inv_band2;     ///< 1 / band^2
+  std::vector<float> weight;        ///< q_i
+  std::vector<std::vector<float>> attributes;
+  void resize(std::size_t n, std::size_t attribute_count);
+};
+
+struct SampleRange {
+  std::uint32_t begin, end;
+};
+
+struct alignas(32) Lanes {
+  std::array<float, kLanes> v;
+  float& operator[](int i) { return v[static_cast<std::size_t>(i)]; }
+  float operator[](int i) const { return v[static_cast<std::size_t>(i)]; }
+};
+
+struct Queries {
+  Lanes x, y, z;
+};
+
+struct FitInput {
+  bool sphere = true;
+  Queries offset;  ///< corner minus query point
+};
+
+/// The fit at eight corners, lengths in cells.
+struct FitOutput {
+  Lanes distance;    ///< signed distance of the corner
+  Lanes nx, ny, nz;  ///< unit normal at the projected point; zero where there is none
+  Lanes curvature;   ///< signed, 1 / cell
+  Lanes reach;       ///< |projected point - weighted average| / local support
+};
+
+/// Trusted corners of a tile and one corner around it, dense: [z + 1][y + 1][x + 1] with rows of kRow floats; zero
+/// where there is none. Lengths in steps.
+struct CornerField {
+  static constexpr int kRow = 16;
+  static constexpr int kPlane = 10 * kRow;
+  static constexpr int kSize = 10 * kPlane;
+  std::array<float, kSize> distance, nx, ny, nz, trusted;
+};
+
+struct Kernel {
+  const char* name;  ///< "x86-64-v3", ...
+  /// Adds samples of `ranges` to `sums` (kSums + attributes lanes).
+  void (*accumulate)(const TileSamples&, const SampleRange* ranges, int count, const Queries&, Lanes* sums);
+  void (*fit)(const Lanes* sums, const FitInput&, FitOutput&);
+  /// Extends trusted neighbours' planes to the eight corners of row (y, z) of a tile: weighted sum of distances and of
+  /// weights (1 / m^2, m = L1 offset in cells) over the 26 neighbours. `cell` in steps.
+  void (*extend)(const CornerField&, int y, int z, float cell, Lanes& sum, Lanes& weight);
+};
+
+/// Kernels this processor can run, best last.
+std::vector<Kernel> available_kernels();
+/// The best one, or the one LAMINA_KERNEL names (v2, v3, v4) for tests and measurements.
+Kernel select_kernel();
+
+}  // namespace lamina

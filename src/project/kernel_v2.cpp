@@ -1,0 +1,16 @@
+// The projection kernel for x86-64-v2 processors (flags set in src/CMakeLists.txt).
+#include <cmath>
+
+#include "project/kernel.h"
+#include "project/kernels.h"
+
+namespace lamina::kernel_v2 {
+namespace {
+#include "project/kernel_body.h"
+}  // namespace
+
+Kernel kernel() {
+  return {"x86-64-v2", &accumulate, &fit, &extend};
+}
+
+}  // namespace lamina::kernel_v2

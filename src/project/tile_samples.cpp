@@ -1,0 +1,164 @@
+#include "project/tile_samples.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace lamina {
+namespace {
+
+struct Entry {
+  std::uint32_t tile, sample;
+};
+
+/// Samples per piece of work; fixed, so that the order does not depend on the number of threads.
+constexpr std::size_t kPiece = 1u << 14;
+
+struct Piece {
+  const ActiveBucket* bucket;
+  std::size_t begin, end;
+  std::uint32_t base;  ///< index of the bucket's first sample in the batch
+};
+
+std::int32_t ceil_cell(double x) {
+  return static_cast<std::int32_t>(std::ceil(x));
+}
+std::int32_t floor_cell(double x) {
+  return static_cast<std::int32_t>(std::floor(x));
+}
+
+void bin_piece(const Window& window, int level, const Piece& piece, std::int32_t first, std::int32_t end, float margin,
+               double shift, std::vector<Entry>& out) {
+  const double inv = 1.0 / window.lattice().cell_size(level);
+  const LocalSamples& s = piece.bucket->samples;
+  for (std::size_t i = piece.begin; i < piece.end; ++i) {
+    if (piece.bucket->support[i] <= 0) continue;
+    const double reach = (static_cast<double>(piece.bucket->support[i]) + static_cast<double>(margin)) * inv;
+    const double z = s.z[i] * inv - shift;
+    const std::int32_t z0 = std::max(ceil_cell(z - reach), first);
+    const std::int32_t z1 = std::min(floor_cell(z + reach), end - 1);
+    if (z0 > z1) continue;
+    const double x = s.x[i] * inv - shift;
+    const double y = s.y[i] * inv - shift;
+    const std::int32_t x0 = ceil_cell(x - reach) >> 3;
+    const std::int32_t x1 = floor_cell(x + reach) >> 3;
+    const std::int32_t y0 = ceil_cell(y - reach) >> 3;
+    const std::int32_t y1 = floor_cell(y + reach) >> 3;
+    for (std::int32_t bz = z0 >> 3; bz <= (z1 >> 3); ++bz) {
+      for (std::int32_t by = y0; by <= y1; ++by) {
+        for (std::int32_t bx = x0; bx <= x1; ++bx) {
+          const CornerBlock* block = window.probe(level, {bx, by, bz});
+          if (block == nullptr || block->task == CornerBlock::kNoTask) continue;
+          out.push_back({block->task, piece.base + static_cast<std::uint32_t>(i)});
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+
+TileBins bin_samples(const Window& window, int level, const Batch& batch, std::int32_t first, std::int32_t end,
+                     std::size_t tiles, float margin, double shift) {
+  std::vector<Piece> pieces;
+  std::uint32_t base = 0;
+  for (const auto& bucket : batch) {
+    const std::size_t n = bucket->samples.size();
+    for (std::size_t b = 0; b < n; b += kPiece) pieces.push_back({bucket.get(), b, std::min(n, b + kPiece), base});
+    base += static_cast<std::uint32_t>(n);
+  }
+  std::vector<std::vector<Entry>> entries(pieces.size());
+  tbb::parallel_for(std::size_t{0}, pieces.size(),
+                    [&](std::size_t p) { bin_piece(window, level, pieces[p], first, end, margin, shift, entries[p]); });
+  TileBins bins;
+  bins.begin.assign(tiles + 1, 0);
+  for (const auto& piece : entries) {
+    for (const Entry& e : piece) ++bins.begin[e.tile + 1];
+  }
+  for (std::size_t t = 0; t < tiles; ++t) bins.begin[t + 1] += bins.begin[t];
+  bins.index.resize(bins.begin[tiles]);
+  std::vector<std::uint64_t> cursor(bins.begin.begin(), bins.begin.end() - 1);
+  for (const auto& piece : entries) {
+    for (const Entry& e : piece) bins.index[cursor[e.tile]++] = e.sample;
+  }
+  return bins;
+}
+
+void RowSamples::gather(const Lattice& lattice, int level, const Block& block, const Batch& batch,
+                        const std::uint32_t* index, std::size_t count, float band) {
+  const std::int32_t a = lattice.cell_size(level);
+  const float inv = 1.0F / static_cast<float>(a);
+  // Differences are taken in integers: exact however far the tile lies from the origin.
+  const std::int64_t ox = std::int64_t{block.x} * 8 * a;
+  const std::int64_t oy = std::int64_t{block.y} * 8 * a;
+  const std::int64_t oz = std::int64_t{block.z} * 8 * a;
+  const std::size_t attributes = batch.empty() ? 0 : batch.front()->samples.attributes.size();
+  samples_.resize(count, attributes);
+  row_.resize(count);
+  row_begin_.assign(kRows * kRows + 1, 0);
+  max_support_ = 0;
+
+  const auto walk = [&](const auto& visit) {
+    std::size_t bucket = 0;
+    std::uint32_t base = 0;
+    for (std::size_t k = 0; k < count; ++k) {
+      while (index[k] - base >= batch[bucket]->samples.size())
+        base += static_cast<std::uint32_t>(batch[bucket++]->samples.size());
+      visit(k, *batch[bucket], index[k] - base);
+    }
+  };
+  const auto row_of = [](std::int64_t steps, std::int32_t cell) {
+    const std::int64_t r = (steps >= 0 ? steps / cell : -((-steps + cell - 1) / cell)) - kLow;
+    return static_cast<int>(std::clamp<std::int64_t>(r, 0, kRows - 1));
+  };
+  walk([&](std::size_t k, const ActiveBucket& b, std::size_t i) {
+    const int row = row_of(b.samples.z[i] - oz, a) * kRows + row_of(b.samples.y[i] - oy, a);
+    row_[k] = static_cast<std::uint16_t>(row);
+    ++row_begin_[static_cast<std::size_t>(row) + 1];
+  });
+  for (std::size_t r = 0; r < kRows * kRows; ++r) row_begin_[r + 1] += row_begin_[r];
+  std::array<std::uint32_t, kRows * kRows> cursor{};
+  std::copy_n(row_begin_.begin(), kRows * kRows, cursor.begin());
+  walk([&](std::size_t k, const ActiveBucket& b, std::size_t i) {
+    const std::uint32_t to = cursor[row_[k]]++;
+    const LocalSamples& s = b.samples;
+    samples_.x[to] = static_cast<float>(s.x[i] - ox) * inv;
+    samples_.y[to] = static_cast<float>(s.y[i] - oy) * inv;
+    samples_.z[to] = static_cast<float>(s.z[i] - oz) * inv;
+    samples_.nx[to] = s.nx[i];
+    samples_.ny[to] = s.ny[i];
+    samples_.nz[to] = s.nz[i];
+    const float support = b.support[i] * inv;
+    const float reach = band * static_cast<float>(lattice.cell_size(b.level[i])) * inv;
+    samples_.support[to] = support;
+    samples_.inv_support2[to] = 1.0F / (support * support);
+    samples_.inv_band2[to] = 1.0F / (reach * reach);
+    samples_.weight[to] = b.weight[i];
+    for (std::size_t c = 0; c < attributes; ++c) samples_.attributes[c][to] = s.attributes[c][i];
+    max_support_ = std::max(max_support_, support);
+  });
+}
+
+int RowSamples::ranges(float y_lo, float y_hi, float z_lo, float z_hi, SampleRange* out) const {
+  const auto row = [](float v) {
+    return static_cast<int>(std::clamp(std::floor(v) - static_cast<float>(kLow), 0.0F, static_cast<float>(kRows - 1)));
+  };
+  const int y0 = row(y_lo - max_support_);
+  const int y1 = row(y_hi + max_support_);
+  const int z1 = row(z_hi + max_support_);
+  int n = 0;
+  for (int z = row(z_lo - max_support_); z <= z1; ++z) {
+    const std::uint32_t begin = row_begin_[static_cast<std::size_t>(z * kRows + y0)];
+    const std::uint32_t end = row_begin_[static_cast<std::size_t>(z * kRows + y1 + 1)];
+    if (begin == end) continue;
+    if (n > 0 && out[n - 1].end == begin) {
+      out[n - 1].end = end;
+    } else {
+      out[n++] = {begin, end};
+    }
+  }
+  return n;
+}
+
+}  // namespace lamina

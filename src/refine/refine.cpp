@@ -1,0 +1,247 @@
+#include "refine/refine.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <atomic>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "window/bits.h"
+
+namespace lamina {
+namespace {
+
+/// Cells a sample reaches around its home: corners within 1.75 cells of it belong to cells at most two away.
+constexpr int kReachCells = 2;
+/// Cells around the home whose corners lie within 1.75 cells of the sample.
+constexpr int kCloseCells = 1;
+
+bits::Neighbourhood gather(const Window& window, int level, const Block& b, BlockMask CornerBlock::*mask) {
+  bits::Neighbourhood n{};
+  for (int z = -1; z <= 1; ++z) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int x = -1; x <= 1; ++x) {
+        const CornerBlock* block = window.probe(level, {b.x + x, b.y + y, b.z + z});
+        n[z + 1][y + 1][x + 1] = block == nullptr ? nullptr : &(block->*mask);
+      }
+    }
+  }
+  return n;
+}
+
+/// Layers of a leaf that a slab covers.
+struct LeafLayers {
+  int begin, end;
+};
+
+LeafLayers leaf_layers(const Window& window, int level, std::int32_t slab, const Block& b) {
+  const std::int32_t first = window.lattice().first_layer(level, slab) - b.z * 8;
+  const int begin = first < 0 ? 0 : first;
+  const int end = std::min(8, first + window.lattice().layers(level));
+  return {begin, end};
+}
+
+template <typename Body>
+void for_tiles(Window& window, int level, std::int32_t slab, const Body& body) {
+  const std::vector<Tile> tiles = window.tiles(level, slab);
+  tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
+    const LeafLayers layers = leaf_layers(window, level, slab, tiles[i].block);
+    body(tiles[i], layers.begin, layers.end);
+  });
+}
+
+/// Makes the blocks that cells within `reach` of marked layers [z - reach, z_end + reach) can fall into.
+void touch_around(Window& window, int level, std::int32_t slab, BlockMask CornerBlock::*mask, int lo, int hi) {
+  const Lattice& lattice = window.lattice();
+  const std::int32_t first = lattice.first_layer(level, slab);
+  const std::int32_t end = first + lattice.layers(level);
+  const std::int32_t slab_lo = lattice.slab_of_layer(level, first - hi);
+  const std::int32_t slab_hi = lattice.slab_of_layer(level, end - 1 - lo);
+  std::vector<Block> wanted;
+  std::int32_t done = std::numeric_limits<std::int32_t>::min();
+  for (std::int32_t s = slab_lo; s <= slab_hi; ++s) {
+    for (const Tile& t : window.tiles(level, s)) {
+      if (t.block.z <= done) continue;  // slabs share leaves at coarse levels
+      const BlockMask& m = t.leaf->*mask;
+      std::uint64_t low = 0;  // bits of layers that reach down into the slab's layers from above, and so on
+      std::array<std::uint64_t, 3> by_target{};
+      for (int z = 0; z < 8; ++z) {
+        if (m.words[z] == 0) continue;
+        const std::int32_t layer = t.block.z * 8 + z;
+        const std::int32_t from = std::max(layer + lo, first);
+        const std::int32_t to = std::min(layer + hi, end - 1);
+        if (from > to) continue;
+        for (std::int32_t bz = from >> 3; bz <= (to >> 3); ++bz) by_target[bz - t.block.z + 1] |= m.words[z];
+        low |= m.words[z];
+      }
+      if (low == 0) continue;
+      for (int dz = -1; dz <= 1; ++dz) {
+        const std::uint64_t w = by_target[dz + 1];
+        if (w == 0) continue;
+        const bool left = lo < 0 && (w & bits::columns_below(-lo)) != 0;
+        const bool right = hi > 0 && (w & ~bits::columns_below(8 - hi)) != 0;
+        const bool down = lo < 0 && (w & ((std::uint64_t{1} << (8 * -lo)) - 1)) != 0;
+        const bool up = hi > 0 && (w >> (8 * (8 - hi))) != 0;
+        for (int dy = down ? -1 : 0; dy <= (up ? 1 : 0); ++dy) {
+          for (int dx = left ? -1 : 0; dx <= (right ? 1 : 0); ++dx) {
+            wanted.push_back({t.block.x + dx, t.block.y + dy, t.block.z + dz});
+          }
+        }
+      }
+    }
+    done = (lattice.first_layer(level, s) + lattice.layers(level) - 1) >> 3;
+  }
+  for (const Block& b : wanted) window.touch(level, b);
+}
+
+Block parent_block(const Block& b) {
+  return {b.x >> 1, b.y >> 1, b.z >> 1};
+}
+
+/// Word z of the child block's view of a parent mask.
+std::uint64_t from_parent(const BlockMask& parent, const Block& child, int z) {
+  return bits::spread_quarter(parent.words[(child.z & 1) * 4 + (z >> 1)], child.x & 1, child.y & 1);
+}
+
+void split_parents(Window& window, int level, std::int32_t slab) {
+  for (const Tile& t : window.tiles(level, slab)) {
+    const LeafLayers layers = leaf_layers(window, level, slab, t.block);
+    std::uint64_t any = 0;
+    for (int z = layers.begin; z < layers.end; ++z) any |= t.leaf->touched.words[z] | t.leaf->split.words[z];
+    if (any != 0) window.touch(level + 1, parent_block(t.block));
+  }
+  for_tiles(window, level + 1, slab, [&](const Tile& t, int begin, int end) {
+    for (int octant = 0; octant < 8; ++octant) {
+      const int ox = octant & 1;
+      const int oy = (octant >> 1) & 1;
+      const int oz = octant >> 2;
+      if (oz * 4 >= end || oz * 4 + 4 <= begin) continue;
+      const CornerBlock* child =
+          std::as_const(window).probe(level, {t.block.x * 2 + ox, t.block.y * 2 + oy, t.block.z * 2 + oz});
+      if (child == nullptr) continue;
+      for (int z = std::max(begin, oz * 4); z < std::min(end, oz * 4 + 4); ++z) {
+        const int cz = (z - oz * 4) * 2;
+        const std::uint64_t w = child->touched.words[cz] | child->touched.words[cz + 1] | child->split.words[cz] |
+                                child->split.words[cz + 1];
+        t.leaf->split.words[z] |= bits::even_quarter(bits::fold_pairs(w), ox, oy);
+      }
+    }
+  });
+}
+
+/// Hands reach and closeness of coarser samples down to the children of split cells.
+void inherit(Window& window, int level, std::int32_t slab) {
+  const int parent_level = level + 1;
+  for (const Tile& t : window.tiles(parent_level, slab)) {
+    const LeafLayers layers = leaf_layers(window, parent_level, slab, t.block);
+    for (int octant = 0; octant < 8; ++octant) {
+      const Block child{t.block.x * 2 + (octant & 1), t.block.y * 2 + ((octant >> 1) & 1),
+                        t.block.z * 2 + (octant >> 2)};
+      std::uint64_t any = 0;
+      const int oz = (octant >> 2) * 4;
+      for (int z = std::max(layers.begin, oz); z < std::min(layers.end, oz + 4); ++z) {
+        const std::uint64_t w = t.leaf->split.words[z] & t.leaf->reached.words[z];
+        any |= bits::spread_quarter(w, octant & 1, (octant >> 1) & 1);
+      }
+      if (any != 0) window.touch(level, child);
+    }
+  }
+  for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
+    const CornerBlock* parent = std::as_const(window).probe(parent_level, parent_block(t.block));
+    for (int z = begin; z < end; ++z) {
+      const std::uint64_t nodes = parent == nullptr ? 0 : from_parent(parent->split, t.block, z);
+      std::uint64_t reached = t.leaf->touched.words[z];
+      std::uint64_t close = t.leaf->close.words[z];
+      if (parent != nullptr) {
+        reached |= from_parent(parent->reached, t.block, z);
+        close |= from_parent(parent->close, t.block, z);
+      }
+      t.leaf->reached.words[z] = reached & nodes;
+      t.leaf->close.words[z] = close & nodes;
+      t.leaf->cells.words[z] = reached & nodes & ~t.leaf->split.words[z];
+    }
+  });
+}
+
+}  // namespace
+
+void mark_sample(Window& window, const Mark& mark) {
+  const std::int32_t a = window.lattice().cell_size(mark.level);
+  const Cell c{floor_div(mark.x, a), floor_div(mark.y, a), floor_div(mark.z, a)};
+  CornerBlock& block = window.touch_shared(mark.level, block_of(c));
+  const int offset = offset_in_block(c);
+  const std::uint64_t bit = std::uint64_t{1} << (offset & 63);
+  std::atomic_ref<std::uint64_t> word(block.home.words[offset >> 6]);
+  if ((word.load(std::memory_order_relaxed) & bit) == 0) word.fetch_or(bit, std::memory_order_relaxed);
+}
+
+void refine_slab(Window& window, std::int32_t slab) {
+  const int levels = window.levels();
+  for (int level = 0; level < levels; ++level) {
+    touch_around(window, level, slab, &CornerBlock::home, -kReachCells, kReachCells);
+    for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
+      const bits::Neighbourhood home = gather(window, level, t.block, &CornerBlock::home);
+      for (int z = begin; z < end; ++z) {
+        t.leaf->touched.words[z] = bits::dilate_layer(home, z, -kReachCells, kReachCells);
+        t.leaf->close.words[z] = bits::dilate_layer(home, z, -kCloseCells, kCloseCells);
+      }
+    });
+  }
+  for (int level = 0; level + 1 < levels; ++level) split_parents(window, level, slab);
+  for_tiles(window, levels - 1, slab, [&](const Tile& t, int begin, int end) {
+    for (int z = begin; z < end; ++z) {
+      t.leaf->reached.words[z] = t.leaf->touched.words[z];
+      t.leaf->cells.words[z] = t.leaf->touched.words[z] & ~t.leaf->split.words[z];
+    }
+  });
+  for (int level = levels - 2; level >= 0; --level) inherit(window, level, slab);
+}
+
+void place_corners(Window& window, std::int32_t slab) {
+  for (int level = 0; level < window.levels(); ++level) {
+    touch_around(window, level, slab, &CornerBlock::cells, 0, 1);
+    for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
+      const bits::Neighbourhood cells = gather(window, level, t.block, &CornerBlock::cells);
+      const bits::Neighbourhood close = gather(window, level, t.block, &CornerBlock::close);
+      for (int z = begin; z < end; ++z) {
+        const std::uint64_t corners = bits::dilate_layer(cells, z, 0, 1);
+        t.leaf->corners.words[z] = corners;
+        t.leaf->near.words[z] = corners == 0 ? 0 : corners & bits::dilate_layer(close, z, 0, 1);
+      }
+    });
+    if (level == 0) continue;
+    // A corner that a finer level holds too is projected there; what it is there it is here.
+    for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
+      for (int octant = 0; octant < 8; ++octant) {
+        const int oz = (octant >> 2) * 4;
+        if (oz >= end || oz + 4 <= begin) continue;
+        const CornerBlock* child = std::as_const(window).probe(
+            level - 1,
+            {t.block.x * 2 + (octant & 1), t.block.y * 2 + ((octant >> 1) & 1), t.block.z * 2 + (octant >> 2)});
+        if (child == nullptr) continue;
+        for (int z = std::max(begin, oz); z < std::min(end, oz + 4); ++z) {
+          const int cz = (z - oz) * 2;
+          const std::uint64_t shared =
+              bits::even_quarter(child->corners.words[cz], octant & 1, (octant >> 1) & 1) & t.leaf->corners.words[z];
+          const std::uint64_t near = bits::even_quarter(child->near.words[cz], octant & 1, (octant >> 1) & 1);
+          t.leaf->shared.words[z] |= shared;
+          t.leaf->near.words[z] = (t.leaf->near.words[z] & ~shared) | (near & shared);
+        }
+      }
+    });
+  }
+}
+
+std::uint64_t count_cells(const Window& window, int level, std::int32_t slab) {
+  std::uint64_t n = 0;
+  for (const Tile& t : window.tiles(level, slab)) {
+    const LeafLayers layers = leaf_layers(window, level, slab, t.block);
+    for (int z = layers.begin; z < layers.end; ++z)
+      n += static_cast<std::uint64_t>(std::popcount(t.leaf->cells.words[z]));
+  }
+  return n;
+}
+
+}  // namespace lamina

@@ -1,0 +1,30 @@
+// Adaptive refinement: which cells of which level exist, and which corners are worth projecting (METHOD 3.4).
+#pragma once
+#include <cstdint>
+
+#include "window/window.h"
+
+namespace lamina {
+
+/// Where a sample lies and the level its radius asks for.
+struct Mark {
+  std::int32_t x, y, z;  ///< fixed-point position
+  std::uint8_t level;    ///< coarsest level whose cells are small enough for the sample
+};
+
+/// Notes the sample's home cell. Any order, several threads at once, slabs at will ahead of refine().
+void mark_sample(Window& window, const Mark& mark);
+
+/// Fixes the octree of one slab: cells that samples reach, subdivision, taking part. Samples must be marked up to two
+/// slabs further, and the slab below be refined. A cell is split when a sample of a finer level lies within two of
+/// that level's cells (METHOD 3.4 with the ball of 1.75 cells taken as the cells it can meet).
+void refine_slab(Window& window, std::int32_t slab);
+
+/// Fixes the corners of one slab (its layers of corners, the first plane included) and of them the ones to project.
+/// The slab and the one below must be refined.
+void place_corners(Window& window, std::int32_t slab);
+
+/// Leaf cells of a slab at a level.
+std::uint64_t count_cells(const Window& window, int level, std::int32_t slab);
+
+}  // namespace lamina

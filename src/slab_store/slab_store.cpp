@@ -1,0 +1,62 @@
+#include "lamina/slab_store.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <utility>
+
+#include "lamina/error.h"
+#include "slab_store/store_impl.h"
+
+namespace lamina {
+
+SlabStore::SlabStore(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+SlabStore::~SlabStore() = default;
+SlabStore::SlabStore(SlabStore&&) noexcept = default;
+SlabStore& SlabStore::operator=(SlabStore&&) noexcept = default;
+
+const StoreLayout& SlabStore::layout() const {
+  return impl_->layout;
+}
+std::size_t SlabStore::buckets() const {
+  return impl_->buckets.size();
+}
+std::uint64_t SlabStore::count(std::size_t bucket) const {
+  return impl_->buckets[bucket].count;
+}
+std::int32_t SlabStore::z_lower(std::size_t bucket) const {
+  return impl_->buckets[bucket].z_lower;
+}
+std::int32_t SlabStore::z_upper(std::size_t bucket) const {
+  return impl_->buckets[bucket].z_upper;
+}
+std::uint64_t SlabStore::total() const {
+  return impl_->total;
+}
+std::uint64_t SlabStore::disk_bytes() const {
+  return impl_->file.size();
+}
+
+void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
+  const auto& [blocks, count, z_lower, z_upper] = impl_->buckets[bucket];
+  const auto& columns = impl_->columns;
+  columns.resize(out, count);
+  std::vector<std::size_t> first(blocks.size());
+  for (std::size_t i = 1; i < blocks.size(); ++i) first[i] = first[i - 1] + blocks[i - 1].count;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size()), [&](const auto& range) {
+    std::vector<std::byte> bytes;
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      bytes.resize(blocks[i].bytes);
+      impl_->file.read(blocks[i].offset, bytes);
+      if (!decode_block(columns, bytes, blocks[i].count, out, first[i])) {
+        throw Error(
+            ExitCode::budget,
+            fmt::format("the temporary file in '{}' is damaged at byte {} (samples of bucket {}); check the disk "
+                        "or choose another with --tmp-dir",
+                        impl_->file.directory(), blocks[i].offset, bucket));
+      }
+    }
+  });
+}
+
+}  // namespace lamina

@@ -1,0 +1,78 @@
+#include "surface/final_vertices.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace lamina {
+namespace {
+
+struct Corner {
+  const SurfaceCorner* corner;
+  const std::vector<std::vector<float>>* attributes;
+  std::size_t index;
+};
+
+using Vec3 = Eigen::Vector3d;
+
+Vec3 position(const SurfaceCorner& c) {
+  return Eigen::Vector3i(c.position[0], c.position[1], c.position[2]).cast<double>();
+}
+Vec3 to_vec(const std::array<float, 3>& v) {
+  return {double{v[0]}, double{v[1]}, double{v[2]}};
+}
+
+Vec3 clustered(const SurfaceCorner& c, float chord) {
+  const float shift = std::clamp(chord * c.curvature * c.cell * c.cell, -0.25F * c.cell, 0.25F * c.cell);
+  return position(c) + to_vec(c.offset) + static_cast<double>(shift) * to_vec(c.normal);
+}
+
+}  // namespace
+
+void place_vertices(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, const Frame& frame, float chord,
+                    VertexBatch& out) {
+  const std::size_t n = slab.vertices.size();
+  const std::size_t attributes = here.corner_attributes.size();
+  for (auto* v : {&out.x, &out.y, &out.z}) v->resize(n);
+  for (auto* v : {&out.nx, &out.ny, &out.nz}) v->resize(n);
+  out.attributes.resize(attributes);
+  for (auto& a : out.attributes) a.resize(n);
+  const auto look_up = [&](SlabIndex i) {
+    const IsoSlab& s = i.next() ? *next : here;
+    return Corner{&s.corners[i.index()], &s.corner_attributes, i.index()};
+  };
+  const Eigen::Matrix3d back = frame.rotation.transpose();
+  tbb::parallel_for(std::size_t{0}, (n + 4095) / 4096, [&](std::size_t piece) {
+    for (std::size_t i = piece * 4096; i < std::min(n, (piece + 1) * 4096); ++i) {
+      const FinalVertex& v = slab.vertices[i];
+      const Corner a = look_up(v.corner);
+      Vec3 p;
+      Vec3 normal = to_vec(a.corner->normal);
+      if (v.kind == FinalVertex::Kind::isovertex) {
+        const Corner b = look_up(v.other);
+        const double t = v.t;
+        p = (1 - t) * position(*a.corner) + t * position(*b.corner);
+        const Vec3 blended = (1 - t) * normal + t * to_vec(b.corner->normal);
+        if (blended.squaredNorm() > 1e-12) normal = blended.normalized();
+        for (std::size_t c = 0; c < attributes; ++c) {
+          out.attributes[c][i] = (1 - v.t) * (*a.attributes)[c][a.index] + v.t * (*b.attributes)[c][b.index];
+        }
+      } else {
+        p = v.kind == FinalVertex::Kind::corner ? clustered(*a.corner, chord)
+                                                : Vec3(position(*a.corner) + to_vec(v.position));
+        for (std::size_t c = 0; c < attributes; ++c) out.attributes[c][i] = (*a.attributes)[c][a.index];
+      }
+      const Vec3 world = frame.to_world(p);
+      const Vec3 turned = back * normal;
+      out.x[i] = world.x();
+      out.y[i] = world.y();
+      out.z[i] = world.z();
+      out.nx[i] = static_cast<float>(turned.x());
+      out.ny[i] = static_cast<float>(turned.y());
+      out.nz[i] = static_cast<float>(turned.z());
+    }
+  });
+}
+
+}  // namespace lamina

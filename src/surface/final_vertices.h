@@ -1,0 +1,16 @@
+// From a finished slab's vertex kinds to positions, normals and attributes in the input's coordinates.
+#pragma once
+#include "lamina/cluster.h"
+#include "lamina/frame.h"
+#include "lamina/iso_mesh.h"
+#include "lamina/mesh_sink.h"
+
+namespace lamina {
+
+/// `here` is the finished slab, `next` the one above (null at the end). `chord`: SurfaceSettings::chord.
+/// A clustered vertex goes to its corner's projected point, moved outward by chord * curvature * cell^2 (at most a
+/// quarter of a cell), which makes up for triangles cutting inside a curved surface.
+void place_vertices(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, const Frame& frame, float chord,
+                    VertexBatch& out);
+
+}  // namespace lamina

@@ -1,0 +1,177 @@
+#include "surface/pipeline.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+
+#include "diffuse/diffuse.h"
+#include "lamina/error.h"
+#include "project/finish.h"
+#include "refine/refine.h"
+#include "surface/final_vertices.h"
+
+namespace lamina {
+namespace {
+
+/// Slabs a cell can be touched from: two cells of the coarsest level, each a slab high.
+constexpr std::int32_t kReachSlabs = 2;
+
+ProjectSettings project_settings(const SurfaceSettings& s) {
+  ProjectSettings p;
+  p.fit = s.fit == FitMode::sphere ? Fit::sphere : Fit::plane;
+  p.steps = s.steps;
+  p.centres = s.diffuse;
+  return p;
+}
+
+}  // namespace
+
+Pipeline::Pipeline(const SurfaceSettings& settings, const Resolved& resolved, const Frame& frame, const Extent& extent,
+                   SampleFeed& feed, std::size_t attributes, MeshSink& sink)
+    : settings_(settings),
+      resolved_(resolved),
+      frame_(frame),
+      feed_(feed),
+      sink_(sink),
+      kernel_(select_kernel()),
+      window_(resolved.lattice, static_cast<int>(attributes), extent),
+      projector_(project_settings(settings), kernel_),
+      clusterer_(ClusterSettings{settings.cluster}),
+      extract_{static_cast<float>(settings.boundary)},
+      first_(resolved.lattice.slab_of(extent.z_min) - kReachSlabs),
+      last_(resolved.lattice.slab_of(extent.z_max) + kReachSlabs),
+      refined_(first_),
+      placed_(first_),
+      projected_(first_),
+      finished_(first_),
+      numbered_(first_),
+      triangulated_(first_),
+      written_(first_),
+      covered_(first_),
+      leaf_cells_(static_cast<std::size_t>(resolved.lattice.levels), 0) {}
+
+void Pipeline::mark(const ActiveBucket& bucket) {
+  constexpr std::size_t kPiece = 4096;
+  const std::size_t n = bucket.samples.size();
+  const auto [low, high] = std::minmax_element(bucket.samples.z.begin(), bucket.samples.z.end());
+  for (covered_ = std::min(covered_, resolved_.lattice.slab_of(*low)); covered_ <= resolved_.lattice.slab_of(*high);
+       ++covered_) {
+    window_.cover(covered_);
+  }
+  tbb::parallel_for(std::size_t{0}, (n + kPiece - 1) / kPiece, [&](std::size_t piece) {
+    for (std::size_t i = piece * kPiece; i < std::min(n, (piece + 1) * kPiece); ++i) {
+      if (bucket.support[i] <= 0) continue;
+      mark_sample(window_, {bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i]});
+    }
+  });
+}
+
+void Pipeline::refine_to(std::int32_t slab) {
+  for (; refined_ <= std::min(slab, last_); ++refined_) {
+    refine_slab(window_, refined_);
+    for (int level = 0; level < window_.levels(); ++level) {
+      leaf_cells_[static_cast<std::size_t>(level)] += count_cells(window_, level, refined_);
+    }
+  }
+  for (; placed_ < refined_; ++placed_) place_corners(window_, placed_);
+}
+
+void Pipeline::project_to(std::int32_t slab) {
+  for (; projected_ <= std::min(slab, last_); ++projected_) {
+    projector_.project(window_, projected_, feed_);
+    if (settings_.diffuse) diffuse_slab(window_, projected_);
+  }
+}
+
+void Pipeline::finish_to(std::int32_t slab) {
+  for (; finished_ <= std::min(slab, last_); ++finished_) {
+    finish_slab(window_, finished_, kernel_);
+  }
+}
+
+void Pipeline::number_to(std::int32_t slab) {
+  for (; numbered_ <= std::min(slab, last_); ++numbered_) {
+    IsoSlab* below = iso_.empty() ? nullptr : iso_.back().get();
+    auto here = std::make_shared<IsoSlab>();
+    number_edges(window_, numbered_, extract_, below, *here);
+    isovertices_ += here->vertices.size();
+    iso_.push_back(std::move(here));
+    // Corners of the next slab are extended from this one's values, but no farther back.
+    if (numbered_ > first_) window_.retire_values(numbered_ - 1);
+  }
+}
+
+void Pipeline::triangulate_to(std::int32_t slab) {
+  IsoSlab nothing;
+  for (; triangulated_ <= std::min(slab, last_); ++triangulated_) {
+    const auto at = static_cast<std::size_t>(triangulated_ - written_);
+    IsoSlab& here = *iso_[at];
+    triangulate(window_, triangulated_, here, at + 1 < iso_.size() ? *iso_[at + 1] : nothing, extracted_);
+    separate_fans(at > 0 ? iso_[at - 1].get() : nullptr, here, extracted_);
+    isotriangles_ += here.triangles.size();
+    if (at > 0) clusterer_.push(iso_[at - 1]);
+  }
+  if (triangulated_ > last_ && !iso_.empty()) {
+    clusterer_.push(iso_.back());
+    clusterer_.finish();
+  }
+}
+
+void Pipeline::write_finished() {
+  FinalSlab slab;
+  while (clusterer_.pop(slab)) {
+    const IsoSlab* next = iso_.size() > 1 ? iso_[1].get() : nullptr;
+    place_vertices(slab, *iso_.front(), next, frame_, static_cast<float>(settings_.chord), vertices_);
+    sink_.append_vertices(vertices_);
+    sink_.append_triangles(slab.triangles);
+    iso_.pop_front();
+    ++written_;
+  }
+}
+
+void Pipeline::retire() {
+  const Lattice& lattice = resolved_.lattice;
+  window_.retire_below(triangulated_ - 1);
+  // The next slab to project is reached from as far below as a sample can act.
+  const double reach = static_cast<double>(feed_.support_limit()) + static_cast<double>(projector_.margin(lattice));
+  feed_.release(std::int64_t{projected_} * lattice.slab_height() - static_cast<std::int64_t>(reach) - 1);
+}
+
+void Pipeline::run(const RunContext& run, Stopwatch& watch) {
+  const Lattice& lattice = resolved_.lattice;
+  const std::int64_t height = lattice.slab_height();
+  const double ahead = static_cast<double>(feed_.support_limit()) + static_cast<double>(projector_.margin(lattice));
+  for (std::int32_t step = first_; step <= last_; step += settings_.window) {
+    const std::int32_t top = std::min(step + settings_.window - 1, last_);  // slabs to triangulate in this step
+    const std::int64_t marked = (std::int64_t{top} + 3 + kReachSlabs + 1) * height;
+    const std::int64_t needed = (std::int64_t{top} + 3 + 1) * height + static_cast<std::int64_t>(ahead) + 1;
+    watch.time("radii", [&] {
+      feed_.prepare(std::max(marked, needed), [&](const ActiveBucket& b) { watch.time("mark", [&] { mark(b); }); });
+    });
+    watch.time("refine", [&] { refine_to(top + 3); });
+    watch.time("project", [&] { project_to(top + 3); });
+    watch.time("finish", [&] { finish_to(top + 2); });
+    watch.time("number", [&] { number_to(top + 1); });
+    watch.time("triangulate", [&] { triangulate_to(top); });
+    watch.time("cluster and write", [&] { write_finished(); });
+    retire();
+    if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+    if (run.progress)
+      run.progress({"surface", feed_.released(), resolved_.plan.samples, top - first_ + 1, last_ - first_ + 1});
+  }
+}
+
+void Pipeline::report(SurfaceStats& stats) const {
+  stats.corners = projector_.counts().corners;
+  stats.corners_seen = projector_.counts().seen;
+  stats.corners_good = projector_.counts().good;
+  stats.isovertices = isovertices_;
+  stats.isotriangles = isotriangles_;
+  stats.rejected_loops = extracted_.rejected_loops;
+  stats.general_cells = extracted_.general_cells;
+  stats.crossing_cells = extracted_.crossing_cells;
+  stats.leaf_cells = leaf_cells_;
+  stats.clusters = clusterer_.counts();
+}
+
+}  // namespace lamina

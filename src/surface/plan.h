@@ -1,0 +1,30 @@
+// Turns settings and a look at the cloud into the lattice and what the run will take.
+#pragma once
+#include "feed/sample_feed.h"
+#include "lamina/frame.h"
+#include "lamina/lattice.h"
+#include "lamina/radii.h"
+#include "lamina/slab_store.h"
+#include "lamina/surface.h"
+#include "surface/ingest.h"
+
+namespace lamina {
+
+struct Resolved {
+  Lattice lattice;
+  FeedSettings feed;
+  RadiiSettings radii;
+  SurfacePlan plan;
+};
+
+/// Throws Error(usage) for settings out of range. Called before the input is opened.
+void check_settings(const SurfaceSettings& settings);
+
+/// Throws Error(usage) when the cell asked for cannot be represented for this cloud.
+Resolved resolve_plan(const SurfaceSettings& settings, const Frame& frame, const SlabStore& store, const Extent& bounds,
+                      bool given_radii, std::size_t attributes);
+
+/// The plan in lines for a reader.
+std::string describe(const SurfacePlan& plan, const SurfaceSettings& settings);
+
+}  // namespace lamina

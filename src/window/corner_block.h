@@ -1,0 +1,106 @@
+// An 8^3 block of cells and of the corners at their lower ends: what a leaf of the window's trees holds. Masks tell
+// what exists, one structure-of-arrays block per slab holds the values of the corners that have any (DESIGN "Layout of
+// the tree").
+#pragma once
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+namespace lamina {
+
+/// 512 bits, a 64-bit word per layer z; bit x + 8 y inside a word. OpenVDB's own linear order with its i axis as z:
+/// Coord(z, y, x), so that a slab is a run of words.
+struct BlockMask {
+  std::array<std::uint64_t, 8> words{};
+
+  static constexpr int offset(int x, int y, int z) { return x + (y << 3) + (z << 6); }
+  [[nodiscard]] bool test(int offset) const { return ((words[offset >> 6] >> (offset & 63)) & 1U) != 0; }
+  void set(int offset) { words[offset >> 6] |= std::uint64_t{1} << (offset & 63); }
+  void reset(int offset) { words[offset >> 6] &= ~(std::uint64_t{1} << (offset & 63)); }
+  void assign(int offset, bool on) { on ? set(offset) : reset(offset); }
+  [[nodiscard]] bool any() const {
+    std::uint64_t all = 0;
+    for (const std::uint64_t w : words) all |= w;
+    return all != 0;
+  }
+  [[nodiscard]] int count() const {
+    int n = 0;
+    for (const std::uint64_t w : words) n += std::popcount(w);
+    return n;
+  }
+};
+
+/// What a valued corner holds after projection, in channels (lengths in fixed-point steps).
+/// Distance is signed (positive outside), the normal is the fit's at the projected point, which lies at corner -
+/// distance * normal; curvature is the fit's signed curvature there (1/steps, positive where the surface bends away
+/// from its normal, as a sphere seen from outside); reach is |projected point - weighted average| in units of the local
+/// support radius.
+enum Channel : int { kDistance = 0, kNormalX, kNormalY, kNormalZ, kCurvature, kReach, kFirstAttribute };
+
+/// Values of the `near` corners of one slab's layers inside a leaf, channel after channel, each in mask order.
+struct CornerValues {
+  std::vector<float> data;
+  std::uint32_t count = 0;  ///< corners
+  void allocate(std::uint32_t corners, int channels) {
+    count = corners;
+    data.assign(static_cast<std::size_t>(corners) * static_cast<std::size_t>(channels), 0.0F);
+  }
+  [[nodiscard]] float* channel(int c) { return data.data() + static_cast<std::size_t>(c) * count; }
+  [[nodiscard]] const float* channel(int c) const { return data.data() + static_cast<std::size_t>(c) * count; }
+};
+
+/// Numbers of the isovertices and surface corners of one layer, written by extraction. Tables are per slab
+/// (IsoSlab::vertices, IsoSlab::corners); the number of an edge is its layer's base plus its rank in the layer's
+/// word of axis x, then y, then z; that of a corner is the base plus its rank in `surface`.
+struct LayerNumbers {
+  std::uint32_t vertex_base = 0;
+  std::uint32_t corner_base = 0;
+};
+
+/// Points of a block that are projected, and what came of it.
+struct Projected {
+  BlockMask near;  ///< carry values (CornerValues): close enough to samples to be projected
+  BlockMask seen;  ///< subset of near: samples contributed; an edge with such an end is valid
+  BlockMask good;  ///< subset of seen: own value is trusted; other corners are extended from good neighbours
+  std::array<CornerValues, 8> values;  ///< by slab inside the leaf, Window::brick_of()
+
+  /// Index of a corner in CornerValues of its brick (`brick_layers` = layers of a slab inside a leaf, a power of two <=
+  /// 8). Meaningful only where near.test(offset).
+  [[nodiscard]] std::uint32_t value_index(int offset, int brick_layers) const {
+    const int z = offset >> 6;
+    std::uint32_t n = 0;
+    for (int w = z & ~(brick_layers - 1); w < z; ++w) n += static_cast<std::uint32_t>(std::popcount(near.words[w]));
+    return n + static_cast<std::uint32_t>(std::popcount(near.words[z] & ((std::uint64_t{1} << (offset & 63)) - 1)));
+  }
+};
+
+struct CornerBlock : Projected {
+  static constexpr std::uint32_t kNoTask = ~std::uint32_t{0};
+  std::uint32_t task = kNoTask;  ///< number of the block in the list a stage works through, while it does
+
+  // Cells of the octree. A cell of this level exists when its parent is split (or at the coarsest level when touched).
+  BlockMask home;     ///< cells that hold a sample of this level
+  BlockMask touched;  ///< cells that a sample of this level reaches: within two cells of its home
+  BlockMask close;    ///< cells within one cell of the home of a sample of this or a coarser level
+  BlockMask reached;  ///< cells that a sample of this or a coarser level reaches
+  BlockMask split;    ///< subdivided cells
+  BlockMask cells;    ///< leaf cells that take part: existing, not split, reached by a sample
+
+  // Corners.
+  BlockMask corners;   ///< of the leaf cells in `cells`, of this level
+  BlockMask shared;    ///< subset of corners: held by a finer level too, whose value counts
+  BlockMask positive;  ///< sign of every corner in `corners` (outside), set when the slab is finished
+
+  // Minimal edges with a sign change, by axis, keyed by their lower corner; written by extraction.
+  std::array<BlockMask, 3> crossing;
+  std::array<BlockMask, 3> accepted;  ///< subset of crossing: the isovertex is valid
+  BlockMask surface;                  ///< corners at an end of a crossing edge
+  std::array<LayerNumbers, 8> numbers{};
+
+  /// Cell centres, where diffusion projects those instead of the corners; shared so that a block can be copied.
+  std::shared_ptr<Projected> centres;
+};
+
+}  // namespace lamina

@@ -1,0 +1,206 @@
+#include "window/window.h"
+
+#include <algorithm>
+#include <atomic>
+#include <deque>
+#include <mutex>
+#include <tuple>
+
+#include "window/corner_leaf.h"
+
+namespace lamina {
+namespace {
+
+openvdb::Coord leaf_origin(const Block& b) {
+  return {b.z * 8, b.y * 8, b.x * 8};
+}
+
+/// Beyond this many entries a layer's lookup table costs more memory than it saves time.
+constexpr std::int64_t kTableLimit = std::int64_t{1} << 22;
+
+std::size_t value_bytes(const Projected& points) {
+  std::size_t bytes = 0;
+  for (const CornerValues& v : points.values) bytes += sizeof(float) * v.data.capacity();
+  return bytes;
+}
+
+/// Removes a leaf, and with the last layer of leaves below it every inner node that has seen its time.
+void retire_branch(CornerTree& tree, const openvdb::Coord& origin) {
+  using Upper = CornerTree::RootNodeType::ChildNodeType;
+  using Lower = Upper::ChildNodeType;
+  const auto last_layer_of = [&](int dim) { return (origin.x() & (dim - 1)) == dim - 8; };
+  delete tree.stealNode<CornerLeaf>(origin, false, false);
+  if (last_layer_of(static_cast<int>(Lower::DIM))) delete tree.stealNode<Lower>(origin, false, false);
+  if (last_layer_of(static_cast<int>(Upper::DIM))) {
+    delete tree.stealNode<Upper>(origin, false, false);
+    tree.root().eraseBackgroundTiles();
+  }
+}
+
+}  // namespace
+
+struct Window::Trees {
+  /// The leaves of one layer of blocks: in order of creation, and by place for quick lookup.
+  struct Layer {
+    std::vector<Tile> tiles;
+    std::vector<CornerBlock*> table;
+  };
+  struct Level {
+    CornerTree tree{false};
+    std::deque<Layer> layers;  ///< block layers z_base, z_base + 1, ...
+    std::int32_t z_base = 0;
+    std::int32_t x0 = 0, y0 = 0, nx = 0, ny = 0;  ///< extent of the tables in blocks
+  };
+  std::vector<Level> levels;
+  std::mutex creation;
+
+  /// Entry of the lookup table, null where the block lies outside of it.
+  static CornerBlock** slot(Level& level, const Block& b) {
+    const std::int32_t x = b.x - level.x0;
+    const std::int32_t y = b.y - level.y0;
+    const std::int32_t z = b.z - level.z_base;
+    if (x < 0 || y < 0 || z < 0 || x >= level.nx || y >= level.ny ||
+        z >= static_cast<std::int32_t>(level.layers.size())) {
+      return nullptr;
+    }
+    return &level.layers[z].table[static_cast<std::size_t>(y) * level.nx + x];
+  }
+
+  CornerBlock* find(int l, const Block& b) {
+    Level& level = levels[l];
+    if (CornerBlock** s = slot(level, b)) return *s;
+    CornerLeaf* leaf = level.tree.probeLeaf(leaf_origin(b));
+    return leaf == nullptr ? nullptr : &leaf->block;
+  }
+
+  void cover(Level& level, std::int32_t z) {
+    if (level.layers.empty()) level.z_base = z;
+    const auto entries = static_cast<std::size_t>(level.nx) * static_cast<std::size_t>(level.ny);
+    while (z < level.z_base) {
+      level.layers.emplace_front().table.assign(entries, nullptr);
+      --level.z_base;
+    }
+    while (z >= level.z_base + static_cast<std::int32_t>(level.layers.size())) {
+      level.layers.emplace_back().table.assign(entries, nullptr);
+    }
+  }
+
+  CornerBlock& create(int l, const Block& b) {
+    Level& level = levels[l];
+    cover(level, b.z);
+    CornerBlock& block = level.tree.touchLeaf(leaf_origin(b))->block;
+    level.layers[b.z - level.z_base].tiles.push_back({b, &block});
+    if (CornerBlock** s = slot(level, b)) std::atomic_ref(*s).store(&block, std::memory_order_release);
+    return block;
+  }
+};
+
+Window::Window(const Lattice& lattice, int attributes, const Bounds& bounds)
+    : lattice_(lattice), attributes_(attributes), trees_(std::make_unique<Trees>()) {
+  trees_->levels.resize(static_cast<std::size_t>(lattice.levels));
+  for (int l = 0; l < lattice.levels; ++l) {
+    Trees::Level& level = trees_->levels[l];
+    const std::int32_t block = lattice.cell_size(l) * 8;
+    if (bounds.x_max < bounds.x_min) continue;
+    const std::int32_t x0 = floor_div(bounds.x_min, block) - 1;
+    const std::int32_t y0 = floor_div(bounds.y_min, block) - 1;
+    const std::int32_t nx = floor_div(bounds.x_max, block) + 2 - x0;
+    const std::int32_t ny = floor_div(bounds.y_max, block) + 2 - y0;
+    if (std::int64_t{nx} * ny > kTableLimit) continue;
+    std::tie(level.x0, level.y0, level.nx, level.ny) = std::tie(x0, y0, nx, ny);
+  }
+}
+
+Window::~Window() = default;
+
+const CornerBlock* Window::probe(int level, const Block& b) const {
+  return trees_->find(level, b);
+}
+
+CornerBlock* Window::probe(int level, const Block& b) {
+  return trees_->find(level, b);
+}
+
+CornerBlock& Window::touch(int level, const Block& b) {
+  if (CornerBlock* block = trees_->find(level, b)) return *block;
+  return trees_->create(level, b);
+}
+
+void Window::cover(std::int32_t slab) {
+  for (int l = 0; l < levels(); ++l) {
+    const std::int32_t first = lattice_.first_layer(l, slab);
+    trees_->cover(trees_->levels[l], first >> 3);
+    trees_->cover(trees_->levels[l], (first + lattice_.layers(l) - 1) >> 3);
+  }
+}
+
+CornerBlock& Window::touch_shared(int level, const Block& b) {
+  if (CornerBlock** slot = Trees::slot(trees_->levels[level], b)) {
+    if (CornerBlock* block = std::atomic_ref(*slot).load(std::memory_order_acquire)) return *block;
+  }
+  const std::lock_guard lock(trees_->creation);
+  return touch(level, b);
+}
+
+std::vector<Tile> Window::tiles(int level, std::int32_t slab) const {
+  const std::int32_t first = lattice_.first_layer(level, slab);
+  const std::int32_t last = first + lattice_.layers(level) - 1;
+  const Trees::Level& l = trees_->levels[level];
+  std::vector<Tile> out;
+  for (std::int32_t z = std::max(first >> 3, l.z_base); z <= (last >> 3); ++z) {
+    const std::int32_t i = z - l.z_base;
+    if (i >= static_cast<std::int32_t>(l.layers.size())) break;
+    const auto begin = out.insert(out.end(), l.layers[i].tiles.begin(), l.layers[i].tiles.end());
+    std::sort(begin, out.end(), [](const Tile& a, const Tile& b) {
+      return std::tie(a.block.y, a.block.x) < std::tie(b.block.y, b.block.x);
+    });
+  }
+  return out;
+}
+
+void Window::retire_values(std::int32_t slab) {
+  for (int level = 0; level < levels(); ++level) {
+    const int brick = brick_of(level, lattice_.first_layer(level, slab) & 7);
+    for (const Tile& t : tiles(level, slab)) {
+      t.leaf->values[brick] = {};
+      if (t.leaf->centres != nullptr) t.leaf->centres->values[brick] = {};
+    }
+  }
+}
+
+void Window::retire_below(std::int32_t slab) {
+  for (int l = 0; l < levels(); ++l) {
+    Trees::Level& level = trees_->levels[l];
+    const std::int32_t first = lattice_.first_layer(l, slab);
+    while (!level.layers.empty() && level.z_base * 8 + 8 <= first) {
+      for (const Tile& t : level.layers.front().tiles) retire_branch(level.tree, leaf_origin(t.block));
+      level.layers.pop_front();
+      ++level.z_base;
+    }
+  }
+}
+
+std::size_t Window::leaf_count() const {
+  std::size_t n = 0;
+  for (const auto& level : trees_->levels) {
+    for (const auto& layer : level.layers) n += layer.tiles.size();
+  }
+  return n;
+}
+
+std::size_t Window::memory() const {
+  std::size_t bytes = 0;
+  for (const auto& level : trees_->levels) {
+    for (const auto& layer : level.layers) {
+      bytes += layer.table.capacity() * sizeof(CornerBlock*);
+      for (const Tile& t : layer.tiles) {
+        bytes += sizeof(CornerLeaf);
+        bytes += value_bytes(*t.leaf);
+        if (t.leaf->centres != nullptr) bytes += sizeof(Projected) + value_bytes(*t.leaf->centres);
+      }
+    }
+  }
+  return bytes;
+}
+
+}  // namespace lamina
