@@ -24,10 +24,10 @@ Image gradient(int width, int height) {
 TEST(Png, PixelsComeBack) {
   const test::TemporaryFolder folder;
   const Image image = gradient(37, 21);
-  write_png(image, folder.file("g.png"));
+  write_png(image, folder / "g.png");
   png_image header = {};
   header.version = PNG_IMAGE_VERSION;
-  ASSERT_NE(png_image_begin_read_from_file(&header, folder.file("g.png").c_str()), 0);
+  ASSERT_NE(png_image_begin_read_from_file(&header, (folder / "g.png").c_str()), 0);
   EXPECT_EQ(header.width, 37u);
   EXPECT_EQ(header.height, 21u);
   header.format = PNG_FORMAT_RGB;
@@ -38,7 +38,7 @@ TEST(Png, PixelsComeBack) {
 
 TEST(Png, NothingIsLeftWhereItCannotBeWritten) {
   const test::TemporaryFolder folder;
-  for (const std::string& path : {folder.path().string(), folder.file("missing/g.png")}) {
+  for (const std::string& path : {folder.path(), folder / "missing/g.png"}) {
     try {
       write_png(gradient(4, 4), path);
       ADD_FAILURE() << path;

@@ -3,35 +3,14 @@
 #include <sys/wait.h>
 
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <sstream>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "files/temporary_folder.h"
+
 namespace lamina::test {
-
-/// A folder of its own for a test, removed with everything in it.
-class TemporaryFolder {
- public:
-  TemporaryFolder() {
-    std::string pattern = (std::filesystem::temp_directory_path() / "lamina-test-XXXXXX").string();
-    if (mkdtemp(pattern.data()) == nullptr) throw std::runtime_error("no temporary folder: " + pattern);
-    path_ = pattern;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-  [[nodiscard]] std::string file(const std::string& name) const { return (path_ / name).string(); }
-
- private:
-  std::filesystem::path path_;
-};
 
 struct Outcome {
   int code = -1;  ///< exit code, or 128 + signal
@@ -55,12 +34,12 @@ inline Outcome run_lamina(const std::vector<std::string>& arguments) {
   };
   std::string command = quoted(LAMINA_PROGRAM);
   for (const std::string& argument : arguments) command += " " + quoted(argument);
-  command += " </dev/null >" + quoted(folder.file("out")) + " 2>" + quoted(folder.file("err"));
+  command += " </dev/null >" + quoted(folder / "out") + " 2>" + quoted(folder / "err");
   const int status = std::system(command.c_str());
   Outcome outcome;
   outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-  outcome.out = read_text(folder.file("out"));
-  outcome.err = read_text(folder.file("err"));
+  outcome.out = read_text(folder / "out");
+  outcome.err = read_text(folder / "err");
   return outcome;
 }
 

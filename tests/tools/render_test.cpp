@@ -23,8 +23,7 @@ class RenderTool : public ::testing::Test {
            "end_header\n0 0 0\n1 0 0\n0 1 0\n";
   }
   test::TemporaryFolder folder_;
-  std::string mesh_ = folder_.file("sphere.ply"), cloud_ = folder_.file("cloud.ply"),
-              picture_ = folder_.file("out.png");
+  std::string mesh_ = folder_ / "sphere.ply", cloud_ = folder_ / "cloud.ply", picture_ = folder_ / "out.png";
 };
 
 TEST_F(RenderTool, DrawsMeshesAndPoints) {
@@ -71,7 +70,7 @@ TEST_F(RenderTool, AnswersBadOptions) {
 }
 
 TEST_F(RenderTool, NamesInputThatCannotBeRead) {
-  for (const std::string& input : {folder_.file("none.ply"), folder_.path().string()}) {
+  for (const std::string& input : {folder_ / "none.ply", folder_.path()}) {
     const auto outcome = run_lamina({"render", input, "-o", picture_});
     EXPECT_EQ(outcome.code, 3) << outcome.err;
     EXPECT_THAT(outcome.err, HasSubstr(input));
@@ -80,7 +79,7 @@ TEST_F(RenderTool, NamesInputThatCannotBeRead) {
       << "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\n"
          "end_header\n";
   EXPECT_EQ(run_lamina({"render", cloud_, "-o", picture_}).code, 5);
-  EXPECT_EQ(run_lamina({"render", mesh_, "-o", folder_.file("no/such/out.png")}).code, 4);
+  EXPECT_EQ(run_lamina({"render", mesh_, "-o", folder_ / "no/such/out.png"}).code, 4);
 }
 
 }  // namespace
