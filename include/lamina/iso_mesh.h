@@ -32,9 +32,9 @@ struct SurfaceCorner {
 };
 
 /// An isovertex: a minimal edge whose ends have different signs. Owned by the slab that holds the edge's lower end.
-/// Only valid ones are listed: both ends have a value, at least one of samples of its own. A loop that cannot be
-/// triangulated by chords gets a centre vertex: its two corners are any two of the loop's, chosen so that the point at
-/// `t` between them comes close to the loop's mean.
+/// Only valid ones are listed: both ends have a value, at least one is carried by the samples around it. A loop that
+/// cannot be triangulated by chords gets a centre vertex: its two corners are any two of the loop's, chosen so that the
+/// point at `t` between them comes close to the loop's mean.
 struct IsoVertex {
   static constexpr std::uint8_t kCentre = 3;  ///< `axis` of a centre vertex
   SlabIndex low, high;  ///< SurfaceCorner at the lower and upper end; the lower is in this slab but for centre vertices

@@ -81,13 +81,13 @@ void find_crossing(const TileView& tile) {
     const std::array<std::uint64_t, 3> valued = {shifted(&CornerBlock::valued, 1, 0, z),
                                                  shifted(&CornerBlock::valued, 0, 1, z),
                                                  above == nullptr ? 0 : above->valued.words[(z + 1) & 7]};
-    const std::array<std::uint64_t, 3> seen = {shifted(&CornerBlock::seen, 1, 0, z),
-                                               shifted(&CornerBlock::seen, 0, 1, z),
-                                               above == nullptr ? 0 : above->seen.words[(z + 1) & 7]};
+    const std::array<std::uint64_t, 3> carried = {shifted(&CornerBlock::carried, 1, 0, z),
+                                                  shifted(&CornerBlock::carried, 0, 1, z),
+                                                  above == nullptr ? 0 : above->carried.words[(z + 1) & 7]};
     for (int axis = 0; axis < 3; ++axis) {
       leaf.crossing[axis].words[z] = change[axis];
       leaf.accepted[axis].words[z] =
-          change[axis] & leaf.valued.words[z] & valued[axis] & (leaf.seen.words[z] | seen[axis]);
+          change[axis] & leaf.valued.words[z] & valued[axis] & (leaf.carried.words[z] | carried[axis]);
     }
   }
 }

@@ -65,7 +65,11 @@ bool corner_value(const Window& window, int level, const Cell& corner, CornerVal
       }
     }
   }
-  if (total <= 0) return false;
+  if (total <= 0) {
+    if (!here.block->valued.test(here.offset)) return false;
+    own_value(window, level, here, out, attributes, 1);
+    return true;
+  }
   const float inv = 1.0F / total;
   const float length =
       std::sqrt(sum.normal[0] * sum.normal[0] + sum.normal[1] * sum.normal[1] + sum.normal[2] * sum.normal[2]);

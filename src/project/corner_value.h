@@ -16,8 +16,8 @@ struct CornerValue {
 
 /// The value of a corner of a leaf cell (any corner in `corners` of its leaf) after its slab and the slabs around it
 /// were projected. The finest level holding the corner decides, so the answer has the same bits from every level. False
-/// when the corner has no own value and no trusted neighbour; `out` is then untouched. `attributes` (may be null) gets
-/// window.attributes() floats.
+/// when the corner has no trusted value, no trusted neighbour and is not `valued` for its own; `out` is then untouched.
+/// `attributes` (may be null) gets window.attributes() floats.
 bool corner_value(const Window& window, int level, const Cell& corner, CornerValue& out, float* attributes);
 
 }  // namespace lamina

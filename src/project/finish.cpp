@@ -59,8 +59,16 @@ void gather_field(const Window& window, int level, const Block& b, int begin, in
 
 /// Bits of a layer's corners: their signs, and whether anything speaks for them.
 struct Signs {
-  std::uint64_t positive = 0, valued = 0;
+  std::uint64_t positive = 0, valued = 0, carried = 0;
 };
+
+/// A corner's own projected point is better than none when it lies no farther from the average of its samples than
+/// this (support radii).
+constexpr float kLoneReach = 0.7F;
+
+/// A corner with trusted neighbours on all sides lies over a small gap between samples, not beyond a rim: their mean is
+/// this near to it (squared, in cells; that of half of the neighbours in a plane is 0.4 away, of one side's 1).
+constexpr float kSurrounded = 0.3F * 0.3F;
 
 /// Corners of the layer whose own projected point lies beyond the limit.
 std::uint64_t beyond(const Window& window, int level, const CornerBlock& leaf, int z, float boundary) {
@@ -73,14 +81,15 @@ std::uint64_t beyond(const Window& window, int level, const CornerBlock& leaf, i
   return out & leaf.seen.words[z];
 }
 
-std::uint64_t own_signs(const Window& window, int level, const CornerBlock& leaf, int z) {
+/// Signs of the layer's corners in `wanted`, by their own distances.
+std::uint64_t own_signs(const Window& window, int level, const CornerBlock& leaf, int z, std::uint64_t wanted) {
   std::uint64_t positive = 0;
   const CornerValues& values = leaf.values[window.brick_of(level, z)];
   std::uint32_t i = leaf.value_index(z * 64, window.brick_layers(level));
   for (std::uint64_t w = leaf.near.words[z]; w != 0; w &= w - 1, ++i) {
     if (values.channel(kDistance)[i] >= 0) positive |= w & (~w + 1);
   }
-  return positive & leaf.good.words[z];
+  return positive & wanted;
 }
 
 /// Of the layer's corners that a finer level holds.
@@ -93,6 +102,7 @@ Signs finer_signs(const Window& window, int level, const Tile& t, int z) {
     const CornerBlock* from = window.probe(level - 1, block_of(fine));
     if (from->positive.test(offset_in_block(fine))) out.positive |= one;
     if (from->valued.test(offset_in_block(fine))) out.valued |= one;
+    if (from->carried.test(offset_in_block(fine))) out.carried |= one;
   }
   return out;
 }
@@ -102,15 +112,16 @@ Signs extended_signs(const Kernel& kernel, const CornerField& field, int z, floa
   Signs out;
   for (int y = 0; y < 8; ++y) {
     if (((wanted >> (8 * y)) & 0xFFU) == 0) continue;
-    Lanes sum{};
-    Lanes weight{};
-    kernel.extend(field, y, z, cell, sum, weight);
+    Extension e{};
+    kernel.extend(field, y, z, cell, e);
     for (int l = 0; l < kLanes; ++l) {
-      out.positive |= static_cast<std::uint64_t>(!(sum[l] < 0)) << (8 * y + l);
-      out.valued |= static_cast<std::uint64_t>(weight[l] > 0) << (8 * y + l);
+      const bool valued = e.weight[l] > 0;
+      out.positive |= static_cast<std::uint64_t>(!(e.distance[l] < 0)) << (8 * y + l);
+      out.valued |= static_cast<std::uint64_t>(valued) << (8 * y + l);
+      out.carried |= static_cast<std::uint64_t>(valued && e.aside[l] <= kSurrounded) << (8 * y + l);
     }
   }
-  return {out.positive & wanted, out.valued & wanted};
+  return {out.positive & wanted, out.valued & wanted, out.carried & wanted};
 }
 
 void finish_tile(const Window& window, int level, const Tile& t, int begin, int end, const Kernel& kernel,
@@ -124,18 +135,24 @@ void finish_tile(const Window& window, int level, const Tile& t, int begin, int 
     const std::uint64_t good = t.leaf->good.words[z];
     Signs signs;
     if (shared != 0) signs = finer_signs(window, level, t, z);
-    signs.positive |= own_signs(window, level, *t.leaf, z) & ~shared;
+    signs.positive |= own_signs(window, level, *t.leaf, z, good & ~shared);
     signs.valued |= good & ~shared;
+    signs.carried |= t.leaf->seen.words[z] & ~shared;
     if (const std::uint64_t wanted = corners & ~shared & ~good; wanted != 0) {
       if (!gathered) gather_field(window, level, t.block, begin, end, field);
       gathered = true;
       const Signs extended = extended_signs(kernel, field, z, cell, wanted);
-      signs.positive |= extended.positive;
-      signs.valued |= extended.valued;
+      // Nobody to extend from.
+      const std::uint64_t alone =
+          wanted & ~extended.valued & ~beyond(window, level, *t.leaf, z, kLoneReach) & t.leaf->seen.words[z];
+      signs.positive |= (extended.positive & ~alone) | own_signs(window, level, *t.leaf, z, alone);
+      signs.valued |= extended.valued | alone;
+      signs.carried |= extended.carried;
     }
     if (boundary > 0) signs.valued &= ~(beyond(window, level, *t.leaf, z, boundary) & ~shared);
     t.leaf->positive.words[z] = signs.positive & corners;
     t.leaf->valued.words[z] = signs.valued & corners;
+    t.leaf->carried.words[z] = signs.carried & corners;
   }
 }
 

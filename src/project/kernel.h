@@ -76,14 +76,20 @@ struct CornerField {
   std::array<float, kSize> distance, nx, ny, nz, trusted;
 };
 
+/// What the trusted ones among 26 neighbours say about eight corners. Weights are 1 / m^2, m = L1 offset in cells.
+struct Extension {
+  Lanes distance;  ///< weighted sum of the neighbours' planes' distances, steps
+  Lanes weight;    ///< sum of weights; 0: no trusted neighbour
+  Lanes aside;     ///< squared distance, along the surface, of the neighbours' weighted mean from the corner, cells^2
+};
+
 struct Kernel {
   const char* name;  ///< "x86-64-v3", ...
   /// Adds samples of `ranges` to `sums` (kSums + attributes lanes).
   void (*accumulate)(const TileSamples&, const SampleRange* ranges, int count, const Queries&, Lanes* sums);
   void (*fit)(const Lanes* sums, const FitInput&, FitOutput&);
-  /// Extends trusted neighbours' planes to the eight corners of row (y, z) of a tile: weighted sum of distances and of
-  /// weights (1 / m^2, m = L1 offset in cells) over the 26 neighbours. `cell` in steps.
-  void (*extend)(const CornerField&, int y, int z, float cell, Lanes& sum, Lanes& weight);
+  /// Extends trusted neighbours' planes to the eight corners of row (y, z) of a tile. `cell` in steps.
+  void (*extend)(const CornerField&, int y, int z, float cell, Extension& out);
 };
 
 /// Kernels this processor can run, best last.

@@ -148,25 +148,45 @@ inline Vec load(const float* p) {
   return v;
 }
 
-void extend(const CornerField& f, int y, int z, float cell, Lanes& sum, Lanes& weight) {
-  Vec s = splat(0.0F);
-  Vec w = splat(0.0F);
+void extend(const CornerField& f, int y, int z, float cell, Extension& out) {
+  const Vec zero = splat(0.0F);
+  Vec s = zero;
+  Vec w = zero;
+  Vec nx = zero;
+  Vec ny = zero;
+  Vec nz = zero;
+  Vec ox = zero;
+  Vec oy = zero;
+  Vec oz = zero;
   for (int dz = -1; dz <= 1; ++dz) {
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
         const int m = (dx != 0) + (dy != 0) + (dz != 0);
         if (m == 0) continue;
         const int at = (z + 1 + dz) * CornerField::kPlane + (y + 1 + dy) * CornerField::kRow + 1 + dx;
+        const Vec ax = load(&f.nx[at]);
+        const Vec ay = load(&f.ny[at]);
+        const Vec az = load(&f.nz[at]);
         // Vector from the neighbour to the corner; the neighbour's plane there.
-        const Vec plane = load(&f.distance[at]) -
-                          cell * (load(&f.nx[at]) * static_cast<float>(dx) + load(&f.ny[at]) * static_cast<float>(dy) +
-                                  load(&f.nz[at]) * static_cast<float>(dz));
+        const Vec plane = load(&f.distance[at]) - cell * (ax * static_cast<float>(dx) + ay * static_cast<float>(dy) +
+                                                          az * static_cast<float>(dz));
         const Vec k = load(&f.trusted[at]) * splat(1.0F / static_cast<float>(m * m));
         s += k * plane;
         w += k;
+        nx += k * ax;
+        ny += k * ay;
+        nz += k * az;
+        ox += k * static_cast<float>(dx);
+        oy += k * static_cast<float>(dy);
+        oz += k * static_cast<float>(dz);
       }
     }
   }
-  vec(sum) = s;
-  vec(weight) = w;
+  const Vec any = w > zero ? w : splat(1.0F);
+  const Vec n2 = nx * nx + ny * ny + nz * nz;
+  const Vec along = ox * nx + oy * ny + oz * nz;
+  const Vec n2_or_one = n2 > zero ? n2 : splat(1.0F);
+  vec(out.distance) = s;
+  vec(out.weight) = w;
+  vec(out.aside) = (ox * ox + oy * oy + oz * oz - along * along / n2_or_one) / (any * any);
 }

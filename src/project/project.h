@@ -16,7 +16,7 @@ struct ProjectSettings {
   Fit fit = Fit::sphere;    ///< sphere: algebraic sphere (Guennebaud & Gross 2007); plane: METHOD 3.2
   bool centres = false;     ///< project the centres of leaf cells instead of corners (METHOD 3.3; see diffuse.h)
   int steps = 1;            ///< N >= 1: almost orthogonal projection steps (Alexa & Adamson 2004)
-  float band = 1.75F;       ///< a corner keeps a value only if a sample lies this near, in cells of the sample's level
+  float band = 2.25F;       ///< a corner keeps a value only if a sample lies this near, in cells of the sample's level
   float good_reach = 0.4F;  ///< trusted while |projected point - weighted average| <= this, in support radii
   int good_samples = 3;     ///< and at least this many samples contributed
 };

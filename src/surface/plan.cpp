@@ -14,7 +14,7 @@ namespace {
 constexpr std::uint64_t kSurveySamples = 1u << 18;  ///< samples whose radii are looked at before streaming
 /// The size of most cells in units of the largest the median radius allows: with 0.64 the radii of an evenly sampled
 /// surface (which scatter by 0.75 to 1.25 around their median) all ask for the same level.
-constexpr double kMainCell = 0.64;
+constexpr double kMainCell = 0.7;
 constexpr int kDefaultLevels = 4;
 constexpr int kMaxLevels = 12;
 constexpr std::int32_t kMinSteps = 64;  ///< fixed-point steps a finest cell must have for exact enough positions

@@ -94,6 +94,7 @@ struct CornerBlock : Projected {
   // Set when the slab is finished.
   BlockMask positive;  ///< sign of every corner in `corners` (outside)
   BlockMask valued;    ///< subset of corners: the sign rests on samples, its own or its neighbours'; others are a guess
+  BlockMask carried;   ///< corners with samples of their own, or with trusted neighbours on all sides
 
   // Minimal edges with a sign change, by axis, keyed by their lower corner; written by extraction.
   std::array<BlockMask, 3> crossing;

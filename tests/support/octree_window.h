@@ -123,6 +123,7 @@ class Octree {
       const FieldSample s = field(lattice.position(level, c));
       t.leaf->positive.assign(offset, s.distance >= 0);
       t.leaf->valued.set(offset);
+      t.leaf->carried.assign(offset, s.seen);
       if (!s.seen) continue;
       t.leaf->near.set(offset);
       t.leaf->seen.set(offset);
