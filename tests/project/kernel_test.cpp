@@ -183,7 +183,9 @@ TEST(Kernel, ExtensionIsTheDefinitionInAllKinds) {
           const int at = (z + 1 + dz) * CornerField::kPlane + (y + 1 + dy) * CornerField::kRow + x + 1 + dx;
           if (m == 0 || field.trusted[at] == 0) continue;
           // The neighbour's plane at the corner, which lies -(dx, dy, dz) cells from it.
-          sum += (field.distance[at] - kCell * (field.nx[at] * dx + field.ny[at] * dy + field.nz[at] * dz)) / (m * m);
+          const double along = dx * static_cast<double>(field.nx[at]) + dy * static_cast<double>(field.ny[at]) +
+                               dz * static_cast<double>(field.nz[at]);
+          sum += (field.distance[at] - kCell * along) / (m * m);
           weight += 1.0 / (m * m);
         }
         EXPECT_NEAR(first_sum[x], sum, 1e-3);

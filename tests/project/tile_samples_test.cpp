@@ -81,7 +81,7 @@ TEST(TileSamples, BinsHoldWhatReachesTheTile) {
           const std::array<std::int32_t, 3> p{bucket->samples.x[i], bucket->samples.y[i], bucket->samples.z[i]};
           const double support = bucket->support[i];
           bool ball = false;  // a point of the tile lies within reach
-          bool box = true;    // and one within reach along each axis
+          bool box = true;    // and one along each axis, to half a cell
           std::array<std::array<bool, 8>, 3> axis{};
           const std::array<std::int32_t, 3> base{blocks[t].x * 8, blocks[t].y * 8, blocks[t].z * 8};
           std::array<std::array<double, 8>, 3> away{};
@@ -91,7 +91,7 @@ TEST(TileSamples, BinsHoldWhatReachesTheTile) {
               const std::int32_t at = base[a] + c;
               away[a][c] = std::abs((at + shift) * lattice.cell_size(level) - p[a]);
               axis[a][c] = a < 2 || (at >= first && at < end);
-              any = any || (axis[a][c] && away[a][c] <= support + margin + 1e-6);
+              any = any || (axis[a][c] && away[a][c] <= support + margin + 0.5 * lattice.cell_size(level));
             }
             box = box && any;
           }
@@ -102,11 +102,11 @@ TEST(TileSamples, BinsHoldWhatReachesTheTile) {
             if (!axis[2][z]) continue;
             ball = ball || std::hypot(away[0][x], away[1][y], away[2][z]) < support + margin;
           }
-          if (ball) ASSERT_TRUE(in.contains(s)) << "a sample in reach is missing";
-          if (in.contains(s)) ASSERT_TRUE(box && support > 0) << "a sample out of reach";
+          ASSERT_TRUE(!ball || in.contains(s)) << "a sample in reach is missing";
+          ASSERT_TRUE(!in.contains(s) || (box && support > 0)) << "a sample out of reach";
         }
       }
-      EXPECT_GT(held, 100U);
+      EXPECT_GT(held, 15U);
     }
   }
 }
@@ -125,7 +125,7 @@ TEST(TileSamples, BinsDoNotDependOnThreads) {
     found.push_back(bin_samples(window, 0, batch, -4, 0, 8, 0, 0));
     EXPECT_EQ(found.back().begin, found.front().begin);
     EXPECT_EQ(found.back().index, found.front().index);
-    EXPECT_GT(found.back().index.size(), 10'000U);
+    EXPECT_GT(found.back().index.size(), 5'000U);
   }
 }
 
@@ -196,7 +196,7 @@ TEST(TileSamples, RowsHoldEverySampleOnceInCells) {
       for (std::size_t k = 0; k < index.size(); ++k) {
         const bool reach =
             t.y[k] > y - largest && t.y[k] < y_high + largest && t.z[k] > z - largest && t.z[k] < z_high + largest;
-        if (reach) ASSERT_TRUE(covered[k]) << "y " << t.y[k] << " z " << t.z[k];
+        ASSERT_TRUE(!reach || covered[k]) << "y " << t.y[k] << " z " << t.z[k];
       }
     }
   }
