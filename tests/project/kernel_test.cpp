@@ -149,58 +149,6 @@ TEST(Kernel, AllKindsGiveTheSameBits) {
   }
 }
 
-TEST(Kernel, ExtensionIsTheDefinitionInAllKinds) {
-  std::mt19937_64 random(4);
-  const auto number = [&] { return static_cast<float>(std::uniform_real_distribution<double>(-50, 50)(random)); };
-  CornerField field{};
-  for (int z = 0; z < 10; ++z) {
-    for (int y = 0; y < 10; ++y) {
-      for (int x = 0; x < 10; ++x) {
-        if (random() % 3 != 0) continue;
-        const int at = z * CornerField::kPlane + y * CornerField::kRow + x;
-        field.distance[at] = number();
-        field.nx[at] = number() / 50;
-        field.ny[at] = number() / 50;
-        field.nz[at] = number() / 50;
-        field.trusted[at] = 1;
-      }
-    }
-  }
-  constexpr float kCell = 37;
-  for (int z = 0; z < 8; ++z) {
-    for (int y = 0; y < 8; ++y) {
-      Lanes first_sum{};
-      Lanes first_weight{};
-      available_kernels().front().extend(field, y, z, kCell, first_sum, first_weight);
-      for (int x = 0; x < 8; ++x) {
-        double sum = 0;
-        double weight = 0;
-        for (int i = 0; i < 27; ++i) {
-          const int dx = i % 3 - 1;
-          const int dy = i / 3 % 3 - 1;
-          const int dz = i / 9 - 1;
-          const int m = std::abs(dx) + std::abs(dy) + std::abs(dz);
-          const int at = (z + 1 + dz) * CornerField::kPlane + (y + 1 + dy) * CornerField::kRow + x + 1 + dx;
-          if (m == 0 || field.trusted[at] == 0) continue;
-          // The neighbour's plane at the corner, which lies -(dx, dy, dz) cells from it.
-          const double along = dx * static_cast<double>(field.nx[at]) + dy * static_cast<double>(field.ny[at]) +
-                               dz * static_cast<double>(field.nz[at]);
-          sum += (field.distance[at] - kCell * along) / (m * m);
-          weight += 1.0 / (m * m);
-        }
-        EXPECT_NEAR(first_sum[x], sum, 1e-3);
-        EXPECT_NEAR(first_weight[x], weight, 1e-5);
-      }
-      for (const Kernel& kernel : available_kernels()) {
-        Lanes sum{};
-        Lanes weight{};
-        kernel.extend(field, y, z, kCell, sum, weight);
-        EXPECT_TRUE(same_bits(sum, first_sum) && same_bits(weight, first_weight)) << kernel.name;
-      }
-    }
-  }
-}
-
 /// LAMINA_KERNEL for the life of the object.
 class WantedKernel {
  public:
