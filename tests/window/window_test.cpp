@@ -114,9 +114,25 @@ TEST(Window, NothingIsLeftBehindTheSweep) {
     EXPECT_GE(window.leaf_count(), 6U * 4);
     EXPECT_EQ(window.tiles(0, slab - 2).size(), 0U);
   }
-  window.retire_below(1000);
+  window.retire_below(10'000);
   EXPECT_EQ(window.leaf_count(), 0U);
   EXPECT_EQ(window.memory(), empty);
+}
+
+TEST(Window, SlantedSheetsLeaveNothingBehindEither) {
+  // Leaves move sideways with the sweep, so that most inner nodes have none in their last layer.
+  for (const std::int32_t slope : {-16, 0, 3, 16}) {
+    Window window({10, 4}, 0, {0, 400, 0, 400});
+    std::size_t early = 0;
+    std::size_t late = 0;
+    for (std::int32_t slab = -400; slab < 1200; ++slab) {
+      for (std::int32_t x = 0; x < 4; ++x) window.touch(0, {slab * slope + x, 0, slab});
+      window.retire_below(slab - 2);
+      std::size_t& most = slab < 0 ? early : late;
+      most = std::max(most, window.memory());
+    }
+    EXPECT_LE(late, early) << "slope " << slope;
+  }
 }
 
 TEST(Window, ThreadsTouchTheSameLeaves) {
@@ -190,7 +206,7 @@ TEST(Window, RetiringValuesKeepsMasksAndOtherSlabs) {
       EXPECT_EQ(points->near.count(), 64);
     }
   }
-  window.retire_below(100);
+  window.retire_below(10'000);
   EXPECT_EQ(window.memory(), empty);
 }
 
