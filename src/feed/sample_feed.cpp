@@ -6,9 +6,6 @@
 namespace lamina {
 namespace {
 
-/// Samples looked at together: large enough to keep every thread busy, small enough to stay in memory whatever H is.
-constexpr std::uint64_t kBatchSamples = 1u << 18;
-
 std::size_t bytes_of(const ActiveBucket& b) {
   const LocalSamples& s = b.samples;
   return s.size() * (9 * sizeof(float) + 1 + s.attributes.size() * sizeof(float));
@@ -124,7 +121,7 @@ std::vector<std::vector<std::size_t>> SampleFeed::batches(std::int64_t lo, std::
     const double reach = std::ceil(static_cast<double>(known_.at(b).max_support + margin));
     if (store_.z_upper(b) + reach < static_cast<double>(lo) || store_.z_lower(b) - reach >= static_cast<double>(hi))
       continue;
-    if (out.empty() || held + store_.count(b) > kBatchSamples) {
+    if (out.empty() || held + store_.count(b) > settings_.batch_samples) {
       out.emplace_back();
       held = 0;
     }

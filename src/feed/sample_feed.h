@@ -32,6 +32,8 @@ struct FeedSettings {
   bool fixed_cell = false;              ///< every sample asks for the finest level
   float max_radius = 0;                 ///< samples with a larger r_i are left out, steps; 0: none
   std::size_t cache_bytes = 64u << 20;  ///< memory for samples kept between uses
+  /// Samples looked at together: large enough to keep every thread busy, small enough to stay in memory whatever H is.
+  std::uint64_t batch_samples = 1u << 18;
 };
 
 struct FeedCounts {

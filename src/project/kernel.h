@@ -24,7 +24,7 @@ enum Sum : int {
   kPP,       ///< sum w p.p
   kPN,       ///< sum w p.n
   kWR,       ///< sum w R
-  kNearest,  ///< min |p - x|^2 / band^2, band = the sample's own
+  kNearest,  ///< min |p - x|^2 / band^2 over samples with w > 0, band = the sample's own
   kSeen,     ///< number of samples with w > 0
   kSums      ///< then one sum w c per attribute
 };

@@ -33,6 +33,7 @@ void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count,
   Vec seen = vec(sums[kSeen]);
   const Vec zero = splat(0.0F);
   const Vec one = splat(1.0F);
+  const Vec far = splat(1e30F);
   const int attributes = A >= 0 ? A : static_cast<int>(s.attributes.size());
   for (int r = 0; r < count; ++r) {
     for (std::uint32_t i = ranges[r].begin; i < ranges[r].end; ++i) {
@@ -57,7 +58,8 @@ void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count,
       pp += w * d2;
       pn += w * (dx * snx + dy * sny + dz * snz);
       wr += w * splat(s.support[i]);
-      const Vec near = d2 * splat(s.inv_band2[i]);
+      // Only samples that contribute: which others are looked at is a matter of tiles and rows.
+      const Vec near = t > zero ? d2 * splat(s.inv_band2[i]) : far;
       nearest = near < nearest ? near : nearest;
       seen += t > zero ? one : zero;
       for (int a = 0; a < attributes; ++a) vec(sums[kSums + a]) += w * splat(s.attributes[a][i]);

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <deque>
 #include <mutex>
+#include <set>
 #include <tuple>
 
 #include "window/corner_leaf.h"
@@ -24,16 +25,18 @@ std::size_t value_bytes(const Projected& points) {
   return bytes;
 }
 
-/// Removes a leaf, and with the last layer of leaves below it every inner node that has seen its time.
-void retire_branch(CornerTree& tree, const openvdb::Coord& origin) {
-  using Upper = CornerTree::RootNodeType::ChildNodeType;
-  using Lower = Upper::ChildNodeType;
-  const auto last_layer_of = [&](int dim) { return (origin.x() & (dim - 1)) == dim - 8; };
-  delete tree.stealNode<CornerLeaf>(origin, false, false);
-  if (last_layer_of(static_cast<int>(Lower::DIM))) delete tree.stealNode<Lower>(origin, false, false);
-  if (last_layer_of(static_cast<int>(Upper::DIM))) {
-    delete tree.stealNode<Upper>(origin, false, false);
-    tree.root().eraseBackgroundTiles();
+using Upper = CornerTree::RootNodeType::ChildNodeType;
+using Lower = Upper::ChildNodeType;
+
+/// Inner nodes that had leaves, by origin: in order of the sweep.
+using Branches = std::set<openvdb::Coord>;
+
+/// Removes the inner nodes that end at or below a layer of cells.
+template <typename Node>
+void retire_branches(CornerTree& tree, Branches& branches, std::int32_t end) {
+  while (!branches.empty() && branches.begin()->x() + static_cast<std::int32_t>(Node::DIM) <= end) {
+    delete tree.stealNode<Node>(*branches.begin(), false, false);
+    branches.erase(branches.begin());
   }
 }
 
@@ -49,6 +52,7 @@ struct Window::Trees {
     CornerTree tree{false};
     std::deque<Layer> layers;  ///< block layers z_base, z_base + 1, ...
     std::int32_t z_base = 0;
+    Branches lower, upper;                        ///< inner nodes with retired leaves
     std::int32_t x0 = 0, y0 = 0, nx = 0, ny = 0;  ///< extent of the tables in blocks
   };
   std::vector<Level> levels;
@@ -173,10 +177,19 @@ void Window::retire_below(std::int32_t slab) {
     Trees::Level& level = trees_->levels[l];
     const std::int32_t first = lattice_.first_layer(l, slab);
     while (!level.layers.empty() && level.z_base * 8 + 8 <= first) {
-      for (const Tile& t : level.layers.front().tiles) retire_branch(level.tree, leaf_origin(t.block));
+      for (const Tile& t : level.layers.front().tiles) {
+        const openvdb::Coord origin = leaf_origin(t.block);
+        delete level.tree.stealNode<CornerLeaf>(origin, false, false);
+        level.lower.insert(origin & ~(static_cast<std::int32_t>(Lower::DIM) - 1));
+        level.upper.insert(origin & ~(static_cast<std::int32_t>(Upper::DIM) - 1));
+      }
       level.layers.pop_front();
       ++level.z_base;
     }
+    retire_branches<Lower>(level.tree, level.lower, first);
+    const std::size_t before = level.upper.size();
+    retire_branches<Upper>(level.tree, level.upper, first);
+    if (level.upper.size() < before) level.tree.root().eraseBackgroundTiles();
   }
 }
 
@@ -191,6 +204,8 @@ std::size_t Window::leaf_count() const {
 std::size_t Window::memory() const {
   std::size_t bytes = 0;
   for (const auto& level : trees_->levels) {
+    const std::vector<openvdb::Index32> nodes = level.tree.nodeCount();
+    bytes += nodes[Lower::LEVEL] * sizeof(Lower) + nodes[Upper::LEVEL] * sizeof(Upper);
     for (const auto& layer : level.layers) {
       bytes += layer.table.capacity() * sizeof(CornerBlock*);
       for (const Tile& t : layer.tiles) {

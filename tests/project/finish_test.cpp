@@ -1,0 +1,119 @@
+#include "project/finish.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+
+#include "project/projected_scenes.h"
+
+namespace lamina::test {
+namespace {
+
+void finish_all(StreamedCloud& s, const Kernel& kernel, float boundary) {
+  for (std::int32_t slab = s.first; slab < s.end; ++slab) finish_slab(s.window, slab, kernel, boundary);
+}
+
+/// What the rule says of a corner.
+struct Sign {
+  bool positive = true, valued = false, tie = false;
+};
+
+Sign sign_of(const std::map<Cell, OwnValue>& values, const Cell& c, double cell, double boundary) {
+  Sign out;
+  const auto own = values.find(c);
+  if (own != values.end() && own->second.good) {
+    out.valued = true;
+    out.positive = own->second.channels[kDistance] >= 0;
+  } else {
+    double sum = 0;
+    double terms = 0;
+    for_trusted_neighbours(values, c, cell, [&](const OwnValue& v, double w, double plane) {
+      out.valued = true;
+      sum += w * plane;
+      terms += w * (std::abs(v.channels[kDistance]) + 2 * cell);
+    });
+    out.positive = sum >= 0;
+    out.tie = out.valued && std::abs(sum) <= 64 * 0x1p-24 * terms;
+  }
+  const bool seen = own != values.end() && own->second.seen;
+  if (boundary > 0 && seen && own->second.channels[kReach] > boundary) out.valued = false;
+  return out;
+}
+
+TEST(Finish, SignsAreTheRule) {
+  for (const ProjectedScene& scene : projected_scenes()) {
+    for (const float boundary : {0.0F, 0.25F, 0.7F}) {
+      StreamedCloud s(random_cloud(scene.cloud, 21), scene.lattice, {}, 77);
+      project_all(s);
+      finish_all(s, select_kernel(), boundary);
+      std::size_t own = 0;
+      std::size_t extended = 0;
+      std::size_t guessed = 0;
+      std::size_t negative = 0;
+      std::size_t beyond = 0;
+      for (int level = 0; level < scene.lattice.levels; ++level) {
+        const auto values = own_values(s.window, level, s.first, s.end);
+        for_set(s.window, level, s.first, s.end, &CornerBlock::corners,
+                [&](int, const Cell& c, const CornerBlock& leaf, int offset) {
+                  const bool positive = leaf.positive.test(offset);
+                  const bool valued = leaf.valued.test(offset);
+                  if (leaf.shared.test(offset)) {
+                    const Cell fine{c.x * 2, c.y * 2, c.z * 2};
+                    const CornerBlock& finer = *s.window.probe(level - 1, block_of(fine));
+                    ASSERT_EQ(positive, finer.positive.test(offset_in_block(fine)));
+                    ASSERT_EQ(valued, finer.valued.test(offset_in_block(fine)));
+                    return;
+                  }
+                  const Sign truth = sign_of(values, c, scene.lattice.cell_size(level), boundary);
+                  ASSERT_EQ(valued, truth.valued) << "level " << level << " " << c.x << " " << c.y << " " << c.z;
+                  if (!truth.tie) {
+                    ASSERT_EQ(positive, truth.positive) << "level " << level << " " << c.x << " " << c.y << " " << c.z;
+                  }
+                  const Sign unlimited = sign_of(values, c, scene.lattice.cell_size(level), 0);
+                  (leaf.good.test(offset) ? own : unlimited.valued ? extended : guessed) += 1;
+                  negative += positive ? 0 : 1;
+                  beyond += unlimited.valued && !valued ? 1 : 0;
+                });
+        ASSERT_FALSE(HasFatalFailure());
+        // Only corners carry bits.
+        for (const auto mask : {&CornerBlock::positive, &CornerBlock::valued}) {
+          for_set(s.window, level, s.first, s.end, mask, [&](int, const Cell&, const CornerBlock& leaf, int offset) {
+            ASSERT_TRUE(leaf.corners.test(offset));
+          });
+        }
+      }
+      EXPECT_GT(own, 100U);
+      EXPECT_GT(extended, 100U);
+      EXPECT_GT(guessed, 100U);
+      EXPECT_GT(negative, 100U);
+      EXPECT_EQ(beyond > 0, boundary > 0);
+    }
+  }
+}
+
+TEST(Finish, KernelsThreadsAndOrderGiveTheSameBits) {
+  for (const ProjectedScene& scene : projected_scenes()) {
+    StreamedCloud s(random_cloud(scene.cloud, 22), scene.lattice, {}, 77);
+    project_all(s);
+    std::vector<std::set<Cell>> first;
+    for (const Kernel& kernel : available_kernels()) {
+      for (const std::size_t n : {1U, 4U}) {
+        const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, n);
+        // Finishing reads projected values alone, so it can be repeated, from above as well.
+        for (std::int32_t slab = s.end - 1; slab >= s.first; --slab) finish_slab(s.window, slab, kernel, 0.5F);
+        std::vector<std::set<Cell>> found;
+        for (int level = 0; level < scene.lattice.levels; ++level) {
+          for (const auto mask : {&CornerBlock::positive, &CornerBlock::valued}) {
+            found.push_back(set_cells(s.window, level, s.first, s.end, mask));
+          }
+        }
+        if (first.empty()) first = found;
+        ASSERT_TRUE(found == first) << kernel.name << ", " << n << " threads";
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lamina::test

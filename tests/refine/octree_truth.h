@@ -1,0 +1,98 @@
+// The octree that samples ask for, by definition: cell by cell over all samples, in plain integers.
+#pragma once
+#include <algorithm>
+#include <cstdlib>
+#include <map>
+#include <set>
+#include <vector>
+
+#include "refine/refine.h"
+
+namespace lamina::test {
+
+class OctreeTruth {
+ public:
+  struct Level {
+    std::set<Cell> nodes;  ///< existing cells, subdivided or not
+    std::set<Cell> split, cells, corners, shared, near;
+  };
+  std::vector<Level> levels;
+
+  OctreeTruth(const Lattice& lattice, const std::vector<Mark>& marks) : lattice_(lattice) {
+    levels.resize(static_cast<std::size_t>(lattice.levels));
+    for (const Mark& m : marks) {
+      const std::int32_t a = lattice.cell_size(m.level);
+      samples_.push_back({m.level, {floor_div(m.x, a), floor_div(m.y, a), floor_div(m.z, a)}});
+    }
+    const int top = lattice.levels - 1;
+    for (const Sample& s : samples_) {
+      // Whatever reaches two cells of its own level lies within two of the coarsest.
+      const Cell home{s.home.x >> (top - s.level), s.home.y >> (top - s.level), s.home.z >> (top - s.level)};
+      for_around(home, -2, 2, [&](const Cell& c) { visit(top, c); });
+    }
+    for (Level& l : levels) {
+      for (const Cell& c : l.cells) for_around(c, 0, 1, [&](const Cell& corner) { l.corners.insert(corner); });
+    }
+    for (int l = 0; l <= top; ++l) find_near(l);
+  }
+
+ private:
+  struct Sample {
+    int level;
+    Cell home;  ///< the cell of its level it lies in
+  };
+  template <typename F>
+  static void for_around(const Cell& c, int lo, int hi, const F& f) {
+    for (int z = lo; z <= hi; ++z) {
+      for (int y = lo; y <= hi; ++y) {
+        for (int x = lo; x <= hi; ++x) f(c + Cell{x, y, z});
+      }
+    }
+  }
+  /// Whether a sample's home is at most `reach` cells of the sample's level away from the cell, or from the cell of
+  /// that level that contains it.
+  static bool reaches(const Sample& s, int level, const Cell& c, int reach) {
+    const auto axis = [&](std::int32_t home, std::int32_t at) {
+      if (s.level >= level) return std::abs((at >> (s.level - level)) - home) <= reach;
+      const std::int32_t size = std::int32_t{1} << (level - s.level);
+      return home >= at * size - reach && home < (at + 1) * size + reach;
+    };
+    return axis(s.home.x, c.x) && axis(s.home.y, c.y) && axis(s.home.z, c.z);
+  }
+  void visit(int level, const Cell& c) {
+    Level& here = levels[static_cast<std::size_t>(level)];
+    if (!here.nodes.insert(c).second) return;
+    const bool split = std::any_of(samples_.begin(), samples_.end(),
+                                   [&](const Sample& s) { return s.level < level && reaches(s, level, c, 2); });
+    if (split) {
+      here.split.insert(c);
+      for_around({c.x * 2, c.y * 2, c.z * 2}, 0, 1, [&](const Cell& child) { visit(level - 1, child); });
+    } else if (std::any_of(samples_.begin(), samples_.end(),
+                           [&](const Sample& s) { return s.level >= level && reaches(s, level, c, 2); })) {
+      here.cells.insert(c);
+    }
+  }
+  void find_near(int level) {
+    Level& here = levels[static_cast<std::size_t>(level)];
+    for (const Cell& corner : here.corners) {
+      const Cell fine{corner.x * 2, corner.y * 2, corner.z * 2};
+      if (level > 0 && levels[static_cast<std::size_t>(level) - 1].corners.contains(fine)) {
+        here.shared.insert(corner);
+        if (levels[static_cast<std::size_t>(level) - 1].near.contains(fine)) here.near.insert(corner);
+        continue;
+      }
+      bool near = false;
+      for_around(corner, -1, 0, [&](const Cell& c) {
+        near = near || (here.nodes.contains(c) && std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {
+                          return s.level >= level && reaches(s, level, c, 1);
+                        }));
+      });
+      if (near) here.near.insert(corner);
+    }
+  }
+
+  Lattice lattice_;
+  std::vector<Sample> samples_;
+};
+
+}  // namespace lamina::test
