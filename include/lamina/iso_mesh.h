@@ -32,7 +32,7 @@ struct SurfaceCorner {
 };
 
 /// An isovertex: a minimal edge whose ends have different signs. Owned by the slab that holds the edge's lower end.
-/// Invalid ones (rims of open surfaces) are listed too, but no triangle uses them. A loop that cannot be triangulated
+/// Only valid ones are listed: both ends have a value, at least one of samples of its own. A loop that cannot be triangulated
 /// by chords gets a centre vertex: its two corners are any two of the loop's, chosen so that the point at `t` between
 /// them comes close to the loop's mean.
 struct IsoVertex {
