@@ -147,8 +147,10 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
   }
   // A lattice much coarser than the cloud adds nothing and would overflow the fixed-point range.
   constexpr double kMaxSlab = 1 << 28;
-  if (levels.finest > kMaxSlab)
-    usage(fmt::format("--cell: larger than the whole cloud ({:.3g})", levels.finest * frame.step));
+  if (levels.finest > kMaxSlab && s.cell.unit == Length::Unit::world) {
+    usage(fmt::format("--cell {}: larger than the whole cloud", s.cell.value));
+  }
+  levels.finest = std::min(levels.finest, kMaxSlab);
   while (std::ldexp(levels.finest, levels.count - 1) > kMaxSlab) --levels.count;
 
   out.lattice.cell = static_cast<std::int32_t>(std::lrint(levels.finest));
