@@ -65,6 +65,16 @@ std::string input_name(const SurfaceSettings& settings) {
   return settings.input == "-" ? "standard input" : settings.input;
 }
 
+const char* why_empty(const SurfacePlan& plan) {
+  // The lattice addresses a million cells from its middle: farther samples set the size of the finest.
+  constexpr double kManyCells = 1 << 20;
+  const double largest = *std::max_element(plan.extent.begin(), plan.extent.end());
+  if (largest > kManyCells * plan.finest_cell && plan.finest_cell > plan.radius_median) {
+    return "single samples far away from the others stretch the lattice beyond what it can resolve; remove them";
+  }
+  return "they lie too far apart for their radii, or on no surface at all (try --blend or --particlescale above 1)";
+}
+
 /// Changes that lower the memory a run takes, mildest first. A larger support has larger cells unless these follow r.
 std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceSettings& settings) {
   std::vector<std::pair<std::string, SurfaceSettings>> runs;
@@ -158,10 +168,8 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
                            feed.counts().undersampled, info.count));
     }
     if (sink.triangles() == 0) {
-      throw Error(ExitCode::empty,
-                  fmt::format("{}: no surface came out of {} samples; they lie too far apart for their radii, or on no "
-                              "surface at all (try --blend or --particlescale above 1)",
-                              input_name(settings), resolved.plan.samples));
+      throw Error(ExitCode::empty, fmt::format("{}: no surface came out of {} samples; {}", input_name(settings),
+                                               resolved.plan.samples, why_empty(resolved.plan)));
     }
     watch.time("commit", [&] { sink.commit(); });
     stats.vertices = sink.vertices();

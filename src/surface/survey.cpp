@@ -98,9 +98,10 @@ Partial look_at_all(PointSource& source, const RunContext& run) {
   };
   if (!source.info().random_access) {
     SampleBatch batch;
-    for (; done < count; done += kChunk) {
+    while (done < count) {
       source.read(done, kChunk, batch);
       merge(total, look_at(batch, source.info().attributes));
+      done = std::min<std::uint64_t>(count, done + kChunk);
       report();
     }
     return total;
