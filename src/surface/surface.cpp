@@ -65,14 +65,12 @@ std::string input_name(const SurfaceSettings& settings) {
   return settings.input == "-" ? "standard input" : settings.input;
 }
 
-const char* why_empty(const SurfacePlan& plan) {
+/// A few far samples can stretch the lattice until no cell is small enough for the others.
+bool is_out_of_reach(const SurfacePlan& plan) {
   // The lattice addresses a million cells from its middle: farther samples set the size of the finest.
   constexpr double kManyCells = 1 << 20;
   const double largest = *std::max_element(plan.extent.begin(), plan.extent.end());
-  if (largest > kManyCells * plan.finest_cell && plan.finest_cell > plan.radius_median) {
-    return "single samples far away from the others stretch the lattice beyond what it can resolve; remove them";
-  }
-  return "they lie too far apart for their radii, or on no surface at all (try --blend or --particlescale above 1)";
+  return largest > kManyCells * plan.finest_cell && plan.finest_cell > 4 * plan.radius_high;
 }
 
 /// Changes that lower the memory a run takes, mildest first. A larger support has larger cells unless these follow r.
@@ -148,6 +146,14 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
     }
   }
   run.info(describe(resolved.plan, settings));
+  if (is_out_of_reach(resolved.plan)) {
+    throw Error(
+        ExitCode::empty,
+        fmt::format("{}: single samples so far away from the others ({:.3g}) that the lattice "
+                    "cannot resolve these (r {:.3g}); remove them",
+                    input_name(settings), *std::max_element(resolved.plan.extent.begin(), resolved.plan.extent.end()),
+                    resolved.plan.radius_median));
+  }
   if (run.max_memory > 0 && resolved.plan.memory_bytes > run.max_memory) {
     refuse_memory(settings, resolved.plan.memory_bytes, run.max_memory,
                   [&](const SurfaceSettings& s) { return plan_for(s).plan.memory_bytes; });
@@ -168,8 +174,10 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
                            feed.counts().undersampled, info.count));
     }
     if (sink.triangles() == 0) {
-      throw Error(ExitCode::empty, fmt::format("{}: no surface came out of {} samples; {}", input_name(settings),
-                                               resolved.plan.samples, why_empty(resolved.plan)));
+      throw Error(ExitCode::empty,
+                  fmt::format("{}: no surface came out of {} samples; they lie too far apart for their radii, or on no "
+                              "surface at all (try --blend or --particlescale above 1)",
+                              input_name(settings), resolved.plan.samples));
     }
     watch.time("commit", [&] { sink.commit(); });
     stats.vertices = sink.vertices();
