@@ -67,8 +67,8 @@ std::string input_name(const SurfaceSettings& settings) {
 
 /// A few far samples can stretch the lattice until no cell is small enough for the others.
 bool is_out_of_reach(const SurfacePlan& plan) {
-  // The lattice addresses a million cells from its middle: farther samples set the size of the finest.
-  constexpr double kManyCells = 1 << 20;
+  // The lattice addresses a million cells either way from its middle: farther samples set the size of the finest.
+  constexpr double kManyCells = 1 << 19;
   const double largest = *std::max_element(plan.extent.begin(), plan.extent.end());
   return largest > kManyCells * plan.finest_cell && plan.finest_cell > 4 * plan.radius_high;
 }
