@@ -66,11 +66,11 @@ std::string input_name(const SurfaceSettings& settings) {
 }
 
 /// A few far samples can stretch the lattice until no cell is small enough for the others.
-bool is_out_of_reach(const SurfacePlan& plan) {
+bool is_out_of_reach(const SurfacePlan& plan, double blend) {
   // The lattice addresses a million cells either way from its middle: farther samples set the size of the finest.
   constexpr double kManyCells = 1 << 19;
   const double largest = *std::max_element(plan.extent.begin(), plan.extent.end());
-  return largest > kManyCells * plan.finest_cell && plan.finest_cell > 4 * plan.radius_high;
+  return largest > kManyCells * plan.finest_cell && plan.finest_cell > 2 * blend * plan.radius_high;
 }
 
 /// Changes that lower the memory a run takes, mildest first. A larger support has larger cells unless these follow r.
@@ -146,10 +146,10 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
     }
   }
   run.info(describe(resolved.plan, settings));
-  if (is_out_of_reach(resolved.plan)) {
+  if (is_out_of_reach(resolved.plan, settings.blend)) {
     throw Error(
         ExitCode::empty,
-        fmt::format("{}: single samples so far away from the others ({:.3g}) that the lattice "
+        fmt::format("{}: some samples lie so far away from the others ({:.3g}) that the lattice "
                     "cannot resolve these (r {:.3g}); remove them",
                     input_name(settings), *std::max_element(resolved.plan.extent.begin(), resolved.plan.extent.end()),
                     resolved.plan.radius_median));

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
+#include <Eigen/LU>
 #include <limits>
 
 #include "surface/clouds.h"
