@@ -70,7 +70,29 @@ bool is_out_of_reach(const SurfacePlan& plan, double blend) {
   // The lattice addresses a million cells either way from its middle: farther samples set the size of the finest.
   constexpr double kManyCells = 1 << 19;
   const double largest = *std::max_element(plan.extent.begin(), plan.extent.end());
-  return largest > kManyCells * plan.finest_cell && plan.finest_cell > 2 * blend * plan.radius_high;
+  const bool unresolved = largest > kManyCells * plan.finest_cell && plan.finest_cell > 2 * blend * plan.radius_high;
+  // A surface has many samples in a slab; a sweep through nothing but gaps takes minutes and finds none.
+  constexpr std::uint64_t kSlabsPerSample = 64;
+  return unresolved || static_cast<std::uint64_t>(plan.slabs) / kSlabsPerSample > plan.samples;
+}
+
+/// The window's look-up tables cover all the slabs a bucket of samples lies in, empty ones too: next to nothing, unless
+/// a few samples are scattered over a long way.
+std::uint64_t table_bytes(const Lattice& lattice, const Ingested& in) {
+  double tallest = 0;
+  for (std::size_t b = 0; b < in.store.buckets(); ++b) {
+    if (in.store.count(b) > 0)
+      tallest = std::max(tallest, static_cast<double>(in.store.z_upper(b)) - in.store.z_lower(b));
+  }
+  constexpr double kLargestTable = 1 << 22;
+  double entries = 0;  // of a slab
+  for (int level = 0; level < lattice.levels; ++level) {
+    const double block = 8.0 * lattice.cell_size(level);
+    const double table = (static_cast<double>(in.extent.x_max) - in.extent.x_min + 3 * block) / block *
+                         (static_cast<double>(in.extent.y_max) - in.extent.y_min + 3 * block) / block;
+    if (table <= kLargestTable) entries += table * lattice.layers(level) / 8;
+  }
+  return static_cast<std::uint64_t>(tallest / lattice.slab_height() * entries * sizeof(void*));
 }
 
 /// Changes that lower the memory a run takes, mildest first. A larger support has larger cells unless these follow r.
@@ -133,7 +155,9 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
   std::optional<Ingested> ingested;
   watch.time("store", [&] { ingested.emplace(ingest(*source, survey, frame, settings.radius_scale, tmp, run)); });
   const auto plan_for = [&](const SurfaceSettings& s) {
-    return resolve_plan(s, frame, ingested->store, ingested->extent, info.has_radius, info.attributes.size());
+    Resolved r = resolve_plan(s, frame, ingested->store, ingested->extent, info.has_radius, info.attributes.size());
+    r.plan.memory_bytes += table_bytes(r.lattice, *ingested);
+    return r;
   };
   Resolved resolved;
   watch.time("plan", [&] { resolved = plan_for(settings); });
@@ -146,13 +170,14 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
     }
   }
   run.info(describe(resolved.plan, settings));
-  if (is_out_of_reach(resolved.plan, settings.blend)) {
-    throw Error(
-        ExitCode::empty,
-        fmt::format("{}: some samples lie so far away from the others ({:.3g}) that the lattice "
-                    "cannot resolve these (r {:.3g}); remove them",
-                    input_name(settings), *std::max_element(resolved.plan.extent.begin(), resolved.plan.extent.end()),
-                    resolved.plan.radius_median));
+  constexpr std::uint64_t kLargestTables = std::uint64_t{1} << 30;  // a scan of 380 million samples needs a few MB
+  if (is_out_of_reach(resolved.plan, settings.blend) || table_bytes(resolved.lattice, *ingested) > kLargestTables) {
+    throw Error(ExitCode::empty,
+                fmt::format("{}: some of the {} samples lie so far away from the others ({:.3g}, r {:.3g}) that the "
+                            "lattice cannot hold both; remove them",
+                            input_name(settings), resolved.plan.samples,
+                            *std::max_element(resolved.plan.extent.begin(), resolved.plan.extent.end()),
+                            resolved.plan.radius_median));
   }
   if (run.max_memory > 0 && resolved.plan.memory_bytes > run.max_memory) {
     refuse_memory(settings, resolved.plan.memory_bytes, run.max_memory,
