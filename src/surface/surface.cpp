@@ -72,8 +72,10 @@ bool is_out_of_reach(const SurfacePlan& plan, double blend) {
   const double largest = *std::max_element(plan.extent.begin(), plan.extent.end());
   const bool unresolved = largest > kManyCells * plan.finest_cell && plan.finest_cell > 2 * blend * plan.radius_high;
   // A surface has many samples in a slab; a sweep through nothing but gaps takes minutes and finds none.
-  constexpr std::uint64_t kSlabsPerSample = 64;
-  return unresolved || static_cast<std::uint64_t>(plan.slabs) / kSlabsPerSample > plan.samples;
+  constexpr std::uint64_t kSlabsPerSample = 8;
+  constexpr std::uint64_t kSlabsAnyway = 1000;
+  const auto slabs = static_cast<std::uint64_t>(plan.slabs);
+  return unresolved || (slabs > kSlabsAnyway && slabs / kSlabsPerSample > plan.samples);
 }
 
 /// The window's look-up tables cover all the slabs a bucket of samples lies in, empty ones too: next to nothing, unless
