@@ -125,7 +125,7 @@ RC_GTEST_PROP(SurfaceFuzz, WildNumbers, (unsigned seed)) {
   s.diffuse = pick(random, 4) == 0;
   s.cluster = static_cast<ClusterMode>(pick(random, 3));
   s.fit = static_cast<FitMode>(pick(random, 2));
-  s.levels = pick(random, 2) == 0 ? 0 : 1 + static_cast<int>(pick(random, 12));
+  s.levels = pick(random, 2) == 0 ? 0 : 1 + static_cast<int>(pick(random, 5));
   s.boundary = pick(random, 3) == 0 ? 0.5 : 0;
   s.density = 2 + pick(random, 30);
   expect_mesh_or_error(test::ply_bytes(test::ply_model(cloud), PlyFormat::little_endian), s, false);
