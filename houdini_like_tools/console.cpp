@@ -109,6 +109,11 @@ void cancel_on_signals() {
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+}
+
+std::string pipe_name(const std::string& name) {
+  return name == "stdin.ply" || name == "stdout.ply" ? "-" : name;
 }
 
 CLI::Option* add_length(CLI::App& app, const std::string& names, Length& value, const std::string& description) {

@@ -32,8 +32,12 @@ RunContext make_context(const RunOptions& options);
 /// Set by SIGINT and SIGTERM after cancel_on_signals(); a second signal ends the program at once.
 const std::atomic<bool>& cancel_requested();
 /// From here on signals ask the running job to stop, so that it unwinds and its temporary files vanish. Writing into a
-/// closed pipe becomes an error of the writer.
+/// closed pipe, or past the largest file the shell allows, becomes an error of the writer.
 void cancel_on_signals();
+
+/// `name`, or "-" where it stands for standard input or output with the format given by its ending: stdin.ply,
+/// stdout.ply. A file of that name is ./stdin.ply.
+std::string pipe_name(const std::string& name);
 
 /// Adds an option that takes a length (length.h); what cannot be read is a usage error naming the option.
 CLI::Option* add_length(CLI::App& app, const std::string& names, Length& value, const std::string& description);

@@ -3,13 +3,14 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "console.h"
 #include "lamina/error.h"
+#include "result_file.h"
 #include "tool.h"
 
 namespace lamina::tools {
@@ -25,6 +26,7 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
   nlohmann::ordered_json j;
   j["input"] = settings.input;
   j["output"] = settings.output;
+  j["dry_run"] = settings.dry_run;
   j["samples"] = s.samples_read;
   j["samples_used"] = s.plan.samples;
   j["vertices"] = s.vertices;
@@ -40,11 +42,15 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
   j["peak_memory_bytes"] = s.peak_memory;
   j["expected_memory_bytes"] = s.plan.memory_bytes;
   j["temporary_disk_bytes"] = s.disk_bytes;
+  j["stages"] = nlohmann::ordered_json::array();
   for (const StageTime& t : s.stages) j["stages"].push_back({{"stage", t.stage}, {"wall", t.wall}, {"cpu", t.cpu}});
   j["rejected"] = nlohmann::ordered_json::array();
   for (const Rejected& r : s.rejected) {
-    j["rejected"].push_back({{"reason", r.reason}, {"count", r.count}, {"first_row", r.first_row}});
+    nlohmann::ordered_json entry{{"reason", r.reason}, {"count", r.count}};
+    if (r.first_row) entry["first_row"] = *r.first_row;
+    j["rejected"].push_back(entry);
   }
+  j["replaced_attribute_values"] = s.replaced_attributes;
   j["corners"] = {{"projected", s.corners}, {"seen", s.corners_seen}, {"trusted", s.corners_good}};
   j["isosurface"] = {{"vertices", s.isovertices},
                      {"triangles", s.isotriangles},
@@ -60,19 +66,29 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
 }
 
 void run_surface(const SurfaceOptions& o) {
-  const RunContext context = make_context(o.run);
-  const SurfaceStats stats = reconstruct_surface(o.settings, context);
-  if (!o.settings.dry_run) {
+  SurfaceSettings settings = o.settings;
+  settings.input = pipe_name(settings.input);
+  settings.output = pipe_name(settings.output);
+  if (o.stats == "-" && settings.output == "-") {
+    throw Error(ExitCode::usage, "--stats and --output both name standard output; give one of them a file");
+  }
+  RunContext context = make_context(o.run);
+  // The plan is what a dry run is for: a result, not a message.
+  if (settings.dry_run && o.stats != "-") {
+    context.log = [say = context.log](LogLevel level, std::string_view text) {
+      level == LogLevel::info ? fmt::print("{}\n", text) : say(level, text);
+    };
+  }
+  std::optional<ResultFile> stats_file;
+  if (!o.stats.empty()) stats_file.emplace(o.stats);
+  const SurfaceStats stats = reconstruct_surface(settings, context);
+  if (!settings.dry_run) {
     context.info(fmt::format("{} vertices, {} triangles in {:.1f} s ({:.2f} M samples per CPU second, {:.0f} MB)",
                              stats.vertices, stats.triangles, stats.wall,
                              static_cast<double>(stats.samples_read) / stats.cpu * 1e-6,
                              static_cast<double>(stats.peak_memory) * 1e-6));
   }
-  if (o.stats.empty()) return;
-  std::ofstream file(o.stats);
-  file << to_json(stats, o.settings).dump(2) << '\n';
-  file.flush();
-  if (!file) throw Error(ExitCode::budget, o.stats + ": cannot write the statistics");
+  if (stats_file) stats_file->write(to_json(stats, settings).dump(2) + "\n");
 }
 
 template <typename T>
@@ -86,8 +102,10 @@ void add_surface(CLI::App& app) {
   auto* tool = app.add_subcommand("surface", "Reconstruct a triangle mesh from oriented points, streaming");
   auto o = std::make_shared<SurfaceOptions>();
   SurfaceSettings& s = o->settings;
-  tool->add_option("INPUT", s.input, "point file: PLY with positions and normals, - for standard input")->required();
-  auto* output = tool->add_option("-o,--output", s.output, "mesh to write: binary PLY, - for standard output");
+  tool->add_option("INPUT", s.input, "point file: PLY with positions and normals; - or stdin.ply for standard input")
+      ->required();
+  auto* output =
+      tool->add_option("-o,--output", s.output, "mesh to write: binary PLY; - or stdout.ply for standard output");
 
   const std::string samples = "Samples";
   tool->add_option("--frame", s.frame, "pca: sweep along the dominant axis; axis: along the longest input axis")
@@ -143,7 +161,9 @@ void add_surface(CLI::App& app) {
   tool->add_option("--window", s.window, "slabs each stage advances at once")->capture_default_str()->group("Run");
   auto* dry = tool->add_flag("--dry-run", s.dry_run, "print levels, slabs, expected memory and disk; write nothing")
                   ->group("Run");
-  tool->add_option("--stats", o->stats, "write counts, times and memory to this JSON file")->group("Run");
+  tool->add_option("--stats", o->stats, "write counts, times and memory to this JSON file, - for standard output")
+      ->type_name("FILE.json")
+      ->group("Run");
   add_run_options(*tool, o->run);
   tool->callback([o, output, dry] {
     if (output->count() == 0 && dry->count() == 0) throw CLI::RequiredError("--output");

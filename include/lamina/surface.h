@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -52,7 +53,7 @@ struct SurfacePlan {
   double slab_height = 0;
   std::int64_t slabs = 0;
   std::uint64_t buckets = 0;
-  std::uint64_t disk_bytes = 0;              ///< temporary disk, expected (measured for the store once it is written)
+  std::uint64_t disk_bytes = 0;              ///< temporary disk, expected: the samples' store (measured) and the faces
   std::uint64_t memory_bytes = 0;            ///< peak memory, expected
 };
 
@@ -65,13 +66,14 @@ struct StageTime {
 struct Rejected {
   std::string reason;
   std::uint64_t count = 0;
-  std::uint64_t first_row = 0;  ///< of the input, where known
+  std::optional<std::uint64_t> first_row;  ///< of the input, counted from 0, where known
 };
 
 struct SurfaceStats {
   SurfacePlan plan;
   std::uint64_t samples_read = 0;
-  std::vector<Rejected> rejected;
+  std::vector<Rejected> rejected;         ///< samples left out, by reason
+  std::uint64_t replaced_attributes = 0;  ///< attribute values that were NaN or out of range
   std::uint64_t vertices = 0, triangles = 0;
   std::uint64_t corners = 0, corners_seen = 0, corners_good = 0;
   std::uint64_t isovertices = 0, isotriangles = 0, rejected_loops = 0, general_cells = 0, crossing_cells = 0;
@@ -80,11 +82,11 @@ struct SurfaceStats {
   std::vector<StageTime> stages;
   double wall = 0, cpu = 0;
   std::uint64_t peak_memory = 0;  ///< bytes, of the process
-  std::uint64_t disk_bytes = 0;   ///< temporary
+  std::uint64_t disk_bytes = 0;   ///< temporary: the samples' store and the faces
 };
 
 /// Runs the job. Reports the plan through `run.info`, progress through `run.progress`; obeys run.cancel by throwing
-/// Error(internal, "cancelled"). Threads: run.threads (all stages). The output is the same bytes for any number of
+/// Error(internal, "cancelled"), and run.max_memory by refusing before the sweep. Threads: run.threads (all stages). The output is the same bytes for any number of
 /// threads and any window.
 /// Throws Error: unreadable (input), usage (settings that contradict each other or the cloud), budget (memory, disk,
 /// output), empty (no surface).

@@ -118,10 +118,29 @@ LocalSamples read_positions(const SlabStore& store, Window window) {
   return all;
 }
 
+/// Samples at the place of another say nothing of the spacing: half a cloud at one place would hide the other half's.
+void drop_coincident(LocalSamples& s) {
+  std::vector<std::array<std::int32_t, 3>> places(s.size());
+  for (std::size_t i = 0; i < places.size(); ++i) places[i] = {s.x[i], s.y[i], s.z[i]};
+  tbb::parallel_sort(places.begin(), places.end());
+  places.erase(std::unique(places.begin(), places.end()), places.end());
+  for (auto* axis : {&s.x, &s.y, &s.z}) axis->resize(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    s.x[i] = places[i][0];
+    s.y[i] = places[i][1];
+    s.z[i] = places[i][2];
+  }
+}
+
 std::uint64_t count(const SlabStore& store, Window window) {
   std::uint64_t n = 0;
   for (std::size_t b = window.begin; b < window.end; ++b) n += store.count(b);
   return n;
+}
+
+std::uint64_t samples_of(const std::vector<WeightedRadius>& radii) {
+  return std::accumulate(radii.begin(), radii.end(), std::uint64_t{0},
+                         [](std::uint64_t n, auto& r) { return n + r.samples; });
 }
 
 float quantile(const std::vector<WeightedRadius>& sorted, std::uint64_t total, double q) {
@@ -142,7 +161,11 @@ std::size_t bucket_of_rank(const SlabStore& store, std::uint64_t rank) {
 
 std::vector<WeightedRadius> density_radii(const SlabStore& store, Window window, std::uint32_t min_samples) {
   std::vector<WeightedRadius> radii;
-  if (count(store, window) > 0) Octree(read_positions(store, window), window, store, min_samples).find_radii(radii);
+  if (count(store, window) > 0) {
+    LocalSamples samples = read_positions(store, window);
+    drop_coincident(samples);
+    Octree(samples, window, store, min_samples).find_radii(radii);
+  }
   std::sort(radii.begin(), radii.end(), [](auto& a, auto& b) { return a.radius < b.radius; });
   return radii;
 }
@@ -173,7 +196,7 @@ std::size_t window_buckets(const SlabStore& store, std::uint64_t sample_limit, s
       low = std::min(low, store.z_lower(b));
       high = std::max(high, store.z_upper(b));
     }
-    if (!radii.empty() && static_cast<double>(high) - low >= tall * quantile(radii, samples, 0.5)) return n;
+    if (!radii.empty() && static_cast<double>(high) - low >= tall * quantile(radii, samples_of(radii), 0.5)) return n;
   }
 }
 
@@ -212,8 +235,7 @@ RadiusSurvey survey_radii(const SlabStore& store, std::uint64_t sample_limit, st
   }
   if (radii.empty()) return survey;
   std::sort(radii.begin(), radii.end(), [](auto& a, auto& b) { return a.radius < b.radius; });
-  const std::uint64_t total = std::accumulate(radii.begin(), radii.end(), std::uint64_t{0},
-                                              [](std::uint64_t n, auto& r) { return n + r.samples; });
+  const std::uint64_t total = samples_of(radii);
   survey.low = quantile(radii, total, 0.01);
   survey.median = quantile(radii, total, 0.5);
   survey.high = quantile(radii, total, 0.99);

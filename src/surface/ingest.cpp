@@ -21,7 +21,21 @@ struct Piece {
   LocalSamples local;
 };
 
-void to_local(const SampleBatch& rows, const Frame& frame, double radius_scale, LocalSamples& out) {
+/// Factor that brings the greatest quality to at most 1, so that sums of weights cannot overflow. A power of two: the
+/// surface does not depend on it.
+double quality_scale(const Survey& survey) {
+  if (!(survey.max_quality > 0)) return 1;
+  return std::exp2(-std::ceil(std::log2(double{survey.max_quality})));
+}
+
+/// A radius in steps: a smaller one than a step reaches nothing but itself, a greater one than the cloud everything.
+float radius_in_steps(double radius) {
+  constexpr double kDiagonal = 1 << 30;
+  return static_cast<float>(std::clamp(radius, 1.0, kDiagonal));
+}
+
+void to_local(const SampleBatch& rows, const Frame& frame, double radius_scale, double quality_scale,
+              LocalSamples& out) {
   out.clear();
   out.reserve(rows.size());
   out.attributes.resize(rows.attributes.size());
@@ -38,9 +52,11 @@ void to_local(const SampleBatch& rows, const Frame& frame, double radius_scale, 
     out.nx.push_back(static_cast<float>(n.x()));
     out.ny.push_back(static_cast<float>(n.y()));
     out.nz.push_back(static_cast<float>(n.z()));
-    if (!rows.radius.empty()) out.radius.push_back(static_cast<float>(rows.radius[i] * radius));
-    if (!rows.quality.empty()) out.quality.push_back(rows.quality[i]);
-    for (std::size_t c = 0; c < rows.attributes.size(); ++c) out.attributes[c].push_back(rows.attributes[c][i]);
+    if (!rows.radius.empty()) out.radius.push_back(radius_in_steps(rows.radius[i] * radius));
+    if (!rows.quality.empty()) out.quality.push_back(static_cast<float>(rows.quality[i] * quality_scale));
+    for (std::size_t c = 0; c < rows.attributes.size(); ++c) {
+      out.attributes[c].push_back(usable_attribute(rows.attributes[c][i]));
+    }
   }
 }
 
@@ -80,6 +96,7 @@ Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, d
   constexpr std::int32_t kMax = std::numeric_limits<std::int32_t>::max();
   constexpr std::int32_t kMin = std::numeric_limits<std::int32_t>::min();
   Extent extent{{kMax, kMin, kMax, kMin}, kMax, kMin};
+  const double quality = quality_scale(survey);
   std::uint64_t next = 0;
   const auto take = [&](tbb::flow_control& flow) -> std::shared_ptr<Piece> {
     if (next >= info.count || run.cancelled()) {
@@ -94,7 +111,7 @@ Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, d
   };
   const auto convert = [&](const std::shared_ptr<Piece>& piece) {
     if (info.random_access) source.read(piece->rows.first, kChunk, piece->rows);
-    to_local(piece->rows, frame, radius_scale, piece->local);
+    to_local(piece->rows, frame, radius_scale, quality, piece->local);
     return piece;
   };
   const auto append = [&](const std::shared_ptr<Piece>& piece) {

@@ -60,6 +60,18 @@ void set_counting_cells(const SurfaceSettings& s, const RadiusSurvey& survey, Re
   out.radii.finest_cell = static_cast<std::int32_t>(std::clamp(std::lrint(cell), 1L, 1L << 24));
 }
 
+/// Faces wait on disk for the vertices. A sample stands for a quarter of its radius squared of surface; a main cell's
+/// worth of surface gives some 3.3 triangles (the cells it cuts, two each), clustering leaves 55 % of them.
+std::uint64_t expected_face_bytes(const SurfaceSettings& s, const Resolved& r, const RadiusSurvey& survey,
+                                  std::uint64_t samples) {
+  constexpr double kFaceBytes = 13;
+  const double ratio = r.feed.cell_ratio * (r.feed.cell_follows_support ? s.blend : 1.0);
+  const double finest = r.lattice.cell;
+  const double cell = r.feed.fixed_cell ? finest : std::max(finest, kMainCell * ratio * survey.median);
+  const double cells = static_cast<double>(samples) * 0.25 * survey.median * survey.median / (cell * cell);
+  return static_cast<std::uint64_t>(kFaceBytes * cells * (s.cluster == ClusterMode::none ? 3.3 : 1.8));
+}
+
 std::uint64_t expected_memory(const SurfaceSettings& s, const Resolved& r, const SlabStore& store,
                               std::size_t attributes) {
   // The densest slab, from the store's own counts.
@@ -147,8 +159,10 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
   }
   // A lattice much coarser than the cloud adds nothing and would overflow the fixed-point range.
   constexpr double kMaxSlab = 1 << 28;
-  if (levels.finest > kMaxSlab)
-    usage(fmt::format("--cell: larger than the whole cloud ({:.3g})", levels.finest * frame.step));
+  if (levels.finest > kMaxSlab && s.cell.unit == Length::Unit::world) {
+    usage(fmt::format("--cell {}: larger than the whole cloud", s.cell.value));
+  }
+  levels.finest = std::min(levels.finest, kMaxSlab);
   while (std::ldexp(levels.finest, levels.count - 1) > kMaxSlab) --levels.count;
 
   out.lattice.cell = static_cast<std::int32_t>(std::lrint(levels.finest));
@@ -172,7 +186,7 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
   plan.slabs = out.lattice.slab_of(bounds.z_max) - out.lattice.slab_of(bounds.z_min) + 1;
   plan.buckets = store.buckets();
   plan.memory_bytes = expected_memory(s, out, store, attributes);
-  plan.disk_bytes = store.disk_bytes();
+  plan.disk_bytes = store.disk_bytes() + expected_face_bytes(s, out, survey, store.total());
   return out;
 }
 

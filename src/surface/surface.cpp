@@ -5,12 +5,16 @@
 #include <tbb/global_control.h>
 #include <tbb/task_arena.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <functional>
+#include <optional>
+#include <vector>
 
+#include "files/descriptor.h"
 #include "lamina/error.h"
 #include "lamina/mesh_sink.h"
 #include "lamina/points.h"
-#include "lamina/version.h"
 #include "surface/ingest.h"
 #include "surface/pipeline.h"
 #include "surface/plan.h"
@@ -26,19 +30,110 @@ std::uint64_t peak_memory() {
   return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
 }
 
-/// Next to the output unless told otherwise; the system's temporary folder for standard output.
+/// Next to the output unless told otherwise; the system's temporary folder for standard output, pipes and devices.
 std::string temporary_directory(const SurfaceSettings& settings, const RunContext& run) {
   if (!run.tmp_dir.empty()) return run.tmp_dir;
-  if (settings.output.empty() || settings.output == "-") return std::filesystem::temp_directory_path().string();
+  std::error_code ignored;
+  const auto kind = std::filesystem::status(settings.output, ignored).type();
+  const bool beside = kind == std::filesystem::file_type::regular || kind == std::filesystem::file_type::not_found;
+  if (settings.output.empty() || settings.output == "-" || !beside) return system_tmp_dir();
   const std::string parent = std::filesystem::path(settings.output).parent_path().string();
   return parent.empty() ? "." : parent;
 }
 
+/// A mesh in the place of its points would cost the user the scan.
+void require_two_files(const SurfaceSettings& settings) {
+  std::error_code ignored;
+  if (settings.input == "-" || settings.output == "-" || settings.output.empty()) return;
+  if (std::filesystem::is_regular_file(settings.output, ignored) &&
+      std::filesystem::equivalent(settings.input, settings.output, ignored)) {
+    throw Error(ExitCode::usage,
+                fmt::format("{}: is input and output; give the mesh another name with --output", settings.output));
+  }
+}
+
 /// Float positions keep a hundredth of a cell as long as the coordinates are below some ten thousand cells;
-/// georeferenced ones are not.
+/// georeferenced ones are not. Nor can float hold the very large and the very small.
 bool needs_double(const Survey& survey, double finest_cell) {
+  constexpr double kLargest = 1e37;
+  constexpr double kSmallestCell = 1e-35;
   const double largest = std::max(survey.low.cwiseAbs().maxCoeff(), survey.high.cwiseAbs().maxCoeff());
-  return largest * 0x1p-24 > 0.01 * finest_cell;
+  return largest * 0x1p-24 > 0.01 * finest_cell || largest > kLargest || finest_cell < kSmallestCell;
+}
+
+std::string input_name(const SurfaceSettings& settings) {
+  return settings.input == "-" ? "standard input" : settings.input;
+}
+
+/// A few far samples can stretch the lattice until no cell is small enough for the others.
+bool is_out_of_reach(const SurfacePlan& plan, double blend) {
+  // The lattice addresses a million cells either way from its middle: farther samples set the size of the finest.
+  constexpr double kManyCells = 1 << 19;
+  const double largest = *std::max_element(plan.extent.begin(), plan.extent.end());
+  const bool unresolved = largest > kManyCells * plan.finest_cell && plan.finest_cell > 2 * blend * plan.radius_high;
+  // A surface has many samples in a slab; a sweep through nothing but gaps takes minutes and finds none.
+  constexpr std::uint64_t kSlabsPerSample = 8;
+  constexpr std::uint64_t kSlabsAnyway = 1000;
+  const auto slabs = static_cast<std::uint64_t>(plan.slabs);
+  return unresolved || (slabs > kSlabsAnyway && slabs / kSlabsPerSample > plan.samples);
+}
+
+/// The window's look-up tables cover all the slabs a bucket of samples lies in, empty ones too: next to nothing, unless
+/// a few samples are scattered over a long way.
+std::uint64_t table_bytes(const Lattice& lattice, const Ingested& in) {
+  double tallest = 0;
+  for (std::size_t b = 0; b < in.store.buckets(); ++b) {
+    if (in.store.count(b) > 0)
+      tallest = std::max(tallest, static_cast<double>(in.store.z_upper(b)) - in.store.z_lower(b));
+  }
+  constexpr double kLargestTable = 1 << 22;
+  double entries = 0;  // of a slab
+  for (int level = 0; level < lattice.levels; ++level) {
+    const double block = 8.0 * lattice.cell_size(level);
+    const double table = (static_cast<double>(in.extent.x_max) - in.extent.x_min + 3 * block) / block *
+                         (static_cast<double>(in.extent.y_max) - in.extent.y_min + 3 * block) / block;
+    if (table <= kLargestTable) entries += table * lattice.layers(level) / 8;
+  }
+  return static_cast<std::uint64_t>(tallest / lattice.slab_height() * entries * sizeof(void*));
+}
+
+/// Changes that lower the memory a run takes, mildest first. A larger support has larger cells unless these follow r.
+std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceSettings& settings) {
+  std::vector<std::pair<std::string, SurfaceSettings>> runs;
+  SurfaceSettings s = settings;
+  std::string base;
+  if (s.window > 1) {
+    s.window = 1;
+    base = "--window 1";
+    runs.emplace_back(base, s);
+    base += " ";
+  }
+  for (const int factor : {2, 4, 8}) {
+    SurfaceSettings coarser = s;
+    if (s.cell.unit == Length::Unit::influence_radius) {
+      coarser.blend = s.blend * factor;
+      if (coarser.blend <= 64) runs.emplace_back(fmt::format("{}--blend {:g}", base, coarser.blend), coarser);
+    } else {
+      coarser.cell.value = s.cell.value * factor;
+      runs.emplace_back(fmt::format("{}--cell {}", base, to_string(coarser.cell)), coarser);
+    }
+  }
+  return runs;
+}
+
+[[noreturn]] void refuse_memory(const SurfaceSettings& settings, std::uint64_t needed, std::uint64_t allowed,
+                                const std::function<std::uint64_t(const SurfaceSettings&)>& memory_of) {
+  const auto mb = [](std::uint64_t bytes) { return static_cast<double>(bytes) / 1e6; };
+  std::string remedy;
+  for (const auto& [words, changed] : smaller_runs(settings)) {
+    const std::uint64_t bytes = memory_of(changed);
+    if (bytes > allowed) continue;
+    remedy = fmt::format("; {} would fit ({:.0f} MB)", words, mb(bytes));
+    break;
+  }
+  if (remedy.empty()) remedy = "; give it more, or cut the cloud";
+  throw Error(ExitCode::budget, fmt::format("{}: needs about {:.0f} MB of memory, --max-memory allows {:.0f} MB{}",
+                                            input_name(settings), mb(needed), mb(allowed), remedy));
 }
 
 SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run) {
@@ -46,6 +141,13 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
   Stopwatch watch;
   const Stopwatch::Moment began = Stopwatch::now();
   const std::string tmp = temporary_directory(settings, run);
+  MeshSinkSettings out;
+  out.path = settings.output;
+  out.tmp_dir = tmp;
+  // An output that cannot be written is better known now than after the input has been read.
+  if (!settings.dry_run) {
+    const MeshSink trial(out);
+  }
 
   const std::unique_ptr<PointSource> source = open_points(settings.input, tmp);
   const PointSourceInfo& info = source->info();
@@ -54,43 +156,62 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
   const Frame frame = choose_frame(survey, settings.frame);
   std::optional<Ingested> ingested;
   watch.time("store", [&] { ingested.emplace(ingest(*source, survey, frame, settings.radius_scale, tmp, run)); });
-  const Resolved resolved =
-      resolve_plan(settings, frame, ingested->store, ingested->extent, info.has_radius, info.attributes.size());
+  const auto plan_for = [&](const SurfaceSettings& s) {
+    Resolved r = resolve_plan(s, frame, ingested->store, ingested->extent, info.has_radius, info.attributes.size());
+    r.plan.memory_bytes += table_bytes(r.lattice, *ingested);
+    return r;
+  };
+  Resolved resolved;
+  watch.time("plan", [&] { resolved = plan_for(settings); });
   stats.plan = resolved.plan;
   stats.samples_read = info.count;
+  stats.replaced_attributes = survey.unusable_attributes;
   for (int k = 1; k < kDefects; ++k) {
     if (survey.rejected[k] > 0) {
       stats.rejected.push_back({describe(static_cast<Defect>(k)), survey.rejected[k], survey.first_row[k]});
     }
   }
   run.info(describe(resolved.plan, settings));
+  constexpr std::uint64_t kLargestTables = std::uint64_t{1} << 30;  // a scan of 380 million samples needs a few MB
+  if (is_out_of_reach(resolved.plan, settings.blend) || table_bytes(resolved.lattice, *ingested) > kLargestTables) {
+    throw Error(ExitCode::empty,
+                fmt::format("{}: some of the {} samples lie so far away from the others ({:.3g}, r {:.3g}) that the "
+                            "lattice cannot hold both; remove them",
+                            input_name(settings), resolved.plan.samples,
+                            *std::max_element(resolved.plan.extent.begin(), resolved.plan.extent.end()),
+                            resolved.plan.radius_median));
+  }
+  if (run.max_memory > 0 && resolved.plan.memory_bytes > run.max_memory) {
+    refuse_memory(settings, resolved.plan.memory_bytes, run.max_memory,
+                  [&](const SurfaceSettings& s) { return plan_for(s).plan.memory_bytes; });
+  }
 
+  stats.disk_bytes = ingested->store.disk_bytes();
   if (!settings.dry_run) {
-    MeshSinkSettings out;
-    out.path = settings.output;
-    out.tmp_dir = tmp;
     out.attributes = info.attributes;
     out.double_positions = needs_double(survey, resolved.plan.finest_cell);
-    out.comments = {fmt::format("made by lamina {}", version())};
     MeshSink sink(out);
     SampleFeed feed(ingested->store, resolved.lattice, resolved.feed, resolved.radii, info.has_radius);
     Pipeline pipeline(settings, resolved, frame, ingested->extent, feed, info.attributes.size(), sink);
     pipeline.run(run, watch);
     pipeline.report(stats);
     if (feed.counts().undersampled > 0) {
-      stats.rejected.push_back({"radius above --max-radius", feed.counts().undersampled, 0});
+      stats.rejected.push_back({"radius above --max-radius", feed.counts().undersampled, std::nullopt});
+      run.info(fmt::format("{} of {} samples discarded as undersampled: radius above --max-radius",
+                           feed.counts().undersampled, info.count));
     }
     if (sink.triangles() == 0) {
       throw Error(ExitCode::empty,
-                  fmt::format("{}: no surface came out; the samples lie too far apart for their radii (try "
-                              "--blend or --particlescale above 1)",
-                              settings.input));
+                  fmt::format("{}: no surface came out of {} samples; they lie too far apart for their radii, or on no "
+                              "surface at all (try --blend or --particlescale above 1)",
+                              input_name(settings), resolved.plan.samples));
     }
     watch.time("commit", [&] { sink.commit(); });
     stats.vertices = sink.vertices();
     stats.triangles = sink.triangles();
+    constexpr std::uint64_t kFaceBytes = 13;  // a count of 1 byte and three indices of 4
+    stats.disk_bytes += stats.triangles * kFaceBytes;
   }
-  stats.disk_bytes = ingested->store.disk_bytes();
   stats.stages = watch.stages();
   const Stopwatch::Moment ended = Stopwatch::now();
   stats.wall = ended.wall - began.wall;
@@ -103,6 +224,7 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
 
 SurfaceStats reconstruct_surface(const SurfaceSettings& settings, const RunContext& run) {
   check_settings(settings);
+  require_two_files(settings);
   const int threads = run.threads > 0 ? run.threads : tbb::this_task_arena::max_concurrency();
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
   tbb::task_arena arena(threads);

@@ -27,10 +27,28 @@ struct Partial {
   Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
+  float max_quality = 0;
+  std::uint64_t unusable_attributes = 0;
+  std::uint64_t first_unusable_attribute = 0;
 };
 
-Partial look_at(const SampleBatch& batch) {
+void look_at_attributes(const SampleBatch& batch, const AttributeLayout& layout, Partial& p) {
+  for (std::size_t c = 0; c < batch.attributes.size(); ++c) {
+    if (layout[c].type != ScalarType::float32 && layout[c].type != ScalarType::float64) continue;  // always in range
+    const std::vector<float>& values = batch.attributes[c];
+    const auto bad = [](float v) { return !(std::abs(v) <= kLargestAttribute); };
+    const auto count = static_cast<std::uint64_t>(std::count_if(values.begin(), values.end(), bad));
+    if (count == 0) continue;
+    const auto at = std::find_if(values.begin(), values.end(), bad) - values.begin();
+    const std::uint64_t row = batch.first + static_cast<std::uint64_t>(at);
+    p.first_unusable_attribute = p.unusable_attributes == 0 ? row : std::min(row, p.first_unusable_attribute);
+    p.unusable_attributes += count;
+  }
+}
+
+Partial look_at(const SampleBatch& batch, const AttributeLayout& layout) {
   Partial p;
+  look_at_attributes(batch, layout, p);
   for (std::size_t i = 0; i < batch.size(); ++i) {
     const Defect defect = defect_of(batch, i);
     if (defect != Defect::none) {
@@ -45,6 +63,7 @@ Partial look_at(const SampleBatch& batch) {
     p.high = p.high.cwiseMax(x);
     p.sum += d;
     p.products += d * d.transpose();
+    if (!batch.quality.empty()) p.max_quality = std::max(p.max_quality, batch.quality[i]);
   }
   return p;
 }
@@ -55,6 +74,9 @@ void merge(Partial& a, const Partial& b) {
     if (a.rejected[k] == 0) a.first_row[k] = b.first_row[k];
     a.rejected[k] += b.rejected[k];
   }
+  if (a.unusable_attributes == 0) a.first_unusable_attribute = b.first_unusable_attribute;
+  a.unusable_attributes += b.unusable_attributes;
+  a.max_quality = std::max(a.max_quality, b.max_quality);
   if (b.usable == 0) return;
   if (a.usable == 0) a.pivot = b.pivot;
   const Eigen::Vector3d s = b.pivot - a.pivot;
@@ -76,9 +98,10 @@ Partial look_at_all(PointSource& source, const RunContext& run) {
   };
   if (!source.info().random_access) {
     SampleBatch batch;
-    for (; done < count; done += kChunk) {
+    while (done < count) {
       source.read(done, kChunk, batch);
-      merge(total, look_at(batch));
+      merge(total, look_at(batch, source.info().attributes));
+      done = std::min<std::uint64_t>(count, done + kChunk);
       report();
     }
     return total;
@@ -92,7 +115,7 @@ Partial look_at_all(PointSource& source, const RunContext& run) {
       partials[i] = {};
       if (first >= count) return;
       source.read(first, kChunk, batches[i]);
-      partials[i] = look_at(batches[i]);
+      partials[i] = look_at(batches[i], source.info().attributes);
     });
     for (const Partial& p : partials) merge(total, p);
     done = std::min<std::uint64_t>(count, done + kPieces * kChunk);
@@ -131,8 +154,29 @@ Defect defect_of(const SampleBatch& b, std::size_t i) {
   return Defect::none;
 }
 
+namespace {
+
+/// Squares of lengths, and of these in units of a fixed-point step, must neither vanish nor overflow.
+constexpr double kLeastExtent = 1e-100;
+constexpr double kGreatestExtent = 1e100;
+
+void warn_of_attributes(const std::string& path, const Survey& survey, BadSamples bad, const RunContext& run) {
+  if (survey.unusable_attributes == 0) return;
+  const std::string what = fmt::format(
+      "{}: {} attribute values are NaN or beyond {:g}, the first in row {} "
+      "(counted from 0)",
+      path, survey.unusable_attributes, kLargestAttribute, survey.first_unusable_attribute);
+  if (bad == BadSamples::refuse) {
+    throw Error(ExitCode::unreadable, what + "; clean the file or use --bad-samples drop");
+  }
+  run.warn(what + "; NaN becomes 0, others the nearest usable value");
+}
+
+}  // namespace
+
 Survey survey_input(PointSource& source, BadSamples bad, const RunContext& run) {
-  const PointSourceInfo& info = source.info();
+  PointSourceInfo info = source.info();
+  if (info.path == "-") info.path = "standard input";
   if (!info.has_normals) {
     throw Error(ExitCode::unreadable,
                 fmt::format("{}: no normals (properties nx ny nz); estimate and orient them first, for example with "
@@ -141,7 +185,15 @@ Survey survey_input(PointSource& source, BadSamples bad, const RunContext& run) 
   }
   if (info.count == 0) throw Error(ExitCode::empty, fmt::format("{}: the file holds no points", info.path));
   const Partial p = look_at_all(source, run);
-  Survey survey{p.usable, p.rejected, p.first_row, p.low, p.high, {}};
+  Survey survey{p.usable,
+                p.rejected,
+                p.first_row,
+                p.low,
+                p.high,
+                {},
+                p.max_quality,
+                p.unusable_attributes,
+                p.first_unusable_attribute};
   for (int k = 1; k < kDefects; ++k) {
     if (p.rejected[k] == 0) continue;
     const std::string what =
@@ -151,18 +203,24 @@ Survey survey_input(PointSource& source, BadSamples bad, const RunContext& run) 
       throw Error(ExitCode::unreadable, what + "; clean the file or use --bad-samples drop");
     run.warn(what + "; dropped");
   }
+  warn_of_attributes(info.path, survey, bad, run);
   if (p.usable == 0)
     throw Error(ExitCode::empty, fmt::format("{}: none of its {} samples is usable", info.path, info.count));
+  if (info.has_quality && !(p.max_quality > 0)) {
+    throw Error(ExitCode::empty, fmt::format("{}: the quality of every sample is 0, so none has a weight; leave the "
+                                             "property out or give it values above 0",
+                                             info.path));
+  }
   const Eigen::Vector3d extent = p.high - p.low;
-  if (!(extent.maxCoeff() > 0)) {
+  if (!(extent.squaredNorm() > kLeastExtent * kLeastExtent)) {
     throw Error(ExitCode::empty,
                 fmt::format("{}: {}; a surface needs samples at different places", info.path,
                             p.usable == 1 ? "only one usable sample"
                                           : fmt::format("all {} usable samples lie at one place", p.usable)));
   }
-  if (!std::isfinite(extent.squaredNorm())) {
-    throw Error(ExitCode::unreadable,
-                fmt::format("{}: coordinates span more than double precision can square", info.path));
+  if (!(extent.maxCoeff() < kGreatestExtent)) {
+    throw Error(ExitCode::unreadable, fmt::format("{}: coordinates span {:.3g}, more than can be computed with",
+                                                  info.path, extent.maxCoeff()));
   }
   const Eigen::Vector3d mean = p.sum / static_cast<double>(p.usable);
   survey.covariance = p.products / static_cast<double>(p.usable) - mean * mean.transpose();

@@ -24,23 +24,31 @@ inline std::string read_text(const std::string& path) {
   return text.str();
 }
 
-/// Runs `lamina` with the arguments; nothing is interpreted by a shell.
-inline Outcome run_lamina(const std::vector<std::string>& arguments) {
+/// A word as the shell takes it literally.
+inline std::string quoted(const std::string& word) {
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
+}
+
+/// Runs a shell's command line; `lamina` in it is a function that runs the program.
+inline Outcome run_shell(const std::string& line) {
   const TemporaryFolder folder;
-  const auto quoted = [](const std::string& word) {
-    std::string text = "'";
-    for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
-    return text + "'";
-  };
-  std::string command = quoted(LAMINA_PROGRAM);
-  for (const std::string& argument : arguments) command += " " + quoted(argument);
-  command += " </dev/null >" + quoted(folder / "out") + " 2>" + quoted(folder / "err");
+  const std::string command = "lamina() { " + quoted(LAMINA_PROGRAM) + " \"$@\"; }; { " + line + "\n} </dev/null >" +
+                              quoted(folder / "out") + " 2>" + quoted(folder / "err");
   const int status = std::system(command.c_str());
   Outcome outcome;
   outcome.code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
   outcome.out = read_text(folder / "out");
   outcome.err = read_text(folder / "err");
   return outcome;
+}
+
+/// Runs `lamina` with the arguments; nothing is interpreted by a shell.
+inline Outcome run_lamina(const std::vector<std::string>& arguments) {
+  std::string command = "exec " + quoted(LAMINA_PROGRAM);
+  for (const std::string& argument : arguments) command += " " + quoted(argument);
+  return run_shell(command);
 }
 
 }  // namespace lamina::test

@@ -1,0 +1,26 @@
+// A small text result, such as statistics: known to be writable before the work begins, there only when complete.
+#pragma once
+#include <cstdio>
+#include <string>
+
+namespace lamina::tools {
+
+/// Staged beside its name and renamed by write(); without write() nothing is left and an older file stays as it was.
+/// "-" is standard output; pipes and devices are written to directly.
+class ResultFile {
+ public:
+  /// Throws Error(budget) naming the path and the reason when it cannot be written.
+  explicit ResultFile(std::string path);
+  ~ResultFile();
+  ResultFile(const ResultFile&) = delete;
+  ResultFile& operator=(const ResultFile&) = delete;
+  /// Writes the whole text, once.
+  void write(const std::string& text);
+
+ private:
+  [[noreturn]] void refuse(int error) const;
+  std::string path_, staged_;  ///< staged_ is empty where nothing has to be removed
+  std::FILE* file_ = nullptr;
+};
+
+}  // namespace lamina::tools
