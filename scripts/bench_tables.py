@@ -33,7 +33,7 @@ def stage_row(record, names):
     m = record["median"]
     per_sample = [m["stage_cpu"].get(s, 0) / m["samples"] * 1e9 for s in names]
     total = m["cpu_seconds"] / m["samples"] * 1e9
-    return [record["case"]] + [f"{ns:.0f}" for ns in per_sample + [total]]
+    return [record["case"]] + [f"{ns:.0f}" for ns in per_sample + [total - sum(per_sample), total]]
 
 
 def tables(results):
@@ -47,7 +47,7 @@ def tables(results):
         stages.append(stage_row(record, names))
     return "\n\n".join([
         f"{results['date']}, {results['version']}, {results['machine']}; medians of {results['repeat']} runs.",
-        table(head, rows), "CPU nanoseconds per sample and stage:", table(["case"] + names + ["all"], stages)])
+        table(head, rows), "CPU nanoseconds per sample and stage:", table(["case"] + names + ["other", "all"], stages)])
 
 
 def ratios(results):
