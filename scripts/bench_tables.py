@@ -1,4 +1,8 @@
 """Results of scripts/bench as Markdown tables."""
+import statistics
+
+# Slowest over fastest run of the same case, by wall clock, that a machine left alone stays below.
+QUIET_SPREAD = 1.1
 
 BEGIN, END = "<!-- figures of scripts/bench: begin -->", "<!-- figures of scripts/bench: end -->"
 
@@ -45,8 +49,11 @@ def tables(results):
     for record in results["cases"]:
         rows.append(figures(record))
         stages.append(stage_row(record, names))
+    where = f"{results['date']}, {results['version']}, {results['machine']}; medians of {results['repeat']} runs."
+    if statistics.median(r["median"]["wall_spread"] for r in results["cases"]) > QUIET_SPREAD:
+        where += " The machine had other work meanwhile: wall clock figures are too slow, CPU figures hold."
     return "\n\n".join([
-        f"{results['date']}, {results['version']}, {results['machine']}; medians of {results['repeat']} runs.",
+        where,
         table(head, rows), "CPU nanoseconds per sample and stage:", table(["case"] + names + ["other", "all"], stages)])
 
 
