@@ -73,11 +73,16 @@ def ratios(results):
     return "old / new; stages by CPU time\n\n" + table(["case", "wall", "CPU", "memory", "disk", "mesh"] + names, rows)
 
 
-def write_between_markers(path, text):
+def check_markers(path):
+    """Ends the program unless the file has both markers: asked before measuring, not after."""
     with open(path) as f:
         whole = f.read()
     if whole.count(BEGIN) != 1 or whole.count(END) != 1 or whole.index(BEGIN) > whole.index(END):
         raise SystemExit(f"bench: {path}: wants the lines '{BEGIN}' and '{END}', once each")
-    before, rest = whole.split(BEGIN)
+    return whole
+
+
+def write_between_markers(path, text):
+    before, rest = check_markers(path).split(BEGIN)
     with open(path, "w") as f:
         f.write(before + BEGIN + "\n\n" + text + "\n\n" + END + rest.split(END)[1])
