@@ -32,12 +32,12 @@ struct SurfaceCorner {
 };
 
 /// An isovertex: a minimal edge whose ends have different signs. Owned by the slab that holds the edge's lower end.
-/// Invalid ones (rims of open surfaces) are listed too, but no triangle uses them. A loop that cannot be triangulated
-/// by chords gets a centre vertex: its two corners are any two of the loop's, chosen so that the point at `t` between
-/// them comes close to the loop's mean.
+/// Only valid ones are listed: both ends have a value, at least one of samples of its own. A loop that cannot be
+/// triangulated by chords gets a centre vertex: its two corners are any two of the loop's, chosen so that the point at
+/// `t` between them comes close to the loop's mean.
 struct IsoVertex {
   static constexpr std::uint8_t kCentre = 3;  ///< `axis` of a centre vertex
-  SlabIndex low, high;  ///< SurfaceCorner at the lower and upper end
+  SlabIndex low, high;  ///< SurfaceCorner at the lower and upper end; the lower is in this slab but for centre vertices
   float t = 0.5F;       ///< position along the edge from low to high, in (0, 1)
   std::uint8_t axis = 0;   ///< of the edge, or kCentre
   std::uint8_t level = 0;  ///< of the edge; of the cell for a centre vertex
@@ -56,7 +56,7 @@ struct IsoSlab {
   std::vector<std::vector<float>> corner_attributes;  ///< one array per attribute, parallel to corners
   /// In canonical order; behind the edges' come centre vertices (by cell), then copies that separate fans.
   std::vector<IsoVertex> vertices;
-  std::vector<IsoTriangle> triangles;                 ///< of the slab's cells, in canonical order
+  std::vector<IsoTriangle> triangles;  ///< of the slab's cells, in canonical order
 };
 
 }  // namespace lamina

@@ -47,9 +47,11 @@ std::uint64_t label_of(const Window& window, Ref v) {
 Eigen::Vector3d point_of(const Window& window, Ref v, const SurfaceCorner& corner) {
   const SlabRecord& record = window.record_of(v);
   const IsoVertex& vertex = record.iso->vertices[v & kRefIndex];
-  const SlabRecord& high_record = vertex.high.next() ? window.at(record.slab + 1) : record;
-  const SurfaceCorner& low = record.iso->corners[vertex.low.index()];
-  const SurfaceCorner& high = high_record.iso->corners[vertex.high.index()];
+  const auto corner_at = [&](SlabIndex i) -> const SurfaceCorner& {
+    return (i.next() ? window.at(record.slab + 1) : record).iso->corners[i.index()];
+  };
+  const SurfaceCorner& low = corner_at(vertex.low);
+  const SurfaceCorner& high = corner_at(vertex.high);
   Eigen::Vector3d point;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const std::int64_t from = std::int64_t{low.position[axis]} - corner.position[axis];

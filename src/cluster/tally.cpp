@@ -221,7 +221,8 @@ void lay_out(SlabRecord& record, std::shared_ptr<const IsoSlab> iso) {
              });
   for (std::size_t v = 0; v < vertices.size(); ++v) {
     const IsoVertex& vertex = vertices[v];
-    if (vertex.low.bits >= corners.size() || (!vertex.high.next() && vertex.high.bits >= corners.size())) {
+    const auto beyond = [&](SlabIndex i) { return !i.next() && i.bits >= corners.size(); };
+    if (beyond(vertex.low) || beyond(vertex.high)) {
       bad_slab(record.slab, "isovertex " + std::to_string(v) + " names a corner beyond the slab's " +
                                 std::to_string(corners.size()));
     }

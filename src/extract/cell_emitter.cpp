@@ -26,15 +26,16 @@ CellEmitter::Point CellEmitter::locate(const CellCrossing& c, const std::array<s
   const CornerBlock& block = *cache_->block(c.level, c.low);
   const int offset = offset_in_block(c.low);
   const int z = offset >> 6;
+  Point p;
+  p.accepted = block.accepted[c.axis].test(offset);
+  if (!p.accepted) return p;
   std::uint32_t id = block.numbers[z].vertex_base;
-  for (int a = 0; a < c.axis; ++a) id += static_cast<std::uint32_t>(std::popcount(block.crossing[a].words[z]));
+  for (int a = 0; a < c.axis; ++a) id += static_cast<std::uint32_t>(std::popcount(block.accepted[a].words[z]));
   const std::uint64_t before = (std::uint64_t{1} << (offset & 63)) - 1;
-  id += static_cast<std::uint32_t>(std::popcount(block.crossing[c.axis].words[z] & before));
+  id += static_cast<std::uint32_t>(std::popcount(block.accepted[c.axis].words[z] & before));
   if (lattice.slab_of_layer(c.level, c.low.z) != slab_) id |= SlabIndex::kNextSlab;
 
-  Point p;
   p.vertex.bits = id;
-  p.accepted = block.accepted[c.axis].test(offset);
   p.geometry.faces = cell_.faces(c);
   const std::array<std::int32_t, 3> low = lattice.position(c.level, c.low);
   for (int i = 0; i < 3; ++i) p.geometry.position[i] = static_cast<float>(low[i] - origin[i]);
@@ -145,7 +146,7 @@ bool CellEmitter::emit(int level, const Cell& cell, TriangleRun& run) {
     // Two vertices leave no surface in the cell: the neighbours across the two faces meet in the same line.
     for (std::uint32_t i = 0; i < loop.count; ++i) {
       const std::uint32_t at = tracer.order()[loop.first + i];
-      note_quadrants(level, cell, crossings[at], points_[at].vertex, accepted);
+      if (points_[at].accepted) note_quadrants(level, cell, crossings[at], points_[at].vertex, accepted);
     }
     if (!accepted) {
       ++run.counts.rejected_loops;

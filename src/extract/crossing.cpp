@@ -46,7 +46,7 @@ Quadrants around_edges(int axis, const Slice& below, const Slice& here) {
 void find_crossing(const TileView& tile) {
   CornerBlock& leaf = tile.leaf();
   // The word of a mask at (x + dx, y + dy, z).
-  const auto shifted = [&](BlockMask CornerBlock::*mask, int dx, int dy, int z) {
+  const auto shifted = [&](auto mask, int dx, int dy, int z) {
     const CornerBlock* b = tile.neighbour(dx, dy, 0);
     const std::uint64_t beyond = b == nullptr ? 0 : (b->*mask).words[z];
     const std::uint64_t here = (leaf.*mask).words[z];
@@ -77,22 +77,32 @@ void find_crossing(const TileView& tile) {
       const Slice split(tile, &CornerBlock::split, z);
       for (int axis = 0; axis < 3; ++axis) change[axis] &= ~around_edges(axis, split_below, split).any();
     }
-    for (int axis = 0; axis < 3; ++axis) leaf.crossing[axis].words[z] = change[axis];
+    const std::array<std::uint64_t, 3> valued = {shifted(&CornerBlock::valued, 1, 0, z),
+                                                 shifted(&CornerBlock::valued, 0, 1, z),
+                                                 above == nullptr ? 0 : above->valued.words[(z + 1) & 7]};
+    const std::array<std::uint64_t, 3> seen = {shifted(&CornerBlock::seen, 1, 0, z),
+                                               shifted(&CornerBlock::seen, 0, 1, z),
+                                               above == nullptr ? 0 : above->seen.words[(z + 1) & 7]};
+    for (int axis = 0; axis < 3; ++axis) {
+      leaf.crossing[axis].words[z] = change[axis];
+      leaf.accepted[axis].words[z] =
+          change[axis] & leaf.valued.words[z] & valued[axis] & (leaf.seen.words[z] | seen[axis]);
+    }
   }
 }
 
 void mark_surface(const TileView& tile, Window& window) {
-  const auto crossing = [&](int axis, int dx, int dy, int z) {
+  const auto accepted = [&](int axis, int dx, int dy, int z) {
     const CornerBlock* b = tile.neighbour(dx, dy, z < 0 ? -1 : 0);
-    return b == nullptr ? std::uint64_t{0} : b->crossing[axis].words[z & 7];
+    return b == nullptr ? std::uint64_t{0} : b->accepted[axis].words[z & 7];
   };
   CornerBlock& leaf = tile.leaf();
   for (int z = tile.begin; z < tile.end; ++z) {
-    const std::uint64_t along_x = crossing(0, 0, 0, z);
-    const std::uint64_t along_y = crossing(1, 0, 0, z);
-    const std::uint64_t ends = along_x | bits::shift_x(crossing(0, -1, 0, z), along_x, 0, 1) | along_y |
-                               bits::shift_y(crossing(1, 0, -1, z), along_y, 0, 1) | crossing(2, 0, 0, z) |
-                               crossing(2, 0, 0, z - 1);
+    const std::uint64_t along_x = accepted(0, 0, 0, z);
+    const std::uint64_t along_y = accepted(1, 0, 0, z);
+    const std::uint64_t ends = along_x | bits::shift_x(accepted(0, -1, 0, z), along_x, 0, 1) | along_y |
+                               bits::shift_y(accepted(1, 0, -1, z), along_y, 0, 1) | accepted(2, 0, 0, z) |
+                               accepted(2, 0, 0, z - 1);
     if (ends == 0) continue;
     std::uint64_t shared = 0;
     if (tile.level > 0) {

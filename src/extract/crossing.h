@@ -1,14 +1,14 @@
 // Minimal edges with a sign change and the corners at their ends, as masks: the first half of numbering.
 #pragma once
-#include "extract/block_cache.h"
 #include "extract/tile_view.h"
+#include "window/block_cache.h"
 
 namespace lamina {
 
-/// Sets `crossing` in the tile's layers of the slab and clears `accepted` and `surface` there.
+/// Sets `crossing` and `accepted` in the tile's layers of the slab and clears `surface` there.
 void find_crossing(const TileView& tile);
 
-/// Sets `surface` for the corners of the tile's layers that end a crossing edge, edges from the layer below included.
+/// Sets `surface` for the corners of the tile's layers that end an accepted edge, edges from the layer below included.
 /// A corner that several levels hold is marked in the finest only, possibly in another tile: all tiles of the slab must
 /// have been through find_crossing(), and several may be marked at once.
 void mark_surface(const TileView& tile, Window& window);
@@ -20,7 +20,7 @@ struct CornerPlace {
   [[nodiscard]] std::uint32_t number() const;
 };
 
-/// Where the corner of a crossing edge is marked: in `level` or a finer one. Its block is null when it is not.
+/// Where the corner of an accepted edge is marked: in `level` or a finer one. Its block is null when it is not.
 CornerPlace surface_place(BlockCache& cache, int level, const Cell& corner);
 
 /// Cells around the tile's edges of one axis at layer z, by quadrant (IsoVertex::open).

@@ -8,12 +8,6 @@
 
 namespace lamina {
 
-struct ExtractSettings {
-  /// An isovertex is rejected where a valued end's projected point lies farther than this from the weighted average of
-  /// its samples, in units of the local support radius (Adamson & Alexa 2004). 0: no limit.
-  float boundary = 0;
-};
-
 struct ExtractCounts {
   std::uint64_t crossing_cells = 0;      ///< leaf cells the surface passes through
   std::uint64_t general_cells = 0;       ///< of these, beside a subdivided one
@@ -26,14 +20,14 @@ struct ExtractCounts {
 /// window after triangulate(s), and its IsoSlab the hands of the caller after separate_fans(s). Results are the same
 /// for any number of threads; the surface is the same for any height of slabs.
 
-/// Step 1, numbers: finds the minimal edges with a sign change whose lower end lies in the slab, numbers them and the
-/// corners at their ends, and fills out.corners, out.corner_attributes and out.vertices. The octree up to this slab,
-/// the signs of its corners and of the next one's first plane, and the values of its corners must be final. `previous`
-/// (null before the first slab) is the slab below: its vertical edges that end in this slab are completed now (`high`,
-/// `t`, validity).
-/// Order of vertices: level, tile (z, y, x), layer, axis, place in the layer; of corners: level, tile, layer, place. A
-/// corner that several levels hold is listed once, with the finest.
-void number_edges(Window& window, std::int32_t slab, const ExtractSettings& settings, IsoSlab* previous, IsoSlab& out);
+/// Step 1, numbers: finds the minimal edges with a sign change whose lower end lies in the slab, numbers those that are
+/// valid (both ends have a value, at least one of samples of its own) and the corners at their ends, and fills
+/// out.corners, out.corner_attributes and out.vertices. The octree up to this slab, the signs of its corners and of the
+/// next one's first plane, and the values of its corners must be final. `previous` (null before the first slab) is the
+/// slab below: its vertical edges that end in this slab are completed now (`high`, `t`). Order of vertices: level, tile
+/// (z, y, x), layer, axis, place in the layer; of corners: level, tile, layer, place. A corner that several levels hold
+/// is listed once, with the finest.
+void number_edges(Window& window, std::int32_t slab, IsoSlab* previous, IsoSlab& out);
 
 /// Step 2, triangles of the slab's leaf cells into out.triangles, in order of level, tile, cell, loop; the slab and the
 /// next one must be numbered, the octree be final up to the next slab. Appends centre vertices to out.vertices; both

@@ -3,8 +3,8 @@
 #pragma once
 #include <vector>
 
-#include "extract/block_cache.h"
 #include "extract/loops.h"
+#include "window/block_cache.h"
 
 namespace lamina {
 

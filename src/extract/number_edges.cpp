@@ -28,7 +28,7 @@ void assign_numbers(const Window& window, const std::vector<TileView>& views, Is
     CornerBlock& leaf = tile.leaf();
     for (int z = tile.begin; z < tile.end; ++z) {
       leaf.numbers[z] = {vertices, corners};
-      for (const BlockMask& m : leaf.crossing) vertices += static_cast<std::uint32_t>(std::popcount(m.words[z]));
+      for (const BlockMask& m : leaf.accepted) vertices += static_cast<std::uint32_t>(std::popcount(m.words[z]));
       corners += static_cast<std::uint32_t>(std::popcount(leaf.surface.words[z]));
     }
   }
@@ -93,15 +93,8 @@ float edge_fraction(const SurfaceCorner& low, const SurfaceCorner& high, bool lo
   return std::clamp(low.distance / (low.distance - high.distance), kMargin, 1.0F - kMargin);
 }
 
-/// At least one end has samples of its own, and none of those lies beyond the limit.
-bool is_accepted(const SurfaceCorner& low, const SurfaceCorner& high, float boundary) {
-  if (low.reach < 0 && high.reach < 0) return false;
-  return boundary <= 0 || std::max(low.reach, high.reach) <= boundary;
-}
-
 struct Numbering {
   const Window& window;
-  const ExtractSettings& settings;
   IsoSlab& slab;
 
   std::uint32_t corner_number(BlockCache& cache, int level, const CornerBlock* block, int offset, const Cell& c) const {
@@ -110,22 +103,21 @@ struct Numbering {
   }
 
   /// Completes a vertex whose ends are both known.
-  void place(IsoVertex& v, const SurfaceCorner& low, const SurfaceCorner& high, CornerBlock& leaf, int offset) const {
-    v.t = edge_fraction(low, high, leaf.positive.test(offset));
+  static void place(IsoVertex& v, const SurfaceCorner& low, const SurfaceCorner& high, bool low_positive) {
+    v.t = edge_fraction(low, high, low_positive);
     v.near_high = v.t > 0.5F;
-    if (is_accepted(low, high, settings.boundary)) leaf.accepted[v.axis].set(offset);
   }
 
   /// Vertices of the tile's edges; vertical edges of the slab's last layer wait for the next slab's corners.
   void fill_vertices(const TileView& tile, BlockCache& cache, std::int32_t last_layer) const {
-    CornerBlock& leaf = tile.leaf();
+    const CornerBlock& leaf = tile.leaf();
     for (int z = tile.begin; z < tile.end; ++z) {
       std::uint32_t id = leaf.numbers[z].vertex_base;
-      if ((leaf.crossing[0].words[z] | leaf.crossing[1].words[z] | leaf.crossing[2].words[z]) == 0) continue;
+      if ((leaf.accepted[0].words[z] | leaf.accepted[1].words[z] | leaf.accepted[2].words[z]) == 0) continue;
       const Slice cells_below(tile, &CornerBlock::cells, z - 1);
       const Slice cells(tile, &CornerBlock::cells, z);
       for (int axis = 0; axis < 3; ++axis) {
-        const std::uint64_t edges = leaf.crossing[axis].words[z];
+        const std::uint64_t edges = leaf.accepted[axis].words[z];
         if (edges == 0) continue;
         const Quadrants full = around_edges(axis, cells_below, cells);
         for_bits(edges, [&](int bit) {
@@ -142,7 +134,7 @@ struct Numbering {
           const CornerBlock* there =
               leaves ? tile.neighbour(axis == 0, axis == 1, axis == 2) : static_cast<const CornerBlock*>(&leaf);
           v.high.bits = corner_number(cache, tile.level, there, offset_in_block(high), high);
-          place(v, slab.corners[v.low.index()], slab.corners[v.high.index()], leaf, offset);
+          place(v, slab.corners[v.low.index()], slab.corners[v.high.index()], leaf.positive.test(offset));
         });
       }
     }
@@ -150,25 +142,25 @@ struct Numbering {
 
   /// Completes the slab below: its vertical edges that end in the tile's first layer, the slab's first plane.
   void complete_below(const TileView& tile, BlockCache& cache, IsoSlab& previous) const {
-    CornerBlock* below = tile.neighbour(0, 0, tile.begin == 0 ? -1 : 0);
+    const CornerBlock* below = tile.neighbour(0, 0, tile.begin == 0 ? -1 : 0);
     if (below == nullptr) return;
     const int z = (tile.begin - 1) & 7;
     std::uint32_t id =
-        below->numbers[z].vertex_base + static_cast<std::uint32_t>(std::popcount(below->crossing[0].words[z]) +
-                                                                   std::popcount(below->crossing[1].words[z]));
-    for_bits(below->crossing[2].words[z], [&](int bit) {
+        below->numbers[z].vertex_base + static_cast<std::uint32_t>(std::popcount(below->accepted[0].words[z]) +
+                                                                   std::popcount(below->accepted[1].words[z]));
+    for_bits(below->accepted[2].words[z], [&](int bit) {
       IsoVertex& v = previous.vertices[id++];
       const int offset = tile.begin * 64 + bit;
       const std::uint32_t high = corner_number(cache, tile.level, &tile.leaf(), offset, tile.cell(offset));
       v.high.bits = high | SlabIndex::kNextSlab;
-      place(v, previous.corners[v.low.index()], slab.corners[high], *below, z * 64 + bit);
+      place(v, previous.corners[v.low.index()], slab.corners[high], below->positive.test(z * 64 + bit));
     });
   }
 };
 
 }  // namespace
 
-void number_edges(Window& window, std::int32_t slab, const ExtractSettings& settings, IsoSlab* previous, IsoSlab& out) {
+void number_edges(Window& window, std::int32_t slab, IsoSlab* previous, IsoSlab& out) {
   out = {};
   out.slab = slab;
   const std::vector<TileView> views = slab_tiles(window, slab);
@@ -176,7 +168,7 @@ void number_edges(Window& window, std::int32_t slab, const ExtractSettings& sett
   for_views(window, views, [&](const TileView& tile, BlockCache&) { mark_surface(tile, window); });
   assign_numbers(window, views, out);
   for_views(window, views, [&](const TileView& tile, BlockCache&) { fill_corners(window, tile, out); });
-  const Numbering numbering{window, settings, out};
+  const Numbering numbering{window, out};
   for_views(window, views, [&](const TileView& tile, BlockCache& cache) {
     const std::int32_t first = window.lattice().first_layer(tile.level, slab);
     numbering.fill_vertices(tile, cache, first + window.lattice().layers(tile.level) - 1);

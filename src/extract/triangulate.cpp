@@ -14,7 +14,7 @@ namespace {
 constexpr std::size_t kRunTiles = 16;
 
 /// Numbers of the isovertices on the edges of a tile's cells, [axis][z][y][x] of the edge's lower corner. Entries
-/// without a crossing hold anything.
+/// without an accepted crossing hold anything.
 class EdgeNumbers {
  public:
   static constexpr int offset(int axis, int x, int y, int z) { return axis * 729 + z * 81 + y * 9 + x; }
@@ -36,12 +36,12 @@ class EdgeNumbers {
   void load_axis(const TileView& tile, int axis, int dx, int dy, int z, std::uint32_t slab_bit) {
     const CornerBlock* block = tile.neighbour(dx, dy, z >> 3);
     if (block == nullptr) return;
-    const std::uint64_t word = block->crossing[axis].words[z & 7];
+    const std::uint64_t word = block->accepted[axis].words[z & 7];
     const std::uint64_t wanted = word & (dx == 0 ? ~std::uint64_t{0} : bits::columns_below(1)) &
                                  (dy == 0 ? ~std::uint64_t{0} : std::uint64_t{0xFF});
     if (wanted == 0) return;
     std::uint32_t id = block->numbers[z & 7].vertex_base | slab_bit;
-    for (int a = 0; a < axis; ++a) id += static_cast<std::uint32_t>(std::popcount(block->crossing[a].words[z & 7]));
+    for (int a = 0; a < axis; ++a) id += static_cast<std::uint32_t>(std::popcount(block->accepted[a].words[z & 7]));
     std::uint32_t* const base = numbers_.data() + offset(axis, 8 * dx, 8 * dy, z);
     if (dx == 0) {
       for_bits(wanted, [&](int bit) { base[(bit >> 3) * 9 + (bit & 7)] = id++; });
@@ -74,34 +74,50 @@ std::array<PlainCase, 256> plain_cases() {
   return out;
 }
 
+/// Cells of a layer with valid and with invalid isovertices on some of their edges.
+struct CellEdges {
+  std::uint64_t valid = 0, invalid = 0;
+
+  CellEdges operator|(const CellEdges& o) const { return {valid | o.valid, invalid | o.invalid}; }
+};
+
+CellEdges edges_at(const TileView& tile, int axis, int dx, int dy, int z) {
+  const CornerBlock* b = tile.neighbour(dx, dy, z >> 3);
+  if (b == nullptr) return {};
+  const std::uint64_t valid = b->accepted[axis].words[z & 7];
+  return {valid, b->crossing[axis].words[z & 7] & ~valid};
+}
+CellEdges from_next_column(const CellEdges& here, const CellEdges& right) {
+  return {bits::shift_x(0, here.valid, right.valid, -1), bits::shift_x(0, here.invalid, right.invalid, -1)};
+}
+CellEdges from_next_row(const CellEdges& here, const CellEdges& above) {
+  return {bits::shift_y(0, here.valid, above.valid, -1), bits::shift_y(0, here.invalid, above.invalid, -1)};
+}
+
 /// What a layer's cells need to know of one plane of corners.
 struct Plane {
   std::array<std::uint64_t, 4> positive{};  ///< at (x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)
-  std::uint64_t rejected = 0;               ///< cells with an invalid isovertex on their edges in the plane
+  CellEdges edges;                          ///< in the plane
 
   Plane() = default;
   Plane(const TileView& tile, int z) {
     const Slice s(tile, &CornerBlock::positive, z);
     positive = {s.here(), s.at<1, 0>(), s.at<0, 1>(), s.at<1, 1>()};
-    const std::uint64_t along_x = invalid(tile, 0, 0, 0, z);
-    const std::uint64_t along_y = invalid(tile, 1, 0, 0, z);
-    rejected = along_x | bits::shift_y(0, along_x, invalid(tile, 0, 0, 1, z), -1) | along_y |
-               bits::shift_x(0, along_y, invalid(tile, 1, 1, 0, z), -1);
-  }
-  static std::uint64_t invalid(const TileView& tile, int axis, int dx, int dy, int z) {
-    const CornerBlock* b = tile.neighbour(dx, dy, z >> 3);
-    return b == nullptr ? 0 : b->crossing[axis].words[z & 7] & ~b->accepted[axis].words[z & 7];
-  }
-  /// Cells with an invalid isovertex on their vertical edges.
-  static std::uint64_t rejected_verticals(const TileView& tile, int z) {
-    const auto rows = [&](int dx) {
-      const std::uint64_t w = invalid(tile, 2, dx, 0, z);
-      return w | bits::shift_y(0, w, invalid(tile, 2, dx, 1, z), -1);
-    };
-    const std::uint64_t w = rows(0);
-    return w | bits::shift_x(0, w, rows(1), -1);
+    const CellEdges along_x = edges_at(tile, 0, 0, 0, z);
+    const CellEdges along_y = edges_at(tile, 1, 0, 0, z);
+    edges = along_x | from_next_row(along_x, edges_at(tile, 0, 0, 1, z)) | along_y |
+            from_next_column(along_y, edges_at(tile, 1, 1, 0, z));
   }
 };
+
+CellEdges vertical_edges(const TileView& tile, int z) {
+  const auto rows = [&](int dx) {
+    const CellEdges e = edges_at(tile, 2, dx, 0, z);
+    return e | from_next_row(e, edges_at(tile, 2, dx, 1, z));
+  };
+  const CellEdges e = rows(0);
+  return e | from_next_column(e, rows(1));
+}
 
 /// Cells with a subdivided one among their 18 face and edge neighbours.
 std::uint64_t beside_split(const TileView& tile, int z) {
@@ -130,9 +146,14 @@ class TilePass {
       const std::uint64_t any = below.positive[0] | below.positive[1] | below.positive[2] | below.positive[3] |
                                 above.positive[0] | above.positive[1] | above.positive[2] | above.positive[3];
       const std::uint64_t general = tile.level == 0 || cells == 0 ? 0 : cells & beside_split(tile, z);
-      const std::uint64_t mixed = cells & any & ~all & ~general;
-      const std::uint64_t rim =
-          mixed == 0 ? 0 : mixed & (below.rejected | above.rejected | Plane::rejected_verticals(tile, z));
+      std::uint64_t mixed = cells & any & ~all & ~general;
+      std::uint64_t rim = 0;
+      if (mixed != 0) {
+        // Most cells with an invalid isovertex have nothing else: the far ends of what samples reach.
+        const CellEdges edges = below.edges | above.edges | vertical_edges(tile, z);
+        mixed &= edges.valid;
+        rim = mixed & edges.invalid;
+      }
       if ((mixed & ~rim) != 0) {
         for (loaded = std::max(loaded, z); loaded <= z + 1; ++loaded) load_edges(tile, loaded);
       }

@@ -4,7 +4,6 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <utility>
 
 namespace lamina {
 namespace {
@@ -58,6 +57,22 @@ void gather_field(const Window& window, int level, const Block& b, int begin, in
   }
 }
 
+/// Bits of a layer's corners: their signs, and whether anything speaks for them.
+struct Signs {
+  std::uint64_t positive = 0, valued = 0;
+};
+
+/// Corners of the layer whose own projected point lies beyond the limit.
+std::uint64_t beyond(const Window& window, int level, const CornerBlock& leaf, int z, float boundary) {
+  std::uint64_t out = 0;
+  const CornerValues& values = leaf.values[window.brick_of(level, z)];
+  std::uint32_t i = leaf.value_index(z * 64, window.brick_layers(level));
+  for (std::uint64_t w = leaf.near.words[z]; w != 0; w &= w - 1, ++i) {
+    if (values.channel(kReach)[i] > boundary) out |= w & (~w + 1);
+  }
+  return out & leaf.seen.words[z];
+}
+
 std::uint64_t own_signs(const Window& window, int level, const CornerBlock& leaf, int z) {
   std::uint64_t positive = 0;
   const CornerValues& values = leaf.values[window.brick_of(level, z)];
@@ -68,62 +83,72 @@ std::uint64_t own_signs(const Window& window, int level, const CornerBlock& leaf
   return positive & leaf.good.words[z];
 }
 
-std::uint64_t finer_signs(const Window& window, int level, const Tile& t, int z) {
-  std::uint64_t out = 0;
-  for (int quarter = 0; quarter < 4; ++quarter) {
-    const int qx = quarter & 1;
-    const int qy = quarter >> 1;
-    const std::uint64_t shared = t.leaf->shared.words[z] & (0x0F0F0F0FULL << (qx * 4 + qy * 32));
-    for (std::uint64_t w = shared; w != 0; w &= w - 1) {
-      const int bit = std::countr_zero(w);
-      const Cell fine{(t.block.x * 8 + (bit & 7)) * 2, (t.block.y * 8 + (bit >> 3)) * 2, (t.block.z * 8 + z) * 2};
-      const CornerBlock* from = window.probe(level - 1, block_of(fine));
-      if (from->positive.test(offset_in_block(fine))) out |= w & (~w + 1);
-    }
+/// Of the layer's corners that a finer level holds.
+Signs finer_signs(const Window& window, int level, const Tile& t, int z) {
+  Signs out;
+  for (std::uint64_t w = t.leaf->shared.words[z]; w != 0; w &= w - 1) {
+    const int bit = std::countr_zero(w);
+    const std::uint64_t one = w & (~w + 1);
+    const Cell fine{(t.block.x * 8 + (bit & 7)) * 2, (t.block.y * 8 + (bit >> 3)) * 2, (t.block.z * 8 + z) * 2};
+    const CornerBlock* from = window.probe(level - 1, block_of(fine));
+    if (from->positive.test(offset_in_block(fine))) out.positive |= one;
+    if (from->valued.test(offset_in_block(fine))) out.valued |= one;
   }
   return out;
 }
 
+/// Of the layer's corners in `wanted`, by the planes of their trusted neighbours.
+Signs extended_signs(const Kernel& kernel, const CornerField& field, int z, float cell, std::uint64_t wanted) {
+  Signs out;
+  for (int y = 0; y < 8; ++y) {
+    if (((wanted >> (8 * y)) & 0xFFU) == 0) continue;
+    Lanes sum{};
+    Lanes weight{};
+    kernel.extend(field, y, z, cell, sum, weight);
+    for (int l = 0; l < kLanes; ++l) {
+      out.positive |= static_cast<std::uint64_t>(!(sum[l] < 0)) << (8 * y + l);
+      out.valued |= static_cast<std::uint64_t>(weight[l] > 0) << (8 * y + l);
+    }
+  }
+  return {out.positive & wanted, out.valued & wanted};
+}
+
+void finish_tile(const Window& window, int level, const Tile& t, int begin, int end, const Kernel& kernel,
+                 float boundary, CornerField& field) {
+  const auto cell = static_cast<float>(window.lattice().cell_size(level));
+  bool gathered = false;
+  for (int z = begin; z < end; ++z) {
+    const std::uint64_t corners = t.leaf->corners.words[z];
+    if (corners == 0) continue;
+    const std::uint64_t shared = t.leaf->shared.words[z];
+    const std::uint64_t good = t.leaf->good.words[z];
+    Signs signs;
+    if (shared != 0) signs = finer_signs(window, level, t, z);
+    signs.positive |= own_signs(window, level, *t.leaf, z) & ~shared;
+    signs.valued |= good & ~shared;
+    if (const std::uint64_t wanted = corners & ~shared & ~good; wanted != 0) {
+      if (!gathered) gather_field(window, level, t.block, begin, end, field);
+      gathered = true;
+      const Signs extended = extended_signs(kernel, field, z, cell, wanted);
+      signs.positive |= extended.positive;
+      signs.valued |= extended.valued;
+    }
+    if (boundary > 0) signs.valued &= ~(beyond(window, level, *t.leaf, z, boundary) & ~shared);
+    t.leaf->positive.words[z] = signs.positive & corners;
+    t.leaf->valued.words[z] = signs.valued & corners;
+  }
+}
+
 }  // namespace
 
-void finish_slab(Window& window, std::int32_t slab, const Kernel& kernel) {
+void finish_slab(Window& window, std::int32_t slab, const Kernel& kernel, float boundary) {
   tbb::enumerable_thread_specific<CornerField> fields;
   for (int level = 0; level < window.levels(); ++level) {
     const std::vector<Tile> tiles = window.tiles(level, slab);
-    const auto cell = static_cast<float>(window.lattice().cell_size(level));
     tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
-      const Tile& t = tiles[i];
-      const std::int32_t first = window.lattice().first_layer(level, slab) - t.block.z * 8;
-      const int begin = std::max(first, 0);
+      const std::int32_t first = window.lattice().first_layer(level, slab) - tiles[i].block.z * 8;
       const int end = std::min(8, first + window.lattice().layers(level));
-      std::uint64_t any = 0;
-      for (int z = begin; z < end; ++z) any |= t.leaf->corners.words[z];
-      if (any == 0) return;
-      CornerField& field = fields.local();
-      bool gathered = false;
-      for (int z = begin; z < end; ++z) {
-        const std::uint64_t corners = t.leaf->corners.words[z];
-        if (corners == 0) continue;
-        const std::uint64_t shared = t.leaf->shared.words[z];
-        std::uint64_t positive = own_signs(window, level, *t.leaf, z) & ~shared;
-        if (shared != 0) positive |= finer_signs(std::as_const(window), level, t, z);
-        const std::uint64_t extended = corners & ~shared & ~t.leaf->good.words[z];
-        if (extended != 0 && !gathered) {
-          gather_field(window, level, t.block, begin, end, field);
-          gathered = true;
-        }
-        for (int y = 0; y < 8; ++y) {
-          const std::uint64_t row = (extended >> (8 * y)) & 0xFFU;
-          if (row == 0) continue;
-          Lanes sum{};
-          Lanes weight{};
-          kernel.extend(field, y, z, cell, sum, weight);
-          std::uint64_t bits = 0;
-          for (int l = 0; l < kLanes; ++l) bits |= static_cast<std::uint64_t>(!(sum[l] < 0)) << l;
-          positive |= (bits & row) << (8 * y);
-        }
-        t.leaf->positive.words[z] = positive & corners;
-      }
+      finish_tile(window, level, tiles[i], std::max(first, 0), end, kernel, boundary, fields.local());
     });
   }
 }

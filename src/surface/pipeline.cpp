@@ -37,7 +37,6 @@ Pipeline::Pipeline(const SurfaceSettings& settings, const Resolved& resolved, co
       window_(resolved.lattice, static_cast<int>(attributes), extent),
       projector_(project_settings(settings), kernel_),
       clusterer_(ClusterSettings{settings.cluster}),
-      extract_{static_cast<float>(settings.boundary)},
       first_(resolved.lattice.slab_of(extent.z_min) - kReachSlabs),
       last_(resolved.lattice.slab_of(extent.z_max) + kReachSlabs),
       refined_(first_),
@@ -85,7 +84,7 @@ void Pipeline::project_to(std::int32_t slab) {
 
 void Pipeline::finish_to(std::int32_t slab) {
   for (; finished_ <= std::min(slab, last_); ++finished_) {
-    finish_slab(window_, finished_, kernel_);
+    finish_slab(window_, finished_, kernel_, static_cast<float>(settings_.boundary));
   }
 }
 
@@ -93,7 +92,7 @@ void Pipeline::number_to(std::int32_t slab) {
   for (; numbered_ <= std::min(slab, last_); ++numbered_) {
     IsoSlab* below = iso_.empty() ? nullptr : iso_.back().get();
     auto here = std::make_shared<IsoSlab>();
-    number_edges(window_, numbered_, extract_, below, *here);
+    number_edges(window_, numbered_, below, *here);
     isovertices_ += here->vertices.size();
     iso_.push_back(std::move(here));
     // Corners of the next slab are extended from this one's values, but no farther back.

@@ -42,7 +42,6 @@ class Pipeline {
   Window window_;
   Projector projector_;
   Clusterer clusterer_;
-  ExtractSettings extract_;
   std::int32_t first_, last_;  ///< slabs that can hold surface
 
   // Next slab of each stage.

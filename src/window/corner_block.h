@@ -52,8 +52,8 @@ struct CornerValues {
 };
 
 /// Numbers of the isovertices and surface corners of one layer, written by extraction. Tables are per slab
-/// (IsoSlab::vertices, IsoSlab::corners); the number of an edge is its layer's base plus its rank in the layer's
-/// word of axis x, then y, then z; that of a corner is the base plus its rank in `surface`.
+/// (IsoSlab::vertices, IsoSlab::corners); the number of an accepted edge is its layer's base plus its rank in the
+/// layer's word of axis x, then y, then z; that of a corner is the base plus its rank in `surface`.
 struct LayerNumbers {
   std::uint32_t vertex_base = 0;
   std::uint32_t corner_base = 0;
@@ -91,12 +91,14 @@ struct CornerBlock : Projected {
   // Corners.
   BlockMask corners;   ///< of the leaf cells in `cells`, of this level
   BlockMask shared;    ///< subset of corners: held by a finer level too, whose value counts
-  BlockMask positive;  ///< sign of every corner in `corners` (outside), set when the slab is finished
+  // Set when the slab is finished.
+  BlockMask positive;  ///< sign of every corner in `corners` (outside)
+  BlockMask valued;    ///< subset of corners: the sign rests on samples, its own or its neighbours'; others are a guess
 
   // Minimal edges with a sign change, by axis, keyed by their lower corner; written by extraction.
   std::array<BlockMask, 3> crossing;
   std::array<BlockMask, 3> accepted;  ///< subset of crossing: the isovertex is valid
-  BlockMask surface;                  ///< corners at an end of a crossing edge
+  BlockMask surface;                  ///< corners at an end of an accepted edge
   std::array<LayerNumbers, 8> numbers{};
 
   /// Cell centres, where diffusion projects those instead of the corners; shared so that a block can be copied.

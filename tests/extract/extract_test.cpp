@@ -77,10 +77,10 @@ struct Case {
     s.seen = noise(seed + 2, p) >= unseen;
     return s;
   }
-  [[nodiscard]] WholeMesh mesh(const ExtractSettings& settings = {}) {
+  [[nodiscard]] WholeMesh mesh() {
     Window window(Lattice{kCell, octree.levels()}, 0);
     octree.fill(window, [this](const Position& p) { return field(p); });
-    return extract_all(window, octree.first_slab(), octree.end_slab(), settings);
+    return extract_all(window, octree.first_slab(), octree.end_slab());
   }
 };
 

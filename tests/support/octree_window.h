@@ -122,6 +122,7 @@ class Octree {
       if (!t.leaf->corners.test(offset)) continue;
       const FieldSample s = field(lattice.position(level, c));
       t.leaf->positive.assign(offset, s.distance >= 0);
+      t.leaf->valued.set(offset);
       if (!s.seen) continue;
       t.leaf->near.set(offset);
       t.leaf->seen.set(offset);
