@@ -17,7 +17,7 @@
 namespace lamina {
 namespace {
 
-using meshes::Vec3;
+using namespace meshes;
 
 [[noreturn]] void usage(const std::string& message) {
   throw Error(ExitCode::usage, message);
@@ -41,7 +41,7 @@ Edges look_at_edges(const TriangleMesh& mesh) {
   measure::EdgeTable(mesh).for_each_edge([&](std::span<const measure::Side> sides) {
     const std::uint32_t corner = sides[0].corner, next = sides[0].next_corner();
     const auto at = [&](std::uint32_t c) { return mesh.positions[mesh.triangles[c / 3][c % 3]]; };
-    sum += meshes::norm(at(next) - at(corner));
+    sum += norm(at(next) - at(corner));
     ++count;
     edges.boundary += sides.size() == 1;
   });
@@ -53,7 +53,7 @@ double area_of(const TriangleMesh& mesh) {
   double area = 0;
   for (const auto& t : mesh.triangles) {
     const Vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
-    area += 0.5 * meshes::norm(meshes::cross(b - a, c - a));
+    area += 0.5 * norm(cross(b - a, c - a));
   }
   return area;
 }
