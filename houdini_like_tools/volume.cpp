@@ -69,7 +69,9 @@ void add_volume(CLI::App& app) {
       ->type_name("NAME")
       ->capture_default_str()
       ->group(grid);
-  tool->add_flag("--no-colour{false},--no-color{false}", s.colours, "Leave out the colours (Cd)")->group(grid);
+  tool->add_flag_callback(
+          "--no-colour,--no-color", [&s] { s.colours = false; }, "Leave out the colours (Cd)")
+      ->group(grid);
   tool->add_flag("--half", s.half, "Store 16-bit floats")->group(grid);
   add_run_options(*tool, o->run);
   tool->callback([o] { run_volume(*o); });

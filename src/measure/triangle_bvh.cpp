@@ -168,7 +168,7 @@ double TriangleBvh::squared_distance_to_box(const Vec3& p, const Box& box) {
   return sum;
 }
 
-NearestTriangle TriangleBvh::nearest(const Vec3& p) const {
+NearestTriangle TriangleBvh::nearest(const Vec3& p, double bound) const {
   struct Entry {
     std::uint32_t node;
     double bound;
@@ -176,7 +176,7 @@ NearestTriangle TriangleBvh::nearest(const Vec3& p) const {
   std::array<Entry, kMaxDepth> stack;
   std::size_t depth = 0;
   const Vec3 local = p - centre_;
-  double best = std::numeric_limits<double>::infinity();
+  double best = bound * bound;
   std::uint32_t triangle = 0;
   stack[depth++] = {0, 0.0};
   while (depth > 0) {

@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -30,8 +31,10 @@ class TriangleBvh {
 
   /// Exact distance from p to the nearest triangle.
   [[nodiscard]] double distance(const meshes::Vec3& p) const { return nearest(p).distance; }
-  /// The nearest triangle; of equally near ones always the same.
-  [[nodiscard]] NearestTriangle nearest(const meshes::Vec3& p) const;
+  /// The nearest triangle; of equally near ones always the same. `bound` speeds the search up: no less than the
+  /// distance, which the caller knows from elsewhere.
+  [[nodiscard]] NearestTriangle nearest(const meshes::Vec3& p,
+                                        double bound = std::numeric_limits<double>::infinity()) const;
   /// Nearest triangle hit by origin + t * direction, t > 0, from either side. `direction` is a unit vector.
   [[nodiscard]] std::optional<RayHit> first_hit(const meshes::Vec3& origin, const meshes::Vec3& direction) const;
 

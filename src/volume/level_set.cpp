@@ -33,15 +33,20 @@ struct MeshAdapter {
 struct Interrupter : openvdb::util::NullInterrupter {
   const RunContext& run;
   explicit Interrupter(const RunContext& context) : run(context) {}
-  bool wasInterrupted(int percent = -1) override {
-    if (run.progress && percent > 0) run.progress({"convert", static_cast<std::uint64_t>(percent), 100, 0, 0});
-    return run.cancelled();
-  }
+  bool wasInterrupted(int /*percent*/ = -1) override { return run.cancelled(); }
 };
 
 meshes::Vec3 world(const openvdb::math::Transform& transform, const openvdb::Coord& voxel) {
   const Vec3d p = transform.indexToWorld(voxel);
   return {p.x(), p.y(), p.z()};
+}
+
+/// The nearest triangle, where a distance to some triangle is known from a float.
+measure::NearestTriangle nearest(const measure::TriangleBvh& triangles, const meshes::Vec3& p, float known) {
+  const double bound = 1.00001 * std::abs(static_cast<double>(known));
+  const measure::NearestTriangle found = triangles.nearest(p, bound);
+  // Where the float was a little short nothing is found below it.
+  return found.distance < bound ? found : triangles.nearest(p);
 }
 
 void stop_when_cancelled(const RunContext& run) {
@@ -67,7 +72,8 @@ openvdb::FloatGrid::Ptr distance_grid(const TriangleMesh& mesh, const measure::T
   leaves.foreach ([&](FloatTree::LeafNodeType& leaf, std::size_t) {
     if (run.cancelled()) return;
     for (auto value = leaf.beginValueOn(); value; ++value) {
-      const auto distance = static_cast<float>(triangles.distance(world(*transform, value.getCoord())));
+      const auto distance =
+          static_cast<float>(nearest(triangles, world(*transform, value.getCoord()), *value).distance);
       const bool inside = *value < 0;
       if (distance >= limit) value.setValueOff();
       value.setValue(std::copysign(std::min(distance, limit), inside ? -1.0F : 1.0F));
@@ -90,7 +96,8 @@ openvdb::Vec3SGrid::Ptr colour_grid(const TriangleMesh& mesh, const measure::Tri
   leaves.foreach ([&](Vec3STree::LeafNodeType& leaf, std::size_t) {
     for (auto value = leaf.beginValueOn(); value; ++value) {
       const meshes::Vec3 p = world(transform, value.getCoord());
-      const auto& corner = mesh.triangles[triangles.nearest(p).triangle];
+      const float distance = distances.tree().getValue(value.getCoord());
+      const auto& corner = mesh.triangles[nearest(triangles, p, distance).triangle];
       Vec3d weights;
       const auto at = [&](int k) { return Vec3d(mesh.positions[corner[static_cast<std::size_t>(k)]].data()); };
       math::closestPointOnTriangleToPoint(at(0), at(1), at(2), Vec3d(p.data()), weights);

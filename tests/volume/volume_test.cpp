@@ -37,6 +37,9 @@ void colour_by_position(TriangleMesh& mesh, ScalarType type, float range) {
 
 class Volume : public ::testing::Test {
  protected:
+  Volume() {
+    run_.log = [this](LogLevel, std::string_view text) { messages_ += text; };
+  }
   /// Writes and reads back.
   openvdb::GridPtrVec grids(const TriangleMesh& mesh, const VolumeSettings& settings) {
     stats_ = write_volume(mesh, settings, path_, run_);
@@ -52,7 +55,7 @@ class Volume : public ::testing::Test {
 
   test::TemporaryFolder folder_;
   std::string path_ = folder_ / "out.vdb", messages_;
-  RunContext run_{.log = [this](LogLevel, std::string_view text) { messages_ += text; }};
+  RunContext run_;
   VolumeStats stats_;
 };
 
