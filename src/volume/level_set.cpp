@@ -55,25 +55,24 @@ void stop_when_cancelled(const RunContext& run) {
 
 }  // namespace
 
-openvdb::FloatGrid::Ptr distance_grid(const TriangleMesh& mesh, const measure::TriangleBvh& triangles, double voxel,
-                                      double band, bool has_sign, const RunContext& run) {
+openvdb::FloatGrid::Ptr distance_grid(const TriangleMesh& mesh, const measure::TriangleBvh& triangles,
+                                      const openvdb::math::Transform& transform, double band, bool has_sign,
+                                      const RunContext& run) {
   using namespace openvdb;
-  const auto transform = math::Transform::createLinearTransform(voxel);
   Interrupter interrupter(run);
   // OpenVDB tells which voxels lie in the band and which side they are on. Its distances are exact next to the surface
   // only; farther out they are taken from the triangles that neighbours found nearest, so what it finds is a voxel
   // wider than asked for, measured anew and cut to size. Renormalising would blur what is exact.
   const auto wide = static_cast<float>(band + 1);
   const int flags = (has_sign ? 0 : tools::UNSIGNED_DISTANCE_FIELD) | tools::DISABLE_RENORMALIZATION;
-  auto grid = tools::meshToVolume<FloatGrid>(interrupter, MeshAdapter{mesh, *transform}, *transform, wide, wide, flags);
+  auto grid = tools::meshToVolume<FloatGrid>(interrupter, MeshAdapter{mesh, transform}, transform, wide, wide, flags);
   stop_when_cancelled(run);
-  const auto limit = static_cast<float>(band * voxel);
+  const auto limit = static_cast<float>(band * transform.voxelSize()[0]);
   tree::LeafManager<FloatTree> leaves(grid->tree());
   leaves.foreach ([&](FloatTree::LeafNodeType& leaf, std::size_t) {
     if (run.cancelled()) return;
     for (auto value = leaf.beginValueOn(); value; ++value) {
-      const auto distance =
-          static_cast<float>(nearest(triangles, world(*transform, value.getCoord()), *value).distance);
+      const auto distance = static_cast<float>(nearest(triangles, world(transform, value.getCoord()), *value).distance);
       const bool inside = *value < 0;
       if (distance >= limit) value.setValueOff();
       value.setValue(std::copysign(std::min(distance, limit), inside ? -1.0F : 1.0F));

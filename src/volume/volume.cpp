@@ -58,15 +58,30 @@ double area_of(const TriangleMesh& mesh) {
   return area;
 }
 
-/// Voxels are numbered with 32 bits, and a converter reaches a little beyond the band.
-void check_range(const TriangleMesh& mesh, double voxel, double band) {
-  constexpr double kLargest = 1 << 30;
-  double reach = 0;
-  for (const auto& p : mesh.positions)
-    for (const double c : p) reach = std::max(reach, std::abs(c));
-  if (reach / voxel + band > kLargest)
-    usage(fmt::format("--voxel {:g}: too small for coordinates up to {:g}; the least is {:.3g}", voxel, reach,
-                      1.01 * reach / kLargest));
+/// Voxels lie on multiples of their edge. OpenVDB's converter judges sides in floats: voxel numbers are counted from
+/// the origin only as long as these can tell them apart, else from the middle of the mesh.
+openvdb::math::Transform::Ptr choose_transform(const TriangleMesh& mesh, double voxel, double band) {
+  constexpr double kFromOrigin = 1 << 20, kLargest = 1 << 30;
+  Vec3 low = mesh.positions[0], high = low;
+  for (const Vec3& p : mesh.positions)
+    for (std::size_t k = 0; k < 3; ++k) low[k] = std::min(low[k], p[k]), high[k] = std::max(high[k], p[k]);
+  double reach = 0, extent = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    reach = std::max({reach, -low[k], high[k]});
+    extent = std::max(extent, high[k] - low[k]);
+  }
+  if (0.5 * extent / voxel + band > kLargest || reach / voxel > kLargest * kFromOrigin)
+    usage(fmt::format("--voxel {:g}: too small for a mesh of this size ({:g}, coordinates up to {:g})", voxel, extent,
+                      reach));
+  auto transform = openvdb::math::Transform::createLinearTransform(voxel);
+  if (reach / voxel <= kFromOrigin) return transform;
+  openvdb::Vec3d middle;
+  for (int k = 0; k < 3; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    middle[k] = voxel * std::round((low[i] + 0.5 * (high[i] - low[i])) / voxel);
+  }
+  transform->postTranslate(middle);
+  return transform;
 }
 
 /// Bytes in leaves: the band's volume at four bytes a voxel for the distance, four for OpenVDB's nearest triangles and
@@ -115,7 +130,7 @@ VolumeStats convert(const TriangleMesh& mesh, const VolumeSettings& s, const std
   VolumeStats stats;
   stats.voxel = s.voxel > 0 ? s.voxel : edges.mean_length;
   stats.boundary_edges = edges.boundary;
-  check_range(mesh, stats.voxel, s.band);
+  const auto transform = choose_transform(mesh, stats.voxel, s.band);
   if (s.half) check_half(stats.voxel, s.band, run);
   check_memory(mesh, s, stats.voxel, s.colours, run);
   meshes::OutputFile out(path);  // an output that cannot be written is refused before the work
@@ -123,7 +138,7 @@ VolumeStats convert(const TriangleMesh& mesh, const VolumeSettings& s, const std
 
   openvdb::initialize();
   const measure::TriangleBvh triangles(mesh);
-  const auto distances = volume::distance_grid(mesh, triangles, stats.voxel, s.band, stats.has_sign, run);
+  const auto distances = volume::distance_grid(mesh, triangles, *transform, s.band, stats.has_sign, run);
   stats.voxels = distances->activeVoxelCount();
   distances->setGridClass(stats.has_sign ? openvdb::GRID_LEVEL_SET : openvdb::GRID_UNKNOWN);
   describe(*distances, s.name, s.half);

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <filesystem>
 #include <sstream>
+#include <stdexcept>
 
 #include "lamina/error.h"
 #include "measure/point_triangle.h"
@@ -49,8 +50,15 @@ class Volume : public ::testing::Test {
     openvdb::io::Stream file(stream);
     return *file.getGrids();
   }
+  /// The file's order of grids is OpenVDB's affair.
+  template <class Grid>
+  static typename Grid::Ptr find(const openvdb::GridPtrVec& all, const std::string& name) {
+    for (const auto& grid : all)
+      if (grid->getName() == name) return openvdb::gridPtrCast<Grid>(grid);
+    throw std::runtime_error("no grid " + name);
+  }
   openvdb::FloatGrid::Ptr distances(const TriangleMesh& mesh, const VolumeSettings& settings) {
-    return openvdb::gridPtrCast<openvdb::FloatGrid>(grids(mesh, settings).at(0));
+    return find<openvdb::FloatGrid>(grids(mesh, settings), settings.name);
   }
 
   test::TemporaryFolder folder_;
@@ -108,6 +116,7 @@ TEST_F(Volume, TakesTheVoxelFromTheMeanEdge) {
   const auto grid = distances(test::square(2, 0, {0, 0, 0}), {});
   EXPECT_NEAR(stats_.voxel, (4 * 2 + std::sqrt(8)) / 5, 1e-12);
   EXPECT_NEAR(grid->voxelSize().x(), stats_.voxel, 1e-12);
+  EXPECT_EQ(grid->indexToWorld(openvdb::Coord(0)), openvdb::Vec3d(0.0));
 }
 
 TEST_F(Volume, LeavesTheSignOutForAnOpenMesh) {
@@ -141,9 +150,8 @@ TEST_F(Volume, InterpolatesColoursAtTheNearestPoint) {
     const auto all = grids(mesh, {.voxel = 0.08});
     ASSERT_EQ(all.size(), 2U);
     EXPECT_TRUE(stats_.has_colours);
-    const auto colours = openvdb::gridPtrCast<openvdb::Vec3SGrid>(all[1]);
+    const auto colours = find<openvdb::Vec3SGrid>(all, "Cd");
     ASSERT_NE(colours, nullptr);
-    EXPECT_EQ(colours->getName(), "Cd");
     EXPECT_EQ(colours->activeVoxelCount(), stats_.voxels);
     for (auto value = colours->cbeginValueOn(); value; ++value) {
       auto p = colours->indexToWorld(value.getCoord());
@@ -194,6 +202,8 @@ TEST_F(Volume, KeepsGeoreferencedCoordinates) {
         (grid->indexToWorld(value.getCoord()) - openvdb::Vec3d(431000.25, 5213000.5, 800)).length() - kRadius;
     ASSERT_NEAR(*value, truth, kSag + 1e-6);
   }
+  const auto steps = grid->indexToWorld(openvdb::Coord(0)) / 0.06;
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(steps[k], std::round(steps[k]), 1e-6);
 }
 
 TEST_F(Volume, RefusesWhatCannotBeMeant) {
