@@ -22,8 +22,7 @@ constexpr int kHalo = kBlockSide + 2;
 using HaloCounts = std::array<std::uint32_t, kHalo * kHalo * kHalo>;
 
 constexpr std::size_t halo_index(int x, int y, int z) {  // of cells -1 .. kBlockSide
-  const int index = ((z + 1) * kHalo + y + 1) * kHalo + x + 1;
-  return static_cast<std::size_t>(index);
+  return static_cast<std::size_t>(((z + 1) * kHalo + y + 1) * kHalo + x + 1);
 }
 
 /// The cells with samples whose z lies in [z_begin, z_end).
