@@ -1,5 +1,6 @@
 #include "extract/crossing.h"
 
+#include <algorithm>
 #include <atomic>
 
 namespace lamina {
@@ -87,6 +88,29 @@ void find_crossing(const TileView& tile) {
       leaf.crossing[axis].words[z] = change[axis];
       leaf.accepted[axis].words[z] =
           change[axis] & leaf.valued.words[z] & valued[axis] & (leaf.seen.words[z] | seen[axis]);
+    }
+  }
+}
+
+void mark_busy(const TileView& tile, const Window& window) {
+  CornerBlock& leaf = tile.leaf();
+  for (int z = tile.begin; z < tile.end; ++z) {
+    leaf.busy.words[z] = leaf.accepted[0].words[z] | leaf.accepted[1].words[z] | leaf.accepted[2].words[z];
+  }
+  if (tile.level == 0) return;
+  for (int half = 0; half < 2; ++half) {
+    if (tile.begin >= 4 * half + 4 || tile.end <= 4 * half) continue;
+    for (int quarter = 0; quarter < 4; ++quarter) {
+      const int qx = quarter & 1;
+      const int qy = quarter >> 1;
+      const CornerBlock* finer =
+          window.probe(tile.level - 1, {2 * tile.block.x + qx, 2 * tile.block.y + qy, 2 * tile.block.z + half});
+      if (finer == nullptr) continue;
+      for (int z = std::max(tile.begin, 4 * half); z < std::min(tile.end, 4 * half + 4); ++z) {
+        const int from = 2 * (z - 4 * half);
+        const std::uint64_t pair = finer->busy.words[from] | finer->busy.words[from + 1];
+        leaf.busy.words[z] |= bits::even_quarter(bits::fold_pairs(pair), qx, qy);
+      }
     }
   }
 }

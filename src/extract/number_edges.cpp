@@ -165,6 +165,10 @@ void number_edges(Window& window, std::int32_t slab, IsoSlab* previous, IsoSlab&
   out.slab = slab;
   const std::vector<TileView> views = slab_tiles(window, slab);
   for_views(window, views, [](const TileView& tile, BlockCache&) { find_crossing(tile); });
+  for (std::size_t first = 0, end = 0; first < views.size(); first = end) {  // level by level, finest first
+    while (end < views.size() && views[end].level == views[first].level) ++end;
+    tbb::parallel_for(first, end, [&](std::size_t i) { mark_busy(views[i], window); });
+  }
   for_views(window, views, [&](const TileView& tile, BlockCache&) { mark_surface(tile, window); });
   assign_numbers(window, views, out);
   for_views(window, views, [&](const TileView& tile, BlockCache&) { fill_corners(window, tile, out); });

@@ -129,6 +129,12 @@ std::uint64_t beside_split(const TileView& tile, int z) {
          cross(Slice(tile, &CornerBlock::split, z - 1)) | cross(Slice(tile, &CornerBlock::split, z + 1));
 }
 
+/// Cells with accepted edges in or around them.
+std::uint64_t beside_busy(const TileView& tile, int z) {
+  const auto around = [](const Slice& s) { return s.here() | s.at<1, 0>() | s.at<0, 1>() | s.at<1, 1>(); };
+  return around(Slice(tile, &CornerBlock::busy, z)) | around(Slice(tile, &CornerBlock::busy, z + 1));
+}
+
 class TilePass {
  public:
   TilePass(BlockCache& cache, std::int32_t slab, IsoSlab& here, IsoSlab& next, const std::array<PlainCase, 256>& cases)
@@ -145,8 +151,9 @@ class TilePass {
                                 above.positive[0] & above.positive[1] & above.positive[2] & above.positive[3];
       const std::uint64_t any = below.positive[0] | below.positive[1] | below.positive[2] | below.positive[3] |
                                 above.positive[0] | above.positive[1] | above.positive[2] | above.positive[3];
-      const std::uint64_t general = tile.level == 0 || cells == 0 ? 0 : cells & beside_split(tile, z);
-      std::uint64_t mixed = cells & any & ~all & ~general;
+      const std::uint64_t hanging = tile.level == 0 || cells == 0 ? 0 : cells & beside_split(tile, z);
+      const std::uint64_t general = hanging == 0 ? 0 : hanging & beside_busy(tile, z);
+      std::uint64_t mixed = cells & any & ~all & ~hanging;
       std::uint64_t rim = 0;
       if (mixed != 0) {
         // Most cells with an invalid isovertex have nothing else: the far ends of what samples reach.

@@ -89,8 +89,8 @@ struct CornerBlock : Projected {
   BlockMask cells;    ///< leaf cells that take part: existing, not split, reached by a sample
 
   // Corners.
-  BlockMask corners;   ///< of the leaf cells in `cells`, of this level
-  BlockMask shared;    ///< subset of corners: held by a finer level too, whose value counts
+  BlockMask corners;  ///< of the leaf cells in `cells`, of this level
+  BlockMask shared;   ///< subset of corners: held by a finer level too, whose value counts
   // Set when the slab is finished.
   BlockMask positive;  ///< sign of every corner in `corners` (outside)
   BlockMask valued;    ///< subset of corners: the sign rests on samples, its own or its neighbours'; others are a guess
@@ -98,7 +98,8 @@ struct CornerBlock : Projected {
   // Minimal edges with a sign change, by axis, keyed by their lower corner; written by extraction.
   std::array<BlockMask, 3> crossing;
   std::array<BlockMask, 3> accepted;  ///< subset of crossing: the isovertex is valid
-  BlockMask surface;                  ///< corners at an end of an accepted edge
+  BlockMask busy;     ///< cells with an accepted edge of this or a finer level at or above their low corner
+  BlockMask surface;  ///< corners at an end of an accepted edge
   std::array<LayerNumbers, 8> numbers{};
 
   /// Cell centres, where diffusion projects those instead of the corners; shared so that a block can be copied.
