@@ -5,12 +5,14 @@
 int main(int argc, char** argv) {
   using namespace lamina::tools;
   const std::vector<AddTool> tools{
-      // clang-format off: one tool a line, in the order of the help
+      // One tool a line, in the order of the help.
+      // clang-format off
       add_surface,
       add_scatter,
       add_compare,
       add_check,
       add_render,
+      add_volume,
       // clang-format on
   };
   return run_program(argc, argv, tools);

@@ -11,5 +11,6 @@ void add_scatter(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_check(CLI::App& app);
 void add_render(CLI::App& app);
+void add_volume(CLI::App& app);
 
 }  // namespace lamina::tools

@@ -12,13 +12,13 @@ namespace lamina {
 
 /// All lengths in fixed-point steps of the frame. Cells lie on multiples of their side, whatever the cloud.
 struct RadiiSettings {
-  std::int32_t finest_cell = 1;  ///< side of the finest counting cell (the octree's d_max), > 0. Best near the side
-                                 ///< that holds min_samples where the cloud is dense: twice the radius there or a
-                                 ///< little more. Smaller ones cost time and memory and gain nothing
+  std::int32_t finest_cell = 1;    ///< side of the finest counting cell (the octree's d_max), > 0. Best near the side
+                                   ///< that holds min_samples where the cloud is dense: twice the radius there or a
+                                   ///< little more. Smaller ones cost time and memory and gain nothing
   int levels = 5;                  ///< 1..31; sides finest_cell * 2^0 .. 2^(levels-1)
   std::uint32_t min_samples = 16;  ///< > 0; a sample takes the finest cell holding at least this many (METHOD 3.1), or
                                    ///< the coarsest one when none does
-  float neighbour_bound = 1.5F;  ///< >= 1; a radius is at most this times the smallest one of the 27 cells around
+  float neighbour_bound = 1.5F;    ///< >= 1; a radius is at most this times the smallest one of the 27 cells around
 };
 
 /// Sliding estimator: push buckets of the store in ascending z, pop the radii of those whose surroundings are complete.

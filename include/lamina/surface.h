@@ -26,35 +26,36 @@ struct SurfaceSettings {
 
   FrameMode frame = FrameMode::pca;
   BadSamples bad_samples = BadSamples::drop;  ///< non-finite, without a normal, with a radius <= 0
-  double radius_scale = 1;       ///< > 0: multiplies every sample's radius, given or estimated
-  std::uint32_t density = 16;    ///< samples a counting cell must hold to give a radius (paper, section 3.1), >= 2
-  Length max_radius;             ///< samples with a larger radius are discarded as undersampled; 0: none
-  double blend = 1.1;              ///< H > 0: R = H r (paper, section 3.2)
-  int steps = 1;                 ///< N in 1..16: projection steps
+  double radius_scale = 1;                    ///< > 0: multiplies every sample's radius, given or estimated
+  std::uint32_t density = 16;  ///< samples a counting cell must hold to give a radius (paper, section 3.1), >= 2
+  Length max_radius;           ///< samples with a larger radius are discarded as undersampled; 0: none
+  double blend = 1.2;          ///< H > 0: R = H r (paper, section 3.2)
+  int steps = 1;               ///< N in 1..16: projection steps
   FitMode fit = FitMode::sphere;
-  bool diffuse = false;          ///< project cell centres, then corners by their cells (paper, section 3.3)
-  Length cell{0.9, Length::Unit::influence_radius};  ///< largest leaf cell a radius allows; leaves are half to all of it
-  int levels = 0;                ///< octree levels, 1..12; 0: as the radii ask, at least 4
-  double boundary = 0;           ///< isovertices whose corners' projections lie farther than this from the average of
-                                 ///< their samples (in R) are rejected; 0: no limit
+  bool diffuse = false;  ///< project cell centres, then corners by their cells (paper, section 3.3)
+  Length cell{0.9,
+              Length::Unit::influence_radius};  ///< largest leaf cell a radius allows; leaves are half to all of it
+  int levels = 0;                               ///< octree levels, 1..12; 0: as the radii ask, at least 4
+  double boundary = 0;  ///< isovertices whose corners' projections lie farther than this from the average of
+                        ///< their samples (in R) are rejected; 0: no limit
   ClusterMode cluster = ClusterMode::preserving;
-  double chord = 0.17;           ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
-  int window = 1;                ///< slabs that each stage advances at once, >= 1: more is faster on many cores, takes memory
-  bool dry_run = false;          ///< plan only: reads the input, writes nothing
+  double chord = 0.17;   ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
+  int window = 1;        ///< slabs that each stage advances at once, >= 1: more is faster on many cores, takes memory
+  bool dry_run = false;  ///< plan only: reads the input, writes nothing
 };
 
 /// What the settings came to for this cloud. Lengths in the input's units.
 struct SurfacePlan {
-  std::uint64_t samples = 0;                 ///< usable ones
-  std::array<double, 3> extent{};            ///< of the bounding box along the frame's axes, sweep axis last
+  std::uint64_t samples = 0;       ///< usable ones
+  std::array<double, 3> extent{};  ///< of the bounding box along the frame's axes, sweep axis last
   double radius_low = 0, radius_median = 0, radius_high = 0;  ///< 1 %, 50 %, 99 % of r
   double finest_cell = 0;
   int levels = 0;
   double slab_height = 0;
   std::int64_t slabs = 0;
   std::uint64_t buckets = 0;
-  std::uint64_t disk_bytes = 0;              ///< temporary disk, expected: the samples' store (measured) and the faces
-  std::uint64_t memory_bytes = 0;            ///< peak memory, expected
+  std::uint64_t disk_bytes = 0;    ///< temporary disk, expected: the samples' store (measured) and the faces
+  std::uint64_t memory_bytes = 0;  ///< peak memory, expected
 };
 
 struct StageTime {
@@ -86,10 +87,9 @@ struct SurfaceStats {
 };
 
 /// Runs the job. Reports the plan through `run.info`, progress through `run.progress`; obeys run.cancel by throwing
-/// Error(internal, "cancelled"), and run.max_memory by refusing before the sweep. Threads: run.threads (all stages). The output is the same bytes for any number of
-/// threads and any window.
-/// Throws Error: unreadable (input), usage (settings that contradict each other or the cloud), budget (memory, disk,
-/// output), empty (no surface).
+/// Error(internal, "cancelled"), and run.max_memory by refusing before the sweep. Threads: run.threads (all stages).
+/// The output is the same bytes for any number of threads and any window. Throws Error: unreadable (input), usage
+/// (settings that contradict each other or the cloud), budget (memory, disk, output), empty (no surface).
 SurfaceStats reconstruct_surface(const SurfaceSettings& settings, const RunContext& run);
 
 }  // namespace lamina

@@ -51,7 +51,7 @@ Eigen::Vector3d place_patch(std::span<const PatchTriangle> triangles) {
   OpenMesh::Vec3d sum(0.0);
   for (const auto member : patch.members) sum += patch.mesh.point(member);
   sum /= static_cast<double>(std::max<std::size_t>(patch.members.size(), 1));
-  const Eigen::Vector3d mean(sum[0], sum[1], sum[2]);
+  Eigen::Vector3d mean(sum[0], sum[1], sum[2]);
 
   Quadric quadric;  // about the mean: small numbers, and the solution of least norm is the one nearest to it
   for (const auto face : patch.mesh.faces()) {

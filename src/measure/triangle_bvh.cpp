@@ -168,7 +168,7 @@ double TriangleBvh::squared_distance_to_box(const Vec3& p, const Box& box) {
   return sum;
 }
 
-double TriangleBvh::distance(const Vec3& p) const {
+NearestTriangle TriangleBvh::nearest(const Vec3& p, double bound) const {
   struct Entry {
     std::uint32_t node;
     double bound;
@@ -176,7 +176,8 @@ double TriangleBvh::distance(const Vec3& p) const {
   std::array<Entry, kMaxDepth> stack;
   std::size_t depth = 0;
   const Vec3 local = p - centre_;
-  double best = std::numeric_limits<double>::infinity();
+  double best = bound * bound;
+  std::uint32_t triangle = 0;
   stack[depth++] = {0, 0.0};
   while (depth > 0) {
     const Entry e = stack[--depth];
@@ -185,8 +186,9 @@ double TriangleBvh::distance(const Vec3& p) const {
     if (node.count > 0) {
       for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
         const auto& c = mesh_.triangles[order_[i]];
-        best = std::min(
-            best, squared_distance_to_triangle(p, mesh_.positions[c[0]], mesh_.positions[c[1]], mesh_.positions[c[2]]));
+        const double d2 =
+            squared_distance_to_triangle(p, mesh_.positions[c[0]], mesh_.positions[c[1]], mesh_.positions[c[2]]);
+        if (d2 < best) best = d2, triangle = order_[i];
       }
       continue;
     }
@@ -196,7 +198,7 @@ double TriangleBvh::distance(const Vec3& p) const {
     if (far.bound < best) stack[depth++] = far;
     if (near.bound < best) stack[depth++] = near;
   }
-  return std::sqrt(best);
+  return {std::sqrt(best), triangle};
 }
 
 std::optional<double> TriangleBvh::entry(const Vec3& origin, const Vec3& inverse, const Box& box) {

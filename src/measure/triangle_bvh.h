@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -16,6 +17,11 @@ struct RayHit {
   std::array<double, 3> weights{};  ///< barycentric
 };
 
+struct NearestTriangle {
+  double distance = 0;
+  std::uint32_t triangle = 0;
+};
+
 /// Holds a reference to the mesh: it must outlive the tree. Queries may run on any number of threads.
 /// About 20 bytes per triangle.
 class TriangleBvh {
@@ -24,7 +30,11 @@ class TriangleBvh {
   explicit TriangleBvh(const TriangleMesh& mesh);
 
   /// Exact distance from p to the nearest triangle.
-  [[nodiscard]] double distance(const meshes::Vec3& p) const;
+  [[nodiscard]] double distance(const meshes::Vec3& p) const { return nearest(p).distance; }
+  /// The nearest triangle; of equally near ones always the same. `bound` speeds the search up: no less than the
+  /// distance, which the caller knows from elsewhere.
+  [[nodiscard]] NearestTriangle nearest(const meshes::Vec3& p,
+                                        double bound = std::numeric_limits<double>::infinity()) const;
   /// Nearest triangle hit by origin + t * direction, t > 0, from either side. `direction` is a unit vector.
   [[nodiscard]] std::optional<RayHit> first_hit(const meshes::Vec3& origin, const meshes::Vec3& direction) const;
 

@@ -66,7 +66,7 @@ bool corner_value(const Window& window, int level, const Cell& corner, CornerVal
     }
   }
   if (total <= 0) {
-    if (!here.block->valued.test(here.offset)) return false;
+    if (!here.block->valued.test(here.offset) || !here.block->seen.test(here.offset)) return false;
     own_value(window, level, here, out, attributes, 1);
     return true;
   }

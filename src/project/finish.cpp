@@ -64,7 +64,7 @@ struct Signs {
 
 /// A corner's own projected point is better than none when it lies no farther from the average of its samples than
 /// this (support radii).
-constexpr float kLoneReach = 0.7F;
+constexpr float kOwnReach = 0.7F;
 
 /// A corner with trusted neighbours on all sides lies over a small gap between samples, not beyond a rim: their mean is
 /// this near to it (squared, in cells; that of half of the neighbours in a plane is 0.4 away, of one side's 1).
@@ -144,7 +144,7 @@ void finish_tile(const Window& window, int level, const Tile& t, int begin, int 
       const Signs extended = extended_signs(kernel, field, z, cell, wanted);
       // Nobody to extend from.
       const std::uint64_t alone =
-          wanted & ~extended.valued & ~beyond(window, level, *t.leaf, z, kLoneReach) & t.leaf->seen.words[z];
+          wanted & ~extended.valued & ~beyond(window, level, *t.leaf, z, kOwnReach) & t.leaf->seen.words[z];
       signs.positive |= (extended.positive & ~alone) | own_signs(window, level, *t.leaf, z, alone);
       signs.valued |= extended.valued | alone;
       signs.carried |= extended.carried;

@@ -37,7 +37,7 @@ class CellOctree {
   };
   [[nodiscard]] bool is_coarsest(int level) const { return level + 1 == settings_.levels; }
   [[nodiscard]] ZRange cells_of(std::int64_t begin, std::int64_t end, int level) const;
-  void find_block_radii(int level, std::uint32_t block, ZRange z);
+  void find_block_radii(int level, std::uint32_t index, ZRange range);
 
   RadiiSettings settings_;
   std::vector<CellBlocks> levels_;  ///< finest first

@@ -15,9 +15,9 @@ struct Mark {
 /// Notes the sample's home cell. Any order, several threads at once, slabs at will ahead of refine().
 void mark_sample(Window& window, const Mark& mark);
 
-/// Fixes the octree of one slab: cells that samples reach, subdivision, taking part. Samples must be marked up to two
-/// slabs further, and the slab below be refined. A cell is split when a sample of a finer level lies within two of
-/// that level's cells (METHOD 3.4 with the ball of 1.75 cells taken as the cells it can meet).
+/// Fixes the octree of one slab: cells that samples reach, subdivision, taking part. Samples must be marked up to three
+/// slabs further, and the slab below be refined. A cell is split when a sample of a finer level lies within three
+/// of that level's cells (METHOD 3.4 with a wider ball, taken as the cells it can meet).
 void refine_slab(Window& window, std::int32_t slab);
 
 /// Fixes the corners of one slab (its layers of corners, the first plane included) and of them the ones to project.

@@ -43,6 +43,7 @@ constexpr std::array<std::pair<const char*, Maker>, 7> kShapes{{
 
 std::vector<std::string> shape_names() {
   std::vector<std::string> names;
+  names.reserve(kShapes.size());
   for (const auto& [name, maker] : kShapes) names.emplace_back(name);
   return names;
 }

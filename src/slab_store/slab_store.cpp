@@ -43,7 +43,7 @@ void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
   columns.resize(out, count);
   std::vector<std::size_t> first(blocks.size());
   for (std::size_t i = 1; i < blocks.size(); ++i) first[i] = first[i - 1] + blocks[i - 1].count;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size()), [&](const auto& range) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size()), [&, &blocks = blocks](const auto& range) {
     std::vector<std::byte> bytes;
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       bytes.resize(blocks[i].bytes);

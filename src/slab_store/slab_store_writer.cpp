@@ -62,7 +62,7 @@ struct SlabStoreWriter::Impl {
   }
   void find_buckets(const LocalSamples& samples, std::size_t first, std::size_t count);
   void flush_fullest();
-  void flush(std::span<const std::size_t> buckets);
+  void flush(std::span<const std::size_t> which);
 
   StoreSettings settings;
   std::unique_ptr<SlabStore::Impl> store;

@@ -13,8 +13,8 @@
 namespace lamina {
 namespace {
 
-/// Slabs a cell can be touched from: two cells of the coarsest level, each a slab high.
-constexpr std::int32_t kReachSlabs = 2;
+/// Slabs a cell can be touched from: three cells of the coarsest level, each a slab high.
+constexpr std::int32_t kReachSlabs = 3;
 
 ProjectSettings project_settings(const SurfaceSettings& s) {
   ProjectSettings p;

@@ -61,6 +61,11 @@ TEST(TriangleBvh, DistanceIsThatOfBruteForce) {
     for (const auto& t : m.triangles)
       best = std::min(best, squared_distance_to_triangle(p, m.positions[t[0]], m.positions[t[1]], m.positions[t[2]]));
     EXPECT_EQ(tree.distance(p), std::sqrt(best));
+    const NearestTriangle nearest = tree.nearest(p);
+    const auto& t = m.triangles[nearest.triangle];
+    EXPECT_EQ(squared_distance_to_triangle(p, m.positions[t[0]], m.positions[t[1]], m.positions[t[2]]), best);
+    EXPECT_EQ(tree.nearest(p, 1.001 * nearest.distance).triangle, nearest.triangle);
+    EXPECT_GE(tree.nearest(p, 0.999 * nearest.distance).distance, 0.998 * nearest.distance) << "nothing lies nearer";
   }
 }
 

@@ -27,7 +27,7 @@ Truth truth_of(const std::map<Cell, OwnValue>& values, const Cell& c, double cel
     return t;
   }
   double weight = 0;
-  for_trusted_neighbours(values, c, cell, [&](const OwnValue& v, double w, double plane) {
+  for_trusted_neighbours(values, c, cell, [&](const OwnValue& v, double w, double plane, const Cell&) {
     weight += w;
     for (int k = 0; k < channels; ++k) {
       t.channels[k] += w * (k == kDistance ? plane : v.channels[k]);

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <Eigen/Core>
 #include <cmath>
 
 #include "project/projected_scenes.h"
@@ -16,7 +17,9 @@ void finish_all(StreamedCloud& s, const Kernel& kernel, float boundary) {
 
 /// What the rule says of a corner.
 struct Sign {
-  bool positive = true, valued = false, tie = false;
+  bool positive = true, valued = false, carried = false;
+  bool tie = false;   ///< the sign hangs on rounding
+  bool edge = false;  ///< whether it is carried does
 };
 
 Sign sign_of(const std::map<Cell, OwnValue>& values, const Cell& c, double cell, double boundary) {
@@ -28,15 +31,32 @@ Sign sign_of(const std::map<Cell, OwnValue>& values, const Cell& c, double cell,
   } else {
     double sum = 0;
     double terms = 0;
-    for_trusted_neighbours(values, c, cell, [&](const OwnValue& v, double w, double plane) {
+    double total = 0;
+    Eigen::Vector3d offset = Eigen::Vector3d::Zero();
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+    for_trusted_neighbours(values, c, cell, [&](const OwnValue& v, double w, double plane, const Cell& d) {
       out.valued = true;
       sum += w * plane;
+      total += w;
       terms += w * (std::abs(v.channels[kDistance]) + 2 * cell);
+      offset += w * Eigen::Vector3d(d.x, d.y, d.z);
+      normal += w * Eigen::Vector3d(v.channels[kNormalX], v.channels[kNormalY], v.channels[kNormalZ]);
     });
     out.positive = sum >= 0;
     out.tie = out.valued && std::abs(sum) <= 64 * 0x1p-24 * terms;
+    if (out.valued) {
+      // How far the neighbours' mean lies aside, along the surface.
+      const Eigen::Vector3d mean = offset / total;
+      const double aside = (mean - mean.dot(normal) / normal.squaredNorm() * normal).norm();
+      out.carried = aside <= 0.3;
+      out.edge = std::abs(aside - 0.3) < 1e-3 || normal.norm() < 1e-2;
+    } else if (own != values.end() && own->second.seen && own->second.channels[kReach] <= 0.7F) {
+      out.valued = true;
+      out.positive = own->second.channels[kDistance] >= 0;
+    }
   }
   const bool seen = own != values.end() && own->second.seen;
+  out.carried = out.carried || seen;
   if (boundary > 0 && seen && own->second.channels[kReach] > boundary) out.valued = false;
   return out;
 }
@@ -52,21 +72,28 @@ TEST(Finish, SignsAreTheRule) {
       std::size_t guessed = 0;
       std::size_t negative = 0;
       std::size_t beyond = 0;
+      std::size_t surrounded = 0;
       for (int level = 0; level < scene.lattice.levels; ++level) {
         const auto values = own_values(s.window, level, s.first, s.end);
         for_set(s.window, level, s.first, s.end, &CornerBlock::corners,
                 [&](int, const Cell& c, const CornerBlock& leaf, int offset) {
                   const bool positive = leaf.positive.test(offset);
                   const bool valued = leaf.valued.test(offset);
+                  const bool carried = leaf.carried.test(offset);
                   if (leaf.shared.test(offset)) {
                     const Cell fine{c.x * 2, c.y * 2, c.z * 2};
                     const CornerBlock& finer = *s.window.probe(level - 1, block_of(fine));
                     ASSERT_EQ(positive, finer.positive.test(offset_in_block(fine)));
                     ASSERT_EQ(valued, finer.valued.test(offset_in_block(fine)));
+                    ASSERT_EQ(carried, finer.carried.test(offset_in_block(fine)));
                     return;
                   }
                   const Sign truth = sign_of(values, c, scene.lattice.cell_size(level), boundary);
                   ASSERT_EQ(valued, truth.valued) << "level " << level << " " << c.x << " " << c.y << " " << c.z;
+                  if (!truth.edge) {
+                    ASSERT_EQ(carried, truth.carried) << "level " << level << " " << c.x << " " << c.y << " " << c.z;
+                  }
+                  surrounded += carried && !leaf.seen.test(offset) ? 1 : 0;
                   if (!truth.tie) {
                     ASSERT_EQ(positive, truth.positive) << "level " << level << " " << c.x << " " << c.y << " " << c.z;
                   }
@@ -77,7 +104,7 @@ TEST(Finish, SignsAreTheRule) {
                 });
         ASSERT_FALSE(HasFatalFailure());
         // Only corners carry bits.
-        for (const auto mask : {&CornerBlock::positive, &CornerBlock::valued}) {
+        for (const auto mask : {&CornerBlock::positive, &CornerBlock::valued, &CornerBlock::carried}) {
           for_set(s.window, level, s.first, s.end, mask, [&](int, const Cell&, const CornerBlock& leaf, int offset) {
             ASSERT_TRUE(leaf.corners.test(offset));
           });
@@ -87,6 +114,7 @@ TEST(Finish, SignsAreTheRule) {
       EXPECT_GT(extended, 100U);
       EXPECT_GT(guessed, 100U);
       EXPECT_GT(negative, 100U);
+      EXPECT_GT(surrounded, 0U);
       EXPECT_EQ(beyond > 0, boundary > 0);
     }
   }
@@ -104,7 +132,7 @@ TEST(Finish, KernelsThreadsAndOrderGiveTheSameBits) {
         for (std::int32_t slab = s.end - 1; slab >= s.first; --slab) finish_slab(s.window, slab, kernel, 0.5F);
         std::vector<std::set<Cell>> found;
         for (int level = 0; level < scene.lattice.levels; ++level) {
-          for (const auto mask : {&CornerBlock::positive, &CornerBlock::valued}) {
+          for (const auto mask : {&CornerBlock::positive, &CornerBlock::valued, &CornerBlock::carried}) {
             found.push_back(set_cells(s.window, level, s.first, s.end, mask));
           }
         }

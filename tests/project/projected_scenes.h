@@ -63,7 +63,7 @@ void for_trusted_neighbours(const std::map<Cell, OwnValue>& values, const Cell& 
     const std::vector<double>& v = found->second.channels;
     // The corner lies at -d from its neighbour.
     const double plane = v[kDistance] - cell * (v[kNormalX] * d.x + v[kNormalY] * d.y + v[kNormalZ] * d.z);
-    f(found->second, 1.0 / (m * m), plane);
+    f(found->second, 1.0 / (m * m), plane, d);
   }
 }
 

@@ -26,9 +26,9 @@ class OctreeTruth {
     }
     const int top = lattice.levels - 1;
     for (const Sample& s : samples_) {
-      // Whatever reaches two cells of its own level lies within two of the coarsest.
+      // Whatever reaches three cells of its own level lies within three of the coarsest.
       const Cell home{s.home.x >> (top - s.level), s.home.y >> (top - s.level), s.home.z >> (top - s.level)};
-      for_around(home, -2, 2, [&](const Cell& c) { visit(top, c); });
+      for_around(home, -3, 3, [&](const Cell& c) { visit(top, c); });
     }
     for (Level& l : levels) {
       for (const Cell& c : l.cells) for_around(c, 0, 1, [&](const Cell& corner) { l.corners.insert(corner); });
@@ -63,12 +63,12 @@ class OctreeTruth {
     Level& here = levels[static_cast<std::size_t>(level)];
     if (!here.nodes.insert(c).second) return;
     const bool split = std::any_of(samples_.begin(), samples_.end(),
-                                   [&](const Sample& s) { return s.level < level && reaches(s, level, c, 2); });
+                                   [&](const Sample& s) { return s.level < level && reaches(s, level, c, 3); });
     if (split) {
       here.split.insert(c);
       for_around({c.x * 2, c.y * 2, c.z * 2}, 0, 1, [&](const Cell& child) { visit(level - 1, child); });
     } else if (std::any_of(samples_.begin(), samples_.end(),
-                           [&](const Sample& s) { return s.level >= level && reaches(s, level, c, 2); })) {
+                           [&](const Sample& s) { return s.level >= level && reaches(s, level, c, 3); })) {
       here.cells.insert(c);
     }
   }
@@ -84,7 +84,7 @@ class OctreeTruth {
       bool near = false;
       for_around(corner, -1, 0, [&](const Cell& c) {
         near = near || (here.nodes.contains(c) && std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {
-                          return s.level >= level && reaches(s, level, c, 1);
+                          return s.level >= level && reaches(s, level, c, 2);
                         }));
       });
       if (near) here.near.insert(corner);

@@ -24,8 +24,8 @@ struct Marked {
     first = end = 0;
     for (std::size_t i = 0; i < marks.size(); ++i) {
       const std::int32_t s = lattice.slab_of(marks[i].z);
-      first = i == 0 ? s - 2 : std::min(first, s - 2);
-      end = i == 0 ? s + 4 : std::max(end, s + 4);
+      first = i == 0 ? s - 3 : std::min(first, s - 3);
+      end = i == 0 ? s + 5 : std::max(end, s + 5);
     }
   }
   [[nodiscard]] Bounds bounds() const {
@@ -163,15 +163,15 @@ TEST(Refine, OrderOfMarksAndOfPlacingDoesNotMatter) {
   }
 }
 
-TEST(Refine, MarkingRunsTwoSlabsAhead) {
-  // The least that the header asks for: when a slab is refined, samples are marked up to two slabs further.
+TEST(Refine, MarkingRunsThreeSlabsAhead) {
+  // The least that the header asks for: when a slab is refined, samples are marked up to three slabs further.
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const Marked m = random_marks(seed + 2000, 1 + static_cast<int>(seed % 6));
     Window window(m.lattice, 0, m.bounds());
     for (std::int32_t s = m.first; s < m.end; ++s) {
       for (const Mark& mark : m.marks) {
         const std::int32_t at = m.lattice.slab_of(mark.z);
-        if (at == s + 2 || (s == m.first && at < s + 2)) mark_sample(window, mark);
+        if (at == s + 3 || (s == m.first && at < s + 3)) mark_sample(window, mark);
       }
       refine_slab(window, s);
       place_corners(window, s);

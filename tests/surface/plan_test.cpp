@@ -56,7 +56,7 @@ TEST(SurfacePlan, LevelsFollowTheSpreadOfRadii) {
 TEST(SurfacePlan, CellsFollowTheSettings) {
   const Cloud cloud = test::sphere_cloud(20000);
   const double finest = plan_of(cloud).finest_cell;
-  EXPECT_NEAR(plan_of(cloud, [](auto& s) { s.blend = 2; }).finest_cell, 2 * finest, 0.01 * finest);
+  EXPECT_NEAR(plan_of(cloud, [](auto& s) { s.blend *= 2; }).finest_cell, 2 * finest, 0.01 * finest);
   EXPECT_NEAR(plan_of(cloud, [](auto& s) { s.radius_scale = 2; }).finest_cell, 2 * finest, 0.01 * finest);
   const auto in_r = [](double blend) {
     return [blend](auto& s) {

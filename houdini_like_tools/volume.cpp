@@ -1,0 +1,80 @@
+// lamina volume: a mesh as an OpenVDB level set.
+#include "lamina/volume.h"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <memory>
+
+#include "console.h"
+#include "lamina/error.h"
+#include "text.h"
+#include "tool.h"
+
+namespace lamina::tools {
+namespace {
+
+struct VolumeOptions {
+  std::string mesh, output;
+  VolumeSettings settings;
+  RunOptions run;
+};
+
+void run_volume(const VolumeOptions& o) {
+  const RunContext context = make_context(o.run);
+  const TriangleMesh mesh = read_mesh(o.mesh);
+  VolumeStats stats;
+  try {
+    stats = write_volume(mesh, o.settings, o.output, context);
+  } catch (const Error& e) {
+    // The library knows the mesh, not its name.
+    if (e.code() != ExitCode::unreadable && e.code() != ExitCode::empty) throw;
+    throw Error(e.code(), o.mesh + ": " + e.what());
+  }
+  context.info(fmt::format("{} voxels of {:.4g}, {}{}, {}", count_text(stats.voxels), stats.voxel,
+                           stats.has_sign ? "signed" : "unsigned", stats.has_colours ? " with colours" : "",
+                           bytes_text(stats.bytes)));
+}
+
+}  // namespace
+
+void add_volume(CLI::App& app) {
+  auto* tool = app.add_subcommand("volume", "Convert a mesh to an OpenVDB narrow-band level set");
+  auto o = std::make_shared<VolumeOptions>();
+  VolumeSettings& s = o->settings;
+  tool->add_option("MESH", o->mesh, "Mesh to convert: .ply .obj .off .stl, each also as .gz")
+      ->required()
+      ->type_name("");
+  tool->add_option("-o,--output", o->output, "Volume to write: .vdb, - for standard output")
+      ->required()
+      ->type_name("FILE");
+  const std::string grid = "Grid";
+  tool->add_option("--voxel", s.voxel, "Edge of a voxel in the mesh's units; 0: the mean length of its edges")
+      ->type_name("LENGTH")
+      ->capture_default_str()
+      ->group(grid);
+  tool->add_option("--band", s.band, "Half width of the band that holds distances, in voxels")
+      ->type_name("N")
+      ->capture_default_str()
+      ->group(grid);
+  const std::map<std::string, VolumeSign> signs{
+      {"auto", VolumeSign::automatic}, {"inside", VolumeSign::inside}, {"none", VolumeSign::none}};
+  tool->add_option_function<std::string>(
+          "--sign", [&s, signs](const std::string& word) { s.sign = signs.at(word); },
+          "inside: negative inside, a level set; none: distances only; auto: by whether the mesh is closed [auto]")
+      ->check(CLI::IsMember({"auto", "inside", "none"}).description(""))
+      ->type_name("auto|inside|none")
+      ->group(grid);
+  tool->add_option("--name", s.name, "Name of the distance grid")
+      ->type_name("NAME")
+      ->capture_default_str()
+      ->group(grid);
+  tool->add_flag_callback(
+          "--no-colour,--no-color", [&s] { s.colours = false; }, "Leave out the colours (Cd)")
+      ->group(grid);
+  tool->add_flag("--half", s.half, "Store 16-bit floats")->group(grid);
+  add_run_options(*tool, o->run);
+  tool->callback([o] { run_volume(*o); });
+}
+
+}  // namespace lamina::tools

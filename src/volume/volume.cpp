@@ -1,0 +1,174 @@
+#include "lamina/volume.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "lamina/error.h"
+#include "lamina/version.h"
+#include "measure/edge_table.h"
+#include "meshes/output_file.h"
+#include "meshes/vec3.h"
+#include "meshes/with_threads.h"
+#include "volume/level_set.h"
+#include "volume/vdb_bytes.h"
+
+namespace lamina {
+namespace {
+
+using namespace meshes;
+
+[[noreturn]] void usage(const std::string& message) {
+  throw Error(ExitCode::usage, message);
+}
+
+void check_settings(const VolumeSettings& s) {
+  if (!(s.voxel >= 0 && std::isfinite(s.voxel))) usage("--voxel must be a positive length, or 0 for the mean edge");
+  if (!(s.band >= 1 && s.band <= 1000)) usage("--band must be in 1..1000 voxels");
+  if (s.name.empty() || s.name == "Cd") usage("--name must be a word other than Cd, which is the colours' name");
+}
+
+struct Edges {
+  std::uint64_t boundary = 0;
+  double mean_length = 0;
+};
+
+Edges look_at_edges(const TriangleMesh& mesh) {
+  Edges edges;
+  double sum = 0;
+  std::uint64_t count = 0;
+  measure::EdgeTable(mesh).for_each_edge([&](std::span<const measure::Side> sides) {
+    const std::uint32_t corner = sides[0].corner, next = sides[0].next_corner();
+    const auto at = [&](std::uint32_t c) { return mesh.positions[mesh.triangles[c / 3][c % 3]]; };
+    sum += norm(at(next) - at(corner));
+    ++count;
+    edges.boundary += sides.size() == 1;
+  });
+  if (count > 0) edges.mean_length = sum / static_cast<double>(count);
+  return edges;
+}
+
+double area_of(const TriangleMesh& mesh) {
+  double area = 0;
+  for (const auto& t : mesh.triangles) {
+    const Vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
+    area += 0.5 * norm(cross(b - a, c - a));
+  }
+  return area;
+}
+
+/// Voxels lie on multiples of their edge. OpenVDB's converter judges sides in floats: voxel numbers are counted from
+/// the origin only as long as these can tell them apart, else from the middle of the mesh.
+openvdb::math::Transform::Ptr choose_transform(const TriangleMesh& mesh, double voxel, double band) {
+  constexpr double kFromOrigin = 1 << 20, kLargest = 1 << 30;
+  Vec3 low = mesh.positions[0], high = low;
+  for (const Vec3& p : mesh.positions)
+    for (std::size_t k = 0; k < 3; ++k) low[k] = std::min(low[k], p[k]), high[k] = std::max(high[k], p[k]);
+  double reach = 0, extent = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    reach = std::max({reach, -low[k], high[k]});
+    extent = std::max(extent, high[k] - low[k]);
+  }
+  if (0.5 * extent / voxel + band > kLargest || reach / voxel > kLargest * kFromOrigin)
+    usage(fmt::format("--voxel {:g}: too small for a mesh of this size ({:g}, coordinates up to {:g})", voxel, extent,
+                      reach));
+  auto transform = openvdb::math::Transform::createLinearTransform(voxel);
+  if (reach / voxel <= kFromOrigin) return transform;
+  openvdb::Vec3d middle;
+  for (int k = 0; k < 3; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    middle[k] = voxel * std::round((low[i] + 0.5 * (high[i] - low[i])) / voxel);
+  }
+  transform->postTranslate(middle);
+  return transform;
+}
+
+/// Bytes in leaves: the band's volume at four bytes a voxel for the distance, four for OpenVDB's nearest triangles and
+/// twelve for the colour; leaves are about half full.
+void check_memory(const TriangleMesh& mesh, const VolumeSettings& s, double voxel, bool colours,
+                  const RunContext& run) {
+  if (run.max_memory == 0) return;
+  const double band = area_of(mesh) / (voxel * voxel) * 2 * (s.band + 1);
+  const double bytes = 2 * band * (colours ? 20 : 8) + 60.0 * static_cast<double>(mesh.triangles.size());
+  if (bytes <= static_cast<double>(run.max_memory)) return;
+  throw Error(ExitCode::budget,
+              fmt::format("a voxel of {:g} needs about {:.0f} MB, --max-memory allows {:.0f} MB; with --voxel {:.2g} "
+                          "it would fit",
+                          voxel, bytes / 1e6, static_cast<double>(run.max_memory) / 1e6,
+                          voxel * std::sqrt(bytes / static_cast<double>(run.max_memory))));
+}
+
+/// What a 16-bit float holds: up to 65504, steps of 2^-24 near zero.
+void check_half(double voxel, double band, const RunContext& run) {
+  if (voxel * band > 65504) usage(fmt::format("--half cannot hold distances up to {:g}", voxel * band));
+  if (voxel < 100 * 0x1p-24)
+    run.warn(fmt::format("16-bit distances are coarse for voxels of {:g}; leave out --half", voxel));
+}
+
+void describe(openvdb::GridBase& grid, const std::string& name, bool half) {
+  grid.setName(name);
+  grid.setCreator(fmt::format("lamina {}", version()));
+  grid.setSaveFloatAsHalf(half);
+}
+
+bool decide_sign(const VolumeSettings& s, std::uint64_t boundary_edges, const RunContext& run) {
+  if (s.sign == VolumeSign::none) return false;
+  if (boundary_edges == 0) return true;
+  if (s.sign == VolumeSign::inside) {
+    run.warn(fmt::format("the mesh is open ({} boundary edges): what a hole wider than a voxel opens counts as outside",
+                         boundary_edges));
+    return true;
+  }
+  run.info(fmt::format("the mesh is open ({} boundary edges): distances without a sign", boundary_edges));
+  return false;
+}
+
+VolumeStats convert(const TriangleMesh& mesh, const VolumeSettings& s, const std::string& path, const RunContext& run) {
+  const Edges edges = look_at_edges(mesh);
+  if (!(edges.mean_length > 0)) throw Error(ExitCode::empty, "the mesh has no area: all its vertices coincide");
+  VolumeStats stats;
+  stats.voxel = s.voxel > 0 ? s.voxel : edges.mean_length;
+  stats.boundary_edges = edges.boundary;
+  const auto transform = choose_transform(mesh, stats.voxel, s.band);
+  if (s.half) check_half(stats.voxel, s.band, run);
+  check_memory(mesh, s, stats.voxel, s.colours, run);
+  meshes::OutputFile out(path);  // an output that cannot be written is refused before the work
+  stats.has_sign = decide_sign(s, edges.boundary, run);
+
+  openvdb::initialize();
+  const measure::TriangleBvh triangles(mesh);
+  const auto distances = volume::distance_grid(mesh, triangles, *transform, s.band, stats.has_sign, run);
+  stats.voxels = distances->activeVoxelCount();
+  distances->setGridClass(stats.has_sign ? openvdb::GRID_LEVEL_SET : openvdb::GRID_UNKNOWN);
+  describe(*distances, s.name, s.half);
+  openvdb::GridCPtrVec grids{distances};
+  if (const auto colours = s.colours ? volume::colour_grid(mesh, triangles, *distances) : nullptr) {
+    stats.has_colours = true;
+    colours->setVectorType(openvdb::VEC_INVARIANT);
+    describe(*colours, "Cd", s.half);
+    grids.push_back(colours);
+  }
+  if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+  const std::string bytes = volume::vdb_bytes(grids);
+  out.write(bytes);
+  out.commit();
+  stats.bytes = bytes.size();
+  return stats;
+}
+
+}  // namespace
+
+VolumeStats write_volume(const TriangleMesh& mesh, const VolumeSettings& settings, const std::string& path,
+                         const RunContext& run) {
+  check_settings(settings);
+  if (mesh.triangles.empty())
+    throw Error(ExitCode::unreadable, "the mesh has no triangles (a point cloud? reconstruct it first)");
+  if (mesh.triangles.size() > 0x7FFFFFFFu / 3)
+    throw Error(ExitCode::unreadable, "meshes of more than 715,827,882 triangles are not supported");
+  VolumeStats stats;
+  meshes::with_threads(run.threads, [&] { stats = convert(mesh, settings, path, run); });
+  return stats;
+}
+
+}  // namespace lamina
