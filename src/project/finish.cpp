@@ -4,6 +4,9 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
+
+#include "window/bits.h"
 
 namespace lamina {
 namespace {
@@ -39,7 +42,21 @@ void gather_block(const Window& window, int level, const CornerBlock& from, int 
   }
 }
 
-void gather_field(const Window& window, int level, const Block& b, int begin, int end, CornerField& f) {
+/// The trusted corners of a block and of its 26 neighbours.
+bits::Neighbourhood good_around(const std::array<const CornerBlock*, 27>& around) {
+  bits::Neighbourhood n{};
+  for (int i = 0; i < 27; ++i) n[i / 9][i / 3 % 3][i % 3] = around[i] == nullptr ? nullptr : &around[i]->good;
+  return n;
+}
+
+std::array<const CornerBlock*, 27> blocks_around(const Window& window, int level, const Block& b) {
+  std::array<const CornerBlock*, 27> around{};
+  for (int i = 0; i < 27; ++i) around[i] = window.probe(level, {b.x + i % 3 - 1, b.y + i / 3 % 3 - 1, b.z + i / 9 - 1});
+  return around;
+}
+
+void gather_field(const Window& window, int level, const std::array<const CornerBlock*, 27>& around, int begin, int end,
+                  CornerField& f) {
   for (auto* a : {&f.distance, &f.nx, &f.ny, &f.nz, &f.trusted}) {
     std::fill(a->begin() + begin * CornerField::kPlane, a->begin() + (end + 2) * CornerField::kPlane, 0.0F);
   }
@@ -49,7 +66,7 @@ void gather_field(const Window& window, int level, const Block& b, int begin, in
     if (from >= to) continue;
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dx = -1; dx <= 1; ++dx) {
-        const CornerBlock* block = window.probe(level, {b.x + dx, b.y + dy, b.z + dz});
+        const CornerBlock* block = around[13 + dx + 3 * dy + 9 * dz];
         if (block == nullptr) continue;
         for (int z = from; z < to; ++z) gather_block(window, level, *block, dx, dy, z - dz * 8, z, f);
       }
@@ -127,6 +144,8 @@ Signs extended_signs(const Kernel& kernel, const CornerField& field, int z, floa
 void finish_tile(const Window& window, int level, const Tile& t, int begin, int end, const Kernel& kernel,
                  float boundary, CornerField& field) {
   const auto cell = static_cast<float>(window.lattice().cell_size(level));
+  const std::array<const CornerBlock*, 27> around = blocks_around(window, level, t.block);
+  const bits::Neighbourhood trusted = good_around(around);
   bool gathered = false;
   for (int z = begin; z < end; ++z) {
     const std::uint64_t corners = t.leaf->corners.words[z];
@@ -139,13 +158,18 @@ void finish_tile(const Window& window, int level, const Tile& t, int begin, int 
     signs.valued |= good & ~shared;
     signs.carried |= t.leaf->seen.words[z] & ~shared;
     if (const std::uint64_t wanted = corners & ~shared & ~good; wanted != 0) {
-      if (!gathered) gather_field(window, level, t.block, begin, end, field);
-      gathered = true;
-      const Signs extended = extended_signs(kernel, field, z, cell, wanted);
+      Signs extended;
+      if (const std::uint64_t beside = wanted & bits::dilate_layer(trusted, z, -1, 1); beside != 0) {
+        if (!gathered) gather_field(window, level, around, begin, end, field);
+        gathered = true;
+        extended = extended_signs(kernel, field, z, cell, beside);
+      }
       // Nobody to extend from.
-      const std::uint64_t alone =
-          wanted & ~extended.valued & ~beyond(window, level, *t.leaf, z, kOwnReach) & t.leaf->seen.words[z];
-      signs.positive |= (extended.positive & ~alone) | own_signs(window, level, *t.leaf, z, alone);
+      const std::uint64_t lone = wanted & ~extended.valued;
+      std::uint64_t alone = lone & t.leaf->seen.words[z];
+      if (alone != 0) alone &= ~beyond(window, level, *t.leaf, z, kOwnReach);
+      signs.positive |= (extended.positive & extended.valued) | (lone & ~alone);
+      if (alone != 0) signs.positive |= own_signs(window, level, *t.leaf, z, alone);
       signs.valued |= extended.valued | alone;
       signs.carried |= extended.carried;
     }

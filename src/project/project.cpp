@@ -141,6 +141,11 @@ struct Tally {
   std::uint64_t seen = 0, good = 0;
 };
 
+/// Whether a sample close enough contributed to a corner.
+bool is_seen(const Lanes* sums, int lane) {
+  return sums[kW][lane] > 0 && sums[kNearest][lane] <= 1;
+}
+
 /// Fits every query of a tile and stores what the later stages need.
 Tally store(const Kernel& kernel, const ProjectSettings& settings, const Window& window, int level, const Work& work,
             const TileState& state, const std::vector<Query>& queries) {
@@ -152,13 +157,16 @@ Tally store(const Kernel& kernel, const ProjectSettings& settings, const Window&
   FitOutput out{};
   for (std::size_t g = 0; g < state.points.size(); ++g) {
     const Lanes* sums = &state.sums[g * channels];
+    bool any = false;
+    for (int l = 0; l < kLanes; ++l) any = any || is_seen(sums, l);
+    if (!any) continue;
     kernel.fit(sums, fit_input(state, queries, g, settings.fit, shift_of(settings)), out);
     for (std::size_t i = g * kLanes; i < std::min(queries.size(), (g + 1) * kLanes); ++i) {
       const int l = static_cast<int>(i - g * kLanes);
       const Query& q = queries[i];
       const int offset = BlockMask::offset(q.x, q.y, q.z);
       const bool has_normal = out.nx[l] != 0 || out.ny[l] != 0 || out.nz[l] != 0;
-      if (sums[kW][l] <= 0 || !has_normal || sums[kNearest][l] > 1) continue;
+      if (!is_seen(sums, l) || !has_normal) continue;
       const bool good =
           out.reach[l] <= settings.good_reach && sums[kSeen][l] >= static_cast<float>(settings.good_samples);
       points.seen.set(offset);

@@ -108,12 +108,13 @@ void RowSamples::gather(const Lattice& lattice, int level, const Block& block, c
       visit(k, *batch[bucket], index[k] - base);
     }
   };
-  const auto row_of = [](std::int64_t steps, std::int32_t cell) {
-    const std::int64_t r = (steps >= 0 ? steps / cell : -((-steps + cell - 1) / cell)) - kLow;
-    return static_cast<int>(std::clamp<std::int64_t>(r, 0, kRows - 1));
+  // Rows by the very coordinates the sums use: what ranges() cuts off lies beyond the support in these, too.
+  const auto row_of = [inv](std::int64_t steps) {
+    return static_cast<int>(std::clamp(std::floor(static_cast<float>(steps) * inv) - static_cast<float>(kLow), 0.0F,
+                                       static_cast<float>(kRows - 1)));
   };
   walk([&](std::size_t k, const ActiveBucket& b, std::size_t i) {
-    const int row = row_of(b.samples.z[i] - oz, a) * kRows + row_of(b.samples.y[i] - oy, a);
+    const int row = row_of(b.samples.z[i] - oz) * kRows + row_of(b.samples.y[i] - oy);
     row_[k] = static_cast<std::uint16_t>(row);
     ++row_begin_[static_cast<std::size_t>(row) + 1];
   });

@@ -16,8 +16,8 @@ namespace {
 /// Cells a sample reaches around its home. A radius is estimated too small by up to a fifth and a cell may be less than
 /// half of it, so gaps between samples are up to five cells wide: with two, they came out as holes.
 constexpr int kReachCells = 3;
-/// Cells around the home whose corners are projected: those within two cells of the sample, and some.
-constexpr int kCloseCells = 2;
+/// Cells around the home whose corners are projected; with two, nothing gained and half as many corners more.
+constexpr int kCloseCells = 1;
 
 bits::Neighbourhood gather(const Window& window, int level, const Block& b, BlockMask CornerBlock::*mask) {
   bits::Neighbourhood n{};

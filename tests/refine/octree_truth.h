@@ -84,7 +84,7 @@ class OctreeTruth {
       bool near = false;
       for_around(corner, -1, 0, [&](const Cell& c) {
         near = near || (here.nodes.contains(c) && std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {
-                          return s.level >= level && reaches(s, level, c, 2);
+                          return s.level >= level && reaches(s, level, c, 1);
                         }));
       });
       if (near) here.near.insert(corner);
