@@ -233,6 +233,8 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
   for (int level = 0; level < window.levels(); ++level) {
     const std::vector<Work> work = list_work(window, level, slab, settings_.centres);
     if (work.empty()) continue;
+    std::vector<Block> blocks;
+    for (const Work& w : work) blocks.push_back(w.tile.block);
     const std::int32_t first = lattice.first_layer(level, slab);
     const std::int32_t end = first + lattice.layers(level);
     const float level_margin = settings_.steps > 1 ? kStepLimit * static_cast<float>(lattice.cell_size(level)) : 0.0F;
@@ -244,7 +246,7 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
       const float halo = batches.size() == 1 || step > 0 ? level_margin : 0.0F;
       for (std::size_t b = 0; b < batches.size(); ++b) {
         const Batch batch = feed.load(batches[b]);
-        const TileBins bins = bin_samples(window, level, batch, first, end, work.size(), halo, shift_of(settings_));
+        const TileBins bins = bin_samples(window, level, batch, first, end, blocks, halo, shift_of(settings_));
         tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t t) {
           Scratch::Local& local = scratch_->local.local();
           list_queries(work[t], local.queries);

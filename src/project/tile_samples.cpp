@@ -28,8 +28,8 @@ std::int32_t floor_cell(double x) {
   return static_cast<std::int32_t>(std::floor(x));
 }
 
-void bin_piece(const Window& window, int level, const Piece& piece, std::int32_t first, std::int32_t end, float margin,
-               double shift, std::vector<Entry>& out) {
+void bin_piece(const Window& window, int level, const Piece& piece, std::int32_t first, std::int32_t end,
+               std::span<const Block> tiles, float margin, double shift, std::vector<Entry>& out) {
   const double inv = 1.0 / window.lattice().cell_size(level);
   const LocalSamples& s = piece.bucket->samples;
   for (std::size_t i = piece.begin; i < piece.end; ++i) {
@@ -45,6 +45,15 @@ void bin_piece(const Window& window, int level, const Piece& piece, std::int32_t
     const std::int32_t x1 = floor_cell(x + reach) >> 3;
     const std::int32_t y0 = ceil_cell(y - reach) >> 3;
     const std::int32_t y1 = floor_cell(y + reach) >> 3;
+    // A support far larger than a tile reaches more places than there are tiles.
+    if ((double{1} + x1 - x0) * (double{1} + y1 - y0) > static_cast<double>(tiles.size())) {
+      for (std::size_t t = 0; t < tiles.size(); ++t) {
+        const Block& b = tiles[t];
+        if (b.x < x0 || b.x > x1 || b.y < y0 || b.y > y1 || b.z < (z0 >> 3) || b.z > (z1 >> 3)) continue;
+        out.push_back({static_cast<std::uint32_t>(t), piece.base + static_cast<std::uint32_t>(i)});
+      }
+      continue;
+    }
     for (std::int32_t bz = z0 >> 3; bz <= (z1 >> 3); ++bz) {
       for (std::int32_t by = y0; by <= y1; ++by) {
         for (std::int32_t bx = x0; bx <= x1; ++bx) {
@@ -60,7 +69,7 @@ void bin_piece(const Window& window, int level, const Piece& piece, std::int32_t
 }  // namespace
 
 TileBins bin_samples(const Window& window, int level, const Batch& batch, std::int32_t first, std::int32_t end,
-                     std::size_t tiles, float margin, double shift) {
+                     std::span<const Block> tiles, float margin, double shift) {
   std::vector<Piece> pieces;
   std::uint32_t base = 0;
   for (const auto& bucket : batch) {
@@ -69,15 +78,16 @@ TileBins bin_samples(const Window& window, int level, const Batch& batch, std::i
     base += static_cast<std::uint32_t>(n);
   }
   std::vector<std::vector<Entry>> entries(pieces.size());
-  tbb::parallel_for(std::size_t{0}, pieces.size(),
-                    [&](std::size_t p) { bin_piece(window, level, pieces[p], first, end, margin, shift, entries[p]); });
+  tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t p) {
+    bin_piece(window, level, pieces[p], first, end, tiles, margin, shift, entries[p]);
+  });
   TileBins bins;
-  bins.begin.assign(tiles + 1, 0);
+  bins.begin.assign(tiles.size() + 1, 0);
   for (const auto& piece : entries) {
     for (const Entry& e : piece) ++bins.begin[e.tile + 1];
   }
-  for (std::size_t t = 0; t < tiles; ++t) bins.begin[t + 1] += bins.begin[t];
-  bins.index.resize(bins.begin[tiles]);
+  for (std::size_t t = 0; t < tiles.size(); ++t) bins.begin[t + 1] += bins.begin[t];
+  bins.index.resize(bins.begin.back());
   std::vector<std::uint64_t> cursor(bins.begin.begin(), bins.begin.end() - 1);
   for (const auto& piece : entries) {
     for (const Entry& e : piece) bins.index[cursor[e.tile]++] = e.sample;

@@ -1,6 +1,7 @@
 // Finding the samples of a tile: binning with halo, and gathering in rows.
 #pragma once
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "feed/sample_feed.h"
@@ -17,10 +18,10 @@ struct TileBins {
 };
 
 /// Bins a batch into the tiles of a level: a sample goes to every tile that has a lattice point (of the layers [first,
-/// end)) within its support + margin. Points lie `shift` cells above the corners (0: corners, 0.5: cell centres). Tiles
-/// are found by CornerBlock::task. Deterministic for any number of threads.
+/// end)) within its support + margin. Points lie `shift` cells above the corners (0: corners, 0.5: cell centres). Every
+/// tile's CornerBlock::task is its index in `tiles`. Deterministic for any number of threads.
 TileBins bin_samples(const Window& window, int level, const Batch& batch, std::int32_t first, std::int32_t end,
-                     std::size_t tiles, float margin, double shift);
+                     std::span<const Block> tiles, float margin, double shift);
 
 /// A tile's samples sorted by rows of cells (z, then y; inside a row in the order of the batch).
 class RowSamples {
