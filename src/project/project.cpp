@@ -40,6 +40,7 @@ struct Projector::Scratch {
     TileState state;
   };
   tbb::enumerable_thread_specific<Local> local;
+  PackedBatch packed;
 };
 
 namespace {
@@ -230,6 +231,8 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
   std::atomic<std::uint64_t> corners = 0;
   std::atomic<std::uint64_t> seen = 0;
   std::atomic<std::uint64_t> good = 0;
+  PackedBatch& packed = scratch_->packed;
+  std::size_t packed_number = batches.size();  // of the batch that is packed: a lone one stays so for all levels
   for (int level = 0; level < window.levels(); ++level) {
     const std::vector<Work> work = list_work(window, level, slab, settings_.centres);
     if (work.empty()) continue;
@@ -246,6 +249,8 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
       const float halo = batches.size() == 1 || step > 0 ? level_margin : 0.0F;
       for (std::size_t b = 0; b < batches.size(); ++b) {
         const Batch batch = feed.load(batches[b]);
+        if (packed_number != b) pack(batch, lattice, packed);
+        packed_number = b;
         const TileBins bins = bin_samples(window, level, batch, first, end, blocks, halo, shift_of(settings_));
         tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t t) {
           Scratch::Local& local = scratch_->local.local();
@@ -259,7 +264,7 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
               advance(kernel_, settings_, state, local.queries, channels);
             }
           }
-          local.rows.gather(lattice, level, work[t].tile.block, batch, bins.index.data() + bins.begin[t],
+          local.rows.gather(lattice, level, work[t].tile.block, packed, bins.index.data() + bins.begin[t],
                             bins.begin[t + 1] - bins.begin[t], settings_.band);
           accumulate(kernel_, local.rows, state, channels);
           if (b + 1 < batches.size()) return;

@@ -15,6 +15,9 @@ struct Entry {
 /// Samples per piece of work; fixed, so that the order does not depend on the number of threads.
 constexpr std::size_t kPiece = 1u << 14;
 
+/// Samples fetched ahead of their turn.
+constexpr std::size_t kPrefetch = 24;
+
 struct Piece {
   const ActiveBucket* bucket;
   std::size_t begin, end;
@@ -95,7 +98,26 @@ TileBins bin_samples(const Window& window, int level, const Batch& batch, std::i
   return bins;
 }
 
-void RowSamples::gather(const Lattice& lattice, int level, const Block& block, const Batch& batch,
+void pack(const Batch& batch, const Lattice& lattice, PackedBatch& out) {
+  std::vector<std::size_t> base(batch.size() + 1, 0);
+  for (std::size_t b = 0; b < batch.size(); ++b) base[b + 1] = base[b] + batch[b]->samples.size();
+  out.attribute_count = batch.empty() ? 0 : batch.front()->samples.attributes.size();
+  out.samples.resize(base.back());
+  out.attributes.resize(base.back() * out.attribute_count);
+  tbb::parallel_for(std::size_t{0}, batch.size(), [&](std::size_t b) {
+    const ActiveBucket& bucket = *batch[b];
+    const LocalSamples& s = bucket.samples;
+    for (std::size_t i = 0; i < s.size(); ++i) {
+      const auto cell = static_cast<float>(lattice.cell_size(bucket.level[i]));
+      out.samples[base[b] + i] = {s.x[i],          s.y[i], s.z[i], s.nx[i], s.ny[i], s.nz[i], cell, bucket.support[i],
+                                  bucket.weight[i]};
+      for (std::size_t c = 0; c < out.attribute_count; ++c)
+        out.attributes[(base[b] + i) * out.attribute_count + c] = s.attributes[c][i];
+    }
+  });
+}
+
+void RowSamples::gather(const Lattice& lattice, int level, const Block& block, const PackedBatch& batch,
                         const std::uint32_t* index, std::size_t count, float band) {
   const std::int32_t a = lattice.cell_size(level);
   const float inv = 1.0F / static_cast<float>(a);
@@ -103,52 +125,47 @@ void RowSamples::gather(const Lattice& lattice, int level, const Block& block, c
   const std::int64_t ox = std::int64_t{block.x} * 8 * a;
   const std::int64_t oy = std::int64_t{block.y} * 8 * a;
   const std::int64_t oz = std::int64_t{block.z} * 8 * a;
-  const std::size_t attributes = batch.empty() ? 0 : batch.front()->samples.attributes.size();
+  const std::size_t attributes = batch.attribute_count;
   samples_.resize(count, attributes);
   row_.resize(count);
   row_begin_.assign(kRows * kRows + 1, 0);
   max_support_ = 0;
 
-  const auto walk = [&](const auto& visit) {
-    std::size_t bucket = 0;
-    std::uint32_t base = 0;
-    for (std::size_t k = 0; k < count; ++k) {
-      while (index[k] - base >= batch[bucket]->samples.size())
-        base += static_cast<std::uint32_t>(batch[bucket++]->samples.size());
-      visit(k, *batch[bucket], index[k] - base);
-    }
-  };
   // Rows by the very coordinates the sums use: what ranges() cuts off lies beyond the support in these, too.
   const auto row_of = [inv](std::int64_t steps) {
     return static_cast<int>(std::clamp(std::floor(static_cast<float>(steps) * inv) - static_cast<float>(kLow), 0.0F,
                                        static_cast<float>(kRows - 1)));
   };
-  walk([&](std::size_t k, const ActiveBucket& b, std::size_t i) {
-    const int row = row_of(b.samples.z[i] - oz) * kRows + row_of(b.samples.y[i] - oy);
+  for (std::size_t k = 0; k < count; ++k) {
+    // Tiles of clouds in random order find their samples all over the batch, which no cache holds.
+    __builtin_prefetch(&batch.samples[index[std::min(k + kPrefetch, count - 1)]]);
+    const PackedSample& s = batch.samples[index[k]];
+    const int row = row_of(s.z - oz) * kRows + row_of(s.y - oy);
     row_[k] = static_cast<std::uint16_t>(row);
     ++row_begin_[static_cast<std::size_t>(row) + 1];
-  });
+  }
   for (std::size_t r = 0; r < kRows * kRows; ++r) row_begin_[r + 1] += row_begin_[r];
   std::array<std::uint32_t, kRows * kRows> cursor{};
   std::copy_n(row_begin_.begin(), kRows * kRows, cursor.begin());
-  walk([&](std::size_t k, const ActiveBucket& b, std::size_t i) {
+  for (std::size_t k = 0; k < count; ++k) {
+    const PackedSample& s = batch.samples[index[k]];
     const std::uint32_t to = cursor[row_[k]]++;
-    const LocalSamples& s = b.samples;
-    samples_.x[to] = static_cast<float>(s.x[i] - ox) * inv;
-    samples_.y[to] = static_cast<float>(s.y[i] - oy) * inv;
-    samples_.z[to] = static_cast<float>(s.z[i] - oz) * inv;
-    samples_.nx[to] = s.nx[i];
-    samples_.ny[to] = s.ny[i];
-    samples_.nz[to] = s.nz[i];
-    const float support = b.support[i] * inv;
-    const float reach = band * static_cast<float>(lattice.cell_size(b.level[i])) * inv;
+    samples_.x[to] = static_cast<float>(s.x - ox) * inv;
+    samples_.y[to] = static_cast<float>(s.y - oy) * inv;
+    samples_.z[to] = static_cast<float>(s.z - oz) * inv;
+    samples_.nx[to] = s.nx;
+    samples_.ny[to] = s.ny;
+    samples_.nz[to] = s.nz;
+    const float support = s.support * inv;
+    const float reach = band * s.cell * inv;
     samples_.support[to] = support;
     samples_.inv_support2[to] = 1.0F / (support * support);
     samples_.inv_band2[to] = 1.0F / (reach * reach);
-    samples_.weight[to] = b.weight[i];
-    for (std::size_t c = 0; c < attributes; ++c) samples_.attributes[c][to] = s.attributes[c][i];
+    samples_.weight[to] = s.weight;
+    const float* const own = batch.attributes.data() + index[k] * attributes;
+    for (std::size_t c = 0; c < attributes; ++c) samples_.attributes[c][to] = own[c];
     max_support_ = std::max(max_support_, support);
-  });
+  }
 }
 
 int RowSamples::ranges(float y_lo, float y_hi, float z_lo, float z_hi, SampleRange* out) const {

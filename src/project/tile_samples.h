@@ -23,6 +23,22 @@ struct TileBins {
 TileBins bin_samples(const Window& window, int level, const Batch& batch, std::int32_t first, std::int32_t end,
                      std::span<const Block> tiles, float margin, double shift);
 
+/// What projection needs of a sample, side by side: tiles pick their samples here and there, each from one line of the
+/// cache.
+struct PackedSample {
+  std::int32_t x, y, z;  ///< steps
+  float nx, ny, nz;
+  float cell;             ///< of its level, steps
+  float support, weight;  ///< as in ActiveBucket
+};
+struct PackedBatch {
+  std::vector<PackedSample> samples;  ///< bucket after bucket, as TileBins counts them
+  std::size_t attribute_count = 0;
+  std::vector<float> attributes;  ///< sample after sample
+};
+/// Reuses what `out` holds.
+void pack(const Batch& batch, const Lattice& lattice, PackedBatch& out);
+
 /// A tile's samples sorted by rows of cells (z, then y; inside a row in the order of the batch).
 class RowSamples {
  public:
@@ -31,8 +47,8 @@ class RowSamples {
   static constexpr int kRows = 16;
 
   /// `band`: ProjectSettings::band.
-  void gather(const Lattice& lattice, int level, const Block& block, const Batch& batch, const std::uint32_t* index,
-              std::size_t count, float band);
+  void gather(const Lattice& lattice, int level, const Block& block, const PackedBatch& batch,
+              const std::uint32_t* index, std::size_t count, float band);
   [[nodiscard]] const TileSamples& samples() const { return samples_; }
   /// Ranges of samples within the largest support of a box (cells relative to the tile); `out` has kRows entries.
   int ranges(float y_lo, float y_hi, float z_lo, float z_hi, SampleRange* out) const;

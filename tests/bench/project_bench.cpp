@@ -113,6 +113,8 @@ void find_samples(benchmark::State& state, const Scene& scene, bool gather) {
       const std::int64_t height = lattice.slab_height();
       for (const auto& numbers : replay->feed().batches(slab * height, (slab + 1) * height, 0)) {
         const Batch batch = replay->feed().load(numbers);
+        PackedBatch packed;
+        if (gather) pack(batch, lattice, packed);
         for (int level = 0; level < window.levels(); ++level) {
           const std::vector<Tile> tiles = window.tiles(level, slab);
           std::uint32_t task = 0;
@@ -127,7 +129,7 @@ void find_samples(benchmark::State& state, const Scene& scene, bool gather) {
           for (std::size_t t = 0; t < tiles.size(); ++t) {
             tiles[t].leaf->task = CornerBlock::kNoTask;
             if (!gather) continue;
-            rows.gather(lattice, level, tiles[t].block, batch, bins.index.data() + bins.begin[t],
+            rows.gather(lattice, level, tiles[t].block, packed, bins.index.data() + bins.begin[t],
                         bins.begin[t + 1] - bins.begin[t], ProjectSettings{}.band);
           }
         }

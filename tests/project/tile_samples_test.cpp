@@ -144,7 +144,9 @@ TEST(TileSamples, RowsHoldEverySampleOnceInCells) {
       if (all[s].bucket->support[all[s].i] > 0 && random() % 3 != 0) index.push_back(s);
     }
     RowSamples rows;
-    rows.gather(lattice, level, block, batch, index.data(), index.size(), 1.75F);
+    PackedBatch packed;
+    pack(batch, lattice, packed);
+    rows.gather(lattice, level, block, packed, index.data(), index.size(), 1.75F);
     const TileSamples& t = rows.samples();
     ASSERT_EQ(t.x.size(), index.size());
     const double a = lattice.cell_size(level);
