@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 #include <vector>
 
 #include "measure/edge_table.h"
@@ -54,7 +55,9 @@ std::uint64_t count_duplicate_vertices(const TriangleMesh& mesh) {
     for (const double c : p[i]) h = mix(h, std::bit_cast<std::uint64_t>(c + 0.0));  // -0 becomes 0
     return h;
   };
-  const auto is_nan = [&](std::uint32_t i) { return p[i] != p[i]; };
+  const auto is_nan = [&](std::uint32_t i) {
+    return std::any_of(p[i].begin(), p[i].end(), [](double c) { return std::isnan(c); });
+  };
   DuplicateCounter counter(p.size(), hash, [&](std::uint32_t a, std::uint32_t b) { return p[a] == p[b]; });
   for (std::uint32_t i = 0; i < p.size(); ++i)
     if (!is_nan(i)) counter.add(i);

@@ -18,8 +18,11 @@ void TileSamples::resize(std::size_t n, std::size_t attribute_count) {
 std::vector<Kernel> available_kernels() {
   __builtin_cpu_init();
   std::vector<Kernel> kernels{kernel_v2::kernel()};
-  const bool v3 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
-                  __builtin_cpu_supports("bmi2") && __builtin_cpu_supports("f16c") && __builtin_cpu_supports("movbe");
+  bool v3 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
+            __builtin_cpu_supports("bmi2");
+#ifndef __clang__  // which knows no names for the rest of v3 before its version 19
+  v3 = v3 && __builtin_cpu_supports("f16c") && __builtin_cpu_supports("movbe");
+#endif
   if (v3) kernels.push_back(kernel_v3::kernel());
   const bool v4 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
                   __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&

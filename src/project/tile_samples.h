@@ -1,6 +1,7 @@
 // Finding the samples of a tile: binning with halo, and gathering in rows.
 #pragma once
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "feed/sample_feed.h"
@@ -17,10 +18,10 @@ struct TileBins {
 };
 
 /// Bins a batch into the tiles of a level: a sample goes to every tile that has a lattice point (of the layers [first,
-/// end)) within its support + margin. Points lie `shift` cells above the corners (0: corners, 0.5: cell centres). Tiles
-/// are found by CornerBlock::task. Deterministic for any number of threads.
-TileBins bin_samples(const Window& window, int level, const Batch& batch, std::int32_t first, std::int32_t end,
-                     std::size_t tiles, float margin, double shift);
+/// end)) within its support + margin. Points lie `shift` cells above the corners (0: corners, 0.5: cell centres).
+/// `tiles` are distinct and in canonical order (z, y, x). Deterministic for any number of threads.
+TileBins bin_samples(const Lattice& lattice, int level, const Batch& batch, std::int32_t first, std::int32_t end,
+                     std::span<const Block> tiles, float margin, double shift);
 
 /// What projection needs of a sample, side by side: tiles pick their samples here and there, each from one line of the
 /// cache.

@@ -36,7 +36,7 @@ constexpr Rgb kBackground{0.92F, 0.93F, 0.95F};
 }  // namespace
 
 std::uint8_t encode(float linear) {
-  return tables().encode[static_cast<std::size_t>(std::clamp(linear, 0.0F, 1.0F) * kEncodeSteps + 0.5F)];
+  return tables().encode[static_cast<std::size_t>(std::lround(std::clamp(linear, 0.0F, 1.0F) * kEncodeSteps))];
 }
 
 float decode(std::uint8_t encoded) {

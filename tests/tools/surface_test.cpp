@@ -93,8 +93,8 @@ TEST_F(SurfaceTool, PipesOnBothEnds) {
   ASSERT_EQ(run({"--quiet"}).code, 0);
   const std::string mesh = test::read_file(mesh_);
   for (const char* names : {"- -o -", "stdin.ply -o stdout.ply", "- --output=stdout.ply"}) {
-    const auto outcome =
-        run_shell("cd " + quoted(tmp_) + " && cat " + quoted(cloud_) + " 2>/dev/null | lamina surface --quiet " + names + " | cat");
+    const auto outcome = run_shell("cd " + quoted(tmp_) + " && cat " + quoted(cloud_) +
+                                   " 2>/dev/null | lamina surface --quiet " + names + " | cat");
     EXPECT_TRUE(outcome.out == mesh) << names;
     EXPECT_EQ(outcome.err, "");
     EXPECT_TRUE(std::filesystem::is_empty(tmp_));
@@ -226,8 +226,8 @@ TEST_F(SurfaceTool, NoRoomForTemporaryFilesOrTheOutput) {
   // In units of 512 bytes: the store of the samples, and the vertices or the faces.
   expect_failure(run_shell("ulimit -f 100; " + job), 4, {tmp_, "File too large", "--tmp-dir"});
   expect_failure(run_shell("ulimit -f 2600; " + job), 4, {"File too large"});
-  expect_failure(run_shell("ulimit -f 100; cat " + quoted(cloud_) + " 2>/dev/null | lamina surface - -q -o " + quoted(mesh_) +
-                           " --tmp-dir " + quoted(tmp_)),
+  expect_failure(run_shell("ulimit -f 100; cat " + quoted(cloud_) + " 2>/dev/null | lamina surface - -q -o " +
+                           quoted(mesh_) + " --tmp-dir " + quoted(tmp_)),
                  4, {tmp_, "standard input", "File too large"});
 }
 
