@@ -194,7 +194,6 @@ Tally store(const Kernel& kernel, const ProjectSettings& settings, const Window&
 std::vector<Work> list_work(Window& window, int level, std::int32_t slab, bool centres) {
   std::vector<Work> work;
   for (const Tile& t : window.tiles(level, slab)) {
-    t.leaf->task = CornerBlock::kNoTask;
     const std::int32_t first = window.lattice().first_layer(level, slab) - t.block.z * 8;
     Work w{t, t.leaf, std::max(first, 0), std::min(8, first + window.lattice().layers(level))};
     if (centres) {
@@ -206,7 +205,6 @@ std::vector<Work> list_work(Window& window, int level, std::int32_t slab, bool c
       for (int z = w.begin; z < w.end; ++z) w.points->near.words[z] = t.leaf->cells.words[z] & t.leaf->close.words[z];
     }
     if (!allocate_values(window, level, *w.points, w.begin, w.end)) continue;
-    t.leaf->task = static_cast<std::uint32_t>(work.size());
     work.push_back(w);
   }
   return work;
@@ -251,7 +249,7 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
         const Batch batch = feed.load(batches[b]);
         if (packed_number != b) pack(batch, lattice, packed);
         packed_number = b;
-        const TileBins bins = bin_samples(window, level, batch, first, end, blocks, halo, shift_of(settings_));
+        const TileBins bins = bin_samples(lattice, level, batch, first, end, blocks, halo, shift_of(settings_));
         tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t t) {
           Scratch::Local& local = scratch_->local.local();
           list_queries(work[t], local.queries);
@@ -287,7 +285,6 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
       tbb::parallel_for(std::size_t{0}, work.size(),
                         [&](std::size_t t) { copy_shared(window, level, work[t].tile, work[t].begin, work[t].end); });
     }
-    for (const Work& w : work) w.tile.leaf->task = CornerBlock::kNoTask;
   }
   counts_.corners += corners;
   counts_.seen += seen;

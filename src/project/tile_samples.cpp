@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace lamina {
 namespace {
@@ -31,9 +32,49 @@ std::int32_t floor_cell(double x) {
   return static_cast<std::int32_t>(std::floor(x));
 }
 
-void bin_piece(const Window& window, int level, const Piece& piece, std::int32_t first, std::int32_t end,
-               std::span<const Block> tiles, float margin, double shift, std::vector<Entry>& out) {
-  const double inv = 1.0 / window.lattice().cell_size(level);
+/// Finds tiles by their block: in a dense table of their box where that is not much larger than their number.
+class TileTable {
+ public:
+  static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+
+  explicit TileTable(std::span<const Block> tiles) : tiles_(tiles) {
+    if (tiles.empty()) return;
+    low_ = high_ = tiles.front();
+    for (const Block& b : tiles) {
+      low_ = {std::min(low_.x, b.x), std::min(low_.y, b.y), std::min(low_.z, b.z)};
+      high_ = {std::max(high_.x, b.x), std::max(high_.y, b.y), std::max(high_.z, b.z)};
+    }
+    nx_ = std::int64_t{high_.x} - low_.x + 1;
+    ny_ = std::int64_t{high_.y} - low_.y + 1;
+    const double volume = static_cast<double>(nx_) * static_cast<double>(ny_) * (1.0 + high_.z - low_.z);
+    if (volume > 4096 + 256.0 * static_cast<double>(tiles.size())) return;
+    numbers_.assign(static_cast<std::size_t>(volume), kNone);
+    for (std::size_t t = 0; t < tiles.size(); ++t) numbers_[place(tiles[t])] = static_cast<std::uint32_t>(t);
+  }
+  [[nodiscard]] std::uint32_t find(const Block& b) const {
+    if (b.x < low_.x || b.y < low_.y || b.z < low_.z || b.x > high_.x || b.y > high_.y || b.z > high_.z) return kNone;
+    if (!numbers_.empty()) return numbers_[place(b)];
+    const auto key = [](const Block& k) { return std::tuple(k.z, k.y, k.x); };
+    const auto at = std::lower_bound(tiles_.begin(), tiles_.end(), b,
+                                     [&](const Block& l, const Block& r) { return key(l) < key(r); });
+    return at != tiles_.end() && *at == b ? static_cast<std::uint32_t>(at - tiles_.begin()) : kNone;
+  }
+
+ private:
+  [[nodiscard]] std::size_t place(const Block& b) const {
+    return static_cast<std::size_t>(((b.z - low_.z) * ny_ + (b.y - low_.y)) * nx_ + (b.x - low_.x));
+  }
+
+  std::span<const Block> tiles_;
+  Block low_{0, 0, 0}, high_{-1, -1, -1};
+  std::int64_t nx_ = 0, ny_ = 0;
+  std::vector<std::uint32_t> numbers_;
+};
+
+void bin_piece(const Lattice& lattice, int level, const Piece& piece, std::int32_t first, std::int32_t end,
+               std::span<const Block> tiles, const TileTable& table, float margin, double shift,
+               std::vector<Entry>& out) {
+  const double inv = 1.0 / lattice.cell_size(level);
   const LocalSamples& s = piece.bucket->samples;
   for (std::size_t i = piece.begin; i < piece.end; ++i) {
     if (piece.bucket->support[i] <= 0) continue;
@@ -60,9 +101,8 @@ void bin_piece(const Window& window, int level, const Piece& piece, std::int32_t
     for (std::int32_t bz = z0 >> 3; bz <= (z1 >> 3); ++bz) {
       for (std::int32_t by = y0; by <= y1; ++by) {
         for (std::int32_t bx = x0; bx <= x1; ++bx) {
-          const CornerBlock* block = window.probe(level, {bx, by, bz});
-          if (block == nullptr || block->task == CornerBlock::kNoTask) continue;
-          out.push_back({block->task, piece.base + static_cast<std::uint32_t>(i)});
+          const std::uint32_t tile = table.find({bx, by, bz});
+          if (tile != TileTable::kNone) out.push_back({tile, piece.base + static_cast<std::uint32_t>(i)});
         }
       }
     }
@@ -71,7 +111,7 @@ void bin_piece(const Window& window, int level, const Piece& piece, std::int32_t
 
 }  // namespace
 
-TileBins bin_samples(const Window& window, int level, const Batch& batch, std::int32_t first, std::int32_t end,
+TileBins bin_samples(const Lattice& lattice, int level, const Batch& batch, std::int32_t first, std::int32_t end,
                      std::span<const Block> tiles, float margin, double shift) {
   std::vector<Piece> pieces;
   std::uint32_t base = 0;
@@ -80,9 +120,10 @@ TileBins bin_samples(const Window& window, int level, const Batch& batch, std::i
     for (std::size_t b = 0; b < n; b += kPiece) pieces.push_back({bucket.get(), b, std::min(n, b + kPiece), base});
     base += static_cast<std::uint32_t>(n);
   }
+  const TileTable table(tiles);
   std::vector<std::vector<Entry>> entries(pieces.size());
   tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t p) {
-    bin_piece(window, level, pieces[p], first, end, tiles, margin, shift, entries[p]);
+    bin_piece(lattice, level, pieces[p], first, end, tiles, table, margin, shift, entries[p]);
   });
   TileBins bins;
   bins.begin.assign(tiles.size() + 1, 0);

@@ -18,9 +18,9 @@ struct TileBins {
 };
 
 /// Bins a batch into the tiles of a level: a sample goes to every tile that has a lattice point (of the layers [first,
-/// end)) within its support + margin. Points lie `shift` cells above the corners (0: corners, 0.5: cell centres). Every
-/// tile's CornerBlock::task is its index in `tiles`. Deterministic for any number of threads.
-TileBins bin_samples(const Window& window, int level, const Batch& batch, std::int32_t first, std::int32_t end,
+/// end)) within its support + margin. Points lie `shift` cells above the corners (0: corners, 0.5: cell centres).
+/// `tiles` are distinct and in canonical order (z, y, x). Deterministic for any number of threads.
+TileBins bin_samples(const Lattice& lattice, int level, const Batch& batch, std::int32_t first, std::int32_t end,
                      std::span<const Block> tiles, float margin, double shift);
 
 /// What projection needs of a sample, side by side: tiles pick their samples here and there, each from one line of the

@@ -77,9 +77,6 @@ struct Projected {
 };
 
 struct CornerBlock : Projected {
-  static constexpr std::uint32_t kNoTask = ~std::uint32_t{0};
-  std::uint32_t task = kNoTask;  ///< number of the block in the list a stage works through, while it does
-
   // Cells of the octree. A cell of this level exists when its parent is split (or at the coarsest level when touched).
   BlockMask home;     ///< cells that hold a sample of this level
   BlockMask touched;  ///< cells that a sample of this level reaches: within two cells of its home

@@ -117,18 +117,12 @@ void find_samples(benchmark::State& state, const Scene& scene, bool gather) {
         if (gather) pack(batch, lattice, packed);
         for (int level = 0; level < window.levels(); ++level) {
           const std::vector<Tile> tiles = window.tiles(level, slab);
-          std::uint32_t task = 0;
           std::vector<Block> blocks;
-          for (const Tile& t : tiles) {
-            t.leaf->task = task++;
-            blocks.push_back(t.block);
-          }
+          for (const Tile& t : tiles) blocks.push_back(t.block);
           const std::int32_t first = lattice.first_layer(level, slab);
-          const TileBins bins = bin_samples(window, level, batch, first, first + lattice.layers(level), blocks, 0, 0);
+          const TileBins bins = bin_samples(lattice, level, batch, first, first + lattice.layers(level), blocks, 0, 0);
           found += bins.index.size();
-          for (std::size_t t = 0; t < tiles.size(); ++t) {
-            tiles[t].leaf->task = CornerBlock::kNoTask;
-            if (!gather) continue;
+          for (std::size_t t = 0; gather && t < tiles.size(); ++t) {
             rows.gather(lattice, level, tiles[t].block, packed, bins.index.data() + bins.begin[t],
                         bins.begin[t + 1] - bins.begin[t], ProjectSettings{}.band);
           }

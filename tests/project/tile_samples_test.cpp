@@ -50,20 +50,17 @@ TEST(TileSamples, BinsHoldWhatReachesTheTile) {
     const Batch batch = random_batch(seed, lattice, 1 + static_cast<int>(seed % 3), 150);
     const std::vector<Place> all = places(batch);
     for (int level = 0; level < 2; ++level) {
-      Window window(lattice, 2);
       // Every second block takes part.
       std::vector<Block> blocks;
       for (int i = 0; i < 216; i += 2) {
         const Block b{i % 6 - 3, i / 6 % 6 - 3, i / 36 - 3};
-        window.touch(level, b).task = static_cast<std::uint32_t>(blocks.size());
         blocks.push_back(b);
       }
-      window.touch(level, {2, 2, 2});  // there, but not asked for
       const std::int32_t first = -4;
       const std::int32_t end = first + lattice.layers(level);
       const float margin = seed % 2 == 0 ? 0.0F : 60.0F;
       const double shift = seed < 3 ? 0.0 : 0.5;
-      const TileBins bins = bin_samples(window, level, batch, first, end, blocks, margin, shift);
+      const TileBins bins = bin_samples(lattice, level, batch, first, end, blocks, margin, shift);
       ASSERT_EQ(bins.begin.size(), blocks.size() + 1);
       ASSERT_EQ(bins.begin.front(), 0U);
       ASSERT_EQ(bins.begin.back(), bins.index.size());
@@ -116,16 +113,14 @@ TEST(TileSamples, BinsDoNotDependOnThreads) {
   // More samples than one piece of work.
   const Lattice lattice{48, 3};
   const Batch batch = random_batch(1, lattice, 3, 30'000);
-  Window window(lattice, 2);
   std::vector<Block> blocks;
   for (int i = 0; i < 8; ++i) {
     blocks.push_back({(i & 1) - 1, ((i >> 1) & 1) - 1, (i >> 2) - 1});
-    window.touch(0, blocks.back()).task = static_cast<std::uint32_t>(i);
   }
   std::vector<TileBins> found;
   for (const std::size_t n : {1U, 2U, 4U}) {
     const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, n);
-    found.push_back(bin_samples(window, 0, batch, -4, 0, blocks, 0, 0));
+    found.push_back(bin_samples(lattice, 0, batch, -4, 0, blocks, 0, 0));
     EXPECT_EQ(found.back().begin, found.front().begin);
     EXPECT_EQ(found.back().index, found.front().index);
     EXPECT_GT(found.back().index.size(), 5'000U);
