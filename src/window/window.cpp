@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <deque>
+#include <limits>
 #include <mutex>
 #include <set>
 #include <tuple>
@@ -104,7 +105,8 @@ Window::Window(const Lattice& lattice, int attributes, const Bounds& bounds)
   trees_->levels.resize(static_cast<std::size_t>(lattice.levels));
   for (int l = 0; l < lattice.levels; ++l) {
     Trees::Level& level = trees_->levels[l];
-    const std::int32_t block = lattice.cell_size(l) * 8;
+    // Cells reach 2^28 steps, eight of them more than an int; one block holds every bound then, whatever its end.
+    const std::int32_t block = std::min(lattice.cell_size(l), std::numeric_limits<std::int32_t>::max() / 8) * 8;
     if (bounds.x_max < bounds.x_min) continue;
     const std::int32_t x0 = floor_div(bounds.x_min, block) - 1;
     const std::int32_t y0 = floor_div(bounds.y_min, block) - 1;
