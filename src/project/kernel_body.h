@@ -79,7 +79,7 @@ void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count,
   vec(sums[kSeen]) = seen;
 }
 
-void accumulate(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query, Lanes* sums) {
+inline void accumulate(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query, Lanes* sums) {
   switch (s.attributes.size()) {
     case 0:
       return accumulate_body<0>(s, ranges, count, query, sums);
@@ -92,7 +92,7 @@ void accumulate(const TileSamples& s, const SampleRange* ranges, int count, cons
 
 /// Plane or algebraic sphere through the weighted samples (Guennebaud & Gross 2007, the closed form of the
 /// normal-constrained fit), evaluated at the corner.
-void fit(const Lanes* sums, const FitInput& in, FitOutput& out) {
+inline void fit(const Lanes* sums, const FitInput& in, FitOutput& out) {
   constexpr float kTiny = 1e-20F;
   constexpr float kFlat = 1e-3F;  // spread of the samples below which no curvature is estimated, in support^2
   for (int l = 0; l < kLanes; ++l) {
@@ -150,7 +150,7 @@ inline Vec load(const float* p) {
   return v;
 }
 
-void extend(const CornerField& f, int y, int z, float cell, Extension& out) {
+inline void extend(const CornerField& f, int y, int z, float cell, Extension& out) {
   const Vec zero = splat(0.0F);
   Vec s = zero;
   Vec w = zero;

@@ -245,6 +245,7 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
     const std::vector<Work> work = list_work(window, level, slab, settings_.centres);
     if (work.empty()) continue;
     std::vector<Block> blocks;
+    blocks.reserve(work.size());
     for (const Work& w : work) blocks.push_back(w.tile.block);
     const std::int32_t first = lattice.first_layer(level, slab);
     const std::int32_t end = first + lattice.layers(level);
