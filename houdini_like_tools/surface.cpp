@@ -52,6 +52,8 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
   }
   j["replaced_attribute_values"] = s.replaced_attributes;
   j["corners"] = {{"projected", s.corners}, {"seen", s.corners_seen}, {"trusted", s.corners_good}};
+  j["contradicting_normals"] = {
+      {"corners", s.corners_torn}, {"worst_slab", s.torn_slab}, {"worst_share", s.torn_share}};
   j["isosurface"] = {{"vertices", s.isovertices},
                      {"triangles", s.isotriangles},
                      {"crossing_cells", s.crossing_cells},

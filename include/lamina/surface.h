@@ -77,6 +77,11 @@ struct SurfaceStats {
   std::uint64_t replaced_attributes = 0;  ///< attribute values that were NaN or out of range
   std::uint64_t vertices = 0, triangles = 0;
   std::uint64_t corners = 0, corners_seen = 0, corners_good = 0;
+  /// Corners whose samples' normals contradict each other; the slab (counted from the first) with the largest share of
+  /// them among the corners with samples, and that share.
+  std::uint64_t corners_torn = 0;
+  std::int64_t torn_slab = 0;
+  double torn_share = 0;
   std::uint64_t isovertices = 0, isotriangles = 0, rejected_loops = 0, general_cells = 0, crossing_cells = 0;
   std::vector<std::uint64_t> leaf_cells;  ///< by level, finest first
   ClusterCounts clusters;

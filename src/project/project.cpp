@@ -139,8 +139,16 @@ void advance(const Kernel& kernel, const ProjectSettings& settings, TileState& s
 }
 
 struct Tally {
-  std::uint64_t seen = 0, good = 0;
+  std::uint64_t seen = 0, good = 0, torn = 0;
 };
+
+/// Whether the normals a corner sees contradict each other.
+bool is_torn(const Lanes* sums, int lane) {
+  const float x = sums[kNx][lane];
+  const float y = sums[kNy][lane];
+  const float z = sums[kNz][lane];
+  return x * x + y * y + z * z < 0.25F * sums[kW][lane] * sums[kW][lane];
+}
 
 /// Whether a sample close enough contributed to a corner.
 bool is_seen(const Lanes* sums, int lane) {
@@ -168,6 +176,7 @@ Tally store(const Kernel& kernel, const ProjectSettings& settings, const Window&
       const int offset = BlockMask::offset(q.x, q.y, q.z);
       const bool has_normal = out.nx[l] != 0 || out.ny[l] != 0 || out.nz[l] != 0;
       if (!is_seen(sums, l) || !has_normal) continue;
+      tally.torn += is_torn(sums, l) ? 1 : 0;
       const bool good =
           out.reach[l] <= settings.good_reach && sums[kSeen][l] >= static_cast<float>(settings.good_samples);
       points.seen.set(offset);
@@ -229,6 +238,7 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
   std::atomic<std::uint64_t> corners = 0;
   std::atomic<std::uint64_t> seen = 0;
   std::atomic<std::uint64_t> good = 0;
+  std::atomic<std::uint64_t> torn = 0;
   PackedBatch& packed = scratch_->packed;
   std::size_t packed_number = batches.size();  // of the batch that is packed: a lone one stays so for all levels
   for (int level = 0; level < window.levels(); ++level) {
@@ -278,6 +288,7 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
           const Tally tally = store(kernel_, settings_, window, level, work[t], state, local.queries);
           seen.fetch_add(tally.seen, std::memory_order_relaxed);
           good.fetch_add(tally.good, std::memory_order_relaxed);
+          torn.fetch_add(tally.torn, std::memory_order_relaxed);
           corners.fetch_add(local.queries.size(), std::memory_order_relaxed);
         });
       }
@@ -290,6 +301,13 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
   counts_.corners += corners;
   counts_.seen += seen;
   counts_.good += good;
+  counts_.torn += torn;
+  constexpr std::uint64_t kEnough = 256;
+  const double share = seen < kEnough ? 0.0 : static_cast<double>(torn) / static_cast<double>(seen);
+  if (share > counts_.torn_share) {
+    counts_.torn_share = share;
+    counts_.torn_slab = slab;
+  }
 }
 
 }  // namespace lamina

@@ -25,6 +25,11 @@ struct ProjectCounts {
   std::uint64_t corners = 0;  ///< corners projected
   std::uint64_t seen = 0;     ///< of these, with samples in reach
   std::uint64_t good = 0;     ///< of these, trusted
+  std::uint64_t torn =
+      0;  ///< of those with samples, whose normals contradict each other: their mean is under half long
+  /// The slab with the largest share of those, among slabs with enough corners to tell.
+  std::int32_t torn_slab = 0;
+  double torn_share = 0;
 };
 
 /// Keeps the threads' scratch memory between slabs.

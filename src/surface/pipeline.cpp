@@ -164,6 +164,9 @@ void Pipeline::report(SurfaceStats& stats) const {
   stats.corners = projector_.counts().corners;
   stats.corners_seen = projector_.counts().seen;
   stats.corners_good = projector_.counts().good;
+  stats.corners_torn = projector_.counts().torn;
+  stats.torn_slab = projector_.counts().torn_slab - first_;
+  stats.torn_share = projector_.counts().torn_share;
   stats.isovertices = isovertices_;
   stats.isotriangles = isotriangles_;
   stats.rejected_loops = extracted_.rejected_loops;

@@ -37,6 +37,18 @@ std::uint64_t peak_memory() {
   return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
 }
 
+/// Normals that were not oriented alike tear the surface apart without any other sign.
+void warn_of_contradictions(const SurfaceStats& stats, const std::string& input, const RunContext& run) {
+  constexpr double kMuch = 0.05;  // scans of thin things have a percent
+  const double share =
+      stats.corners_seen == 0 ? 0.0 : static_cast<double>(stats.corners_torn) / static_cast<double>(stats.corners_seen);
+  if (share < kMuch && stats.torn_share < 4 * kMuch) return;
+  run.warn(
+      fmt::format("{}: normals contradict each other around {:.0f} % of the surface, {:.0f} % in slab {}: orient "
+                  "them alike before (CloudCompare, MeshLab), or expect holes and double sheets",
+                  input, 100 * share, 100 * stats.torn_share, stats.torn_slab));
+}
+
 /// Next to the output unless told otherwise; the system's temporary folder for standard output, pipes and devices.
 std::string temporary_directory(const SurfaceSettings& settings, const RunContext& run) {
   if (!run.tmp_dir.empty()) return run.tmp_dir;
@@ -202,6 +214,7 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
     Pipeline pipeline(settings, resolved, frame, ingested->extent, feed, info.attributes.size(), sink);
     pipeline.run(run, watch);
     pipeline.report(stats);
+    warn_of_contradictions(stats, input_name(settings), run);
     if (feed.counts().undersampled > 0) {
       stats.rejected.push_back({"radius above --max-radius", feed.counts().undersampled, std::nullopt});
       run.info(fmt::format("{} of {} samples discarded as undersampled: radius above --max-radius",

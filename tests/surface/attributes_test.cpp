@@ -134,5 +134,26 @@ TEST(SurfaceAttributes, ValuesThatAreNoNumbersAreReplacedAndCounted) {
   EXPECT_THROW(reconstruct(cloud, refuse), Error);
 }
 
+// Normals that were never oriented alike: the job goes on, but says so and where it is worst.
+TEST(SurfaceAttributes, ContradictingNormalsAreReported) {
+  std::string said;
+  RunContext run;
+  run.log = [&](LogLevel level, std::string_view text) {
+    if (level == LogLevel::warning) said += text;
+  };
+  Cloud cloud = test::sphere_cloud(20000);
+  const Reconstruction alike = reconstruct(cloud, {}, run);
+  EXPECT_EQ(alike.stats.corners_torn, 0u);
+  EXPECT_EQ(said, "");
+  for (std::size_t i = 0; i < cloud.size(); i += 3) {
+    for (double& n : cloud.normals[i]) n = -n;
+  }
+  const Reconstruction mixed = reconstruct(cloud, {}, run);
+  EXPECT_GT(mixed.stats.corners_torn, mixed.stats.corners_seen / 10);
+  EXPECT_GE(mixed.stats.torn_share * static_cast<double>(mixed.stats.corners_seen),
+            static_cast<double>(mixed.stats.corners_torn));
+  EXPECT_NE(said.find("normals contradict each other"), std::string::npos) << said;
+}
+
 }  // namespace
 }  // namespace lamina
