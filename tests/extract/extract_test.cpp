@@ -75,6 +75,7 @@ struct Case {
     FieldSample s;
     s.distance = static_cast<float>((negative ? -kCell : kCell) * magnitude);
     s.seen = noise(seed + 2, p) >= unseen;
+    s.valued = noise(seed + 3, p) < 0.6;
     return s;
   }
   [[nodiscard]] WholeMesh mesh() {

@@ -15,6 +15,7 @@ struct FieldSample {
   float distance = 1;  ///< steps
   std::array<float, 3> normal{0, 0, 1};
   bool seen = true;
+  bool valued = true;  ///< the sign is more than a guess; what is seen always is
 };
 
 /// A dense octree over `size` coarsest cells from `origin` on (in coarsest cells); levels counted from 0, the finest.
@@ -122,7 +123,7 @@ class Octree {
       if (!t.leaf->corners.test(offset)) continue;
       const FieldSample s = field(lattice.position(level, c));
       t.leaf->positive.assign(offset, s.distance >= 0);
-      t.leaf->valued.set(offset);
+      t.leaf->valued.assign(offset, s.seen || s.valued);
       t.leaf->carried.assign(offset, s.seen);
       if (!s.seen) continue;
       t.leaf->near.set(offset);
