@@ -33,8 +33,8 @@ def cases(size, threads, large, data):
         add("model", f"{scan} {millions} M", cloud(scan, millions))
     for millions in (1, 4, 16) + ((100,) if large else ()):
         add("scale", f"bumpy sphere {millions} M", cloud("bumpy-sphere", millions))
-    for blend in (1, 2, 4, 8):
-        add("blend", f"--blend {blend}", middle, *option("--blend", blend, 1))
+    for blend in (1, 1.2, 2, 4, 8):
+        add("blend", f"--blend {blend}", middle, *option("--blend", blend, 1.2))
     for steps in (1, 4):
         add("steps", f"--steps {steps}", middle, *option("--steps", steps, 1))
     for fit in ("sphere", "plane"):
