@@ -11,7 +11,7 @@ namespace lamina {
 struct ExtractCounts {
   std::uint64_t crossing_cells = 0;      ///< leaf cells the surface passes through
   std::uint64_t general_cells = 0;       ///< of these, beside a subdivided one
-  std::uint64_t rejected_loops = 0;      ///< loops with an isovertex that is not valid: the rims of open surfaces
+  std::uint64_t rejected_loops = 0;      ///< loops with an invalid isovertex, in cells with valid ones: rims
   std::uint64_t separated_vertices = 0;  ///< isovertices duplicated so that each is a single fan
 };
 
