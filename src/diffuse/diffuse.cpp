@@ -115,7 +115,7 @@ void diffuse_corner(const Window& window, int level, const Cell& corner, CornerB
 
 void diffuse_slab(Window& window, std::int32_t slab) {
   for (int level = 0; level < window.levels(); ++level) {
-    const std::vector<Tile> tiles = window.tiles(level, slab);
+    const Tiles tiles = window.tiles(level, slab);
     tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
       const Tile& t = tiles[i];
       const std::int32_t first = window.lattice().first_layer(level, slab) - t.block.z * 8;

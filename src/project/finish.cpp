@@ -43,19 +43,13 @@ void gather_block(const Window& window, int level, const CornerBlock& from, int 
 }
 
 /// The trusted corners of a block and of its 26 neighbours.
-bits::Neighbourhood good_around(const std::array<const CornerBlock*, 27>& around) {
+bits::Neighbourhood good_around(const std::array<CornerBlock*, 27>& around) {
   bits::Neighbourhood n{};
   for (int i = 0; i < 27; ++i) n[i / 9][i / 3 % 3][i % 3] = around[i] == nullptr ? nullptr : &around[i]->good;
   return n;
 }
 
-std::array<const CornerBlock*, 27> blocks_around(const Window& window, int level, const Block& b) {
-  std::array<const CornerBlock*, 27> around{};
-  for (int i = 0; i < 27; ++i) around[i] = window.probe(level, {b.x + i % 3 - 1, b.y + i / 3 % 3 - 1, b.z + i / 9 - 1});
-  return around;
-}
-
-void gather_field(const Window& window, int level, const std::array<const CornerBlock*, 27>& around, int begin, int end,
+void gather_field(const Window& window, int level, const std::array<CornerBlock*, 27>& around, int begin, int end,
                   CornerField& f) {
   for (auto* a : {&f.distance, &f.nx, &f.ny, &f.nz, &f.trusted}) {
     std::fill(a->begin() + begin * CornerField::kPlane, a->begin() + (end + 2) * CornerField::kPlane, 0.0F);
@@ -144,7 +138,7 @@ Signs extended_signs(const Kernel& kernel, const CornerField& field, int z, floa
 void finish_tile(const Window& window, int level, const Tile& t, int begin, int end, const Kernel& kernel,
                  float boundary, CornerField& field) {
   const auto cell = static_cast<float>(window.lattice().cell_size(level));
-  const std::array<const CornerBlock*, 27> around = blocks_around(window, level, t.block);
+  const std::array<CornerBlock*, 27>& around = t.leaf->around;
   const bits::Neighbourhood trusted = good_around(around);
   bool gathered = false;
   for (int z = begin; z < end; ++z) {
@@ -185,7 +179,7 @@ void finish_tile(const Window& window, int level, const Tile& t, int begin, int 
 void finish_slab(Window& window, std::int32_t slab, const Kernel& kernel, float boundary) {
   tbb::enumerable_thread_specific<CornerField> fields;
   for (int level = 0; level < window.levels(); ++level) {
-    const std::vector<Tile> tiles = window.tiles(level, slab);
+    const Tiles tiles = window.tiles(level, slab);
     tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
       const std::int32_t first = window.lattice().first_layer(level, slab) - tiles[i].block.z * 8;
       const int end = std::min(8, first + window.lattice().layers(level));

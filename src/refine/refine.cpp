@@ -19,15 +19,11 @@ constexpr int kReachCells = 3;
 /// Cells around the home whose corners are projected; with two, nothing gained and half as many corners more.
 constexpr int kCloseCells = 1;
 
-bits::Neighbourhood gather(const Window& window, int level, const Block& b, BlockMask CornerBlock::*mask) {
+bits::Neighbourhood gather(const CornerBlock& leaf, BlockMask CornerBlock::*mask) {
   bits::Neighbourhood n{};
-  for (int z = -1; z <= 1; ++z) {
-    for (int y = -1; y <= 1; ++y) {
-      for (int x = -1; x <= 1; ++x) {
-        const CornerBlock* block = window.probe(level, {b.x + x, b.y + y, b.z + z});
-        n[z + 1][y + 1][x + 1] = block == nullptr ? nullptr : &(block->*mask);
-      }
-    }
+  for (int i = 0; i < 27; ++i) {
+    const CornerBlock* const block = leaf.around[i];
+    n[i / 9][i / 3 % 3][i % 3] = block == nullptr ? nullptr : &(block->*mask);
   }
   return n;
 }
@@ -46,7 +42,7 @@ LeafLayers leaf_layers(const Window& window, int level, std::int32_t slab, const
 
 template <typename Body>
 void for_tiles(Window& window, int level, std::int32_t slab, const Body& body) {
-  const std::vector<Tile> tiles = window.tiles(level, slab);
+  const Tiles tiles = window.tiles(level, slab);
   tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
     const LeafLayers layers = leaf_layers(window, level, slab, tiles[i].block);
     body(tiles[i], layers.begin, layers.end);
@@ -183,7 +179,7 @@ void refine_slab(Window& window, std::int32_t slab) {
   for (int level = 0; level < levels; ++level) {
     touch_around(window, level, slab, &CornerBlock::home, -kReachCells, kReachCells);
     for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
-      const bits::Neighbourhood home = gather(window, level, t.block, &CornerBlock::home);
+      const bits::Neighbourhood home = gather(*t.leaf, &CornerBlock::home);
       for (int z = begin; z < end; ++z) {
         t.leaf->touched.words[z] = bits::dilate_layer(home, z, -kReachCells, kReachCells);
         t.leaf->close.words[z] = bits::dilate_layer(home, z, -kCloseCells, kCloseCells);
@@ -204,8 +200,8 @@ void place_corners(Window& window, std::int32_t slab) {
   for (int level = 0; level < window.levels(); ++level) {
     touch_around(window, level, slab, &CornerBlock::cells, 0, 1);
     for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
-      const bits::Neighbourhood cells = gather(window, level, t.block, &CornerBlock::cells);
-      const bits::Neighbourhood close = gather(window, level, t.block, &CornerBlock::close);
+      const bits::Neighbourhood cells = gather(*t.leaf, &CornerBlock::cells);
+      const bits::Neighbourhood close = gather(*t.leaf, &CornerBlock::close);
       for (int z = begin; z < end; ++z) {
         const std::uint64_t corners = bits::dilate_layer(cells, z, 0, 1);
         t.leaf->corners.words[z] = corners;

@@ -100,6 +100,11 @@ struct CornerBlock : Projected {
   BlockMask surface;  ///< corners at an end of an accepted edge
   std::array<LayerNumbers, 8> numbers{};
 
+  /// The blocks around of the same level, null where there is none: [x + 1 + 3 (y + 1) + 9 (z + 1)], itself in the
+  /// middle. Kept by the window.
+  static constexpr int kHere = 13;
+  std::array<CornerBlock*, 27> around{};
+
   /// Cell centres, where diffusion projects those instead of the corners; shared so that a block can be copied.
   std::shared_ptr<Projected> centres;
 };

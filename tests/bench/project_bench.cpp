@@ -116,7 +116,7 @@ void find_samples(benchmark::State& state, const Scene& scene, bool gather) {
         PackedBatch packed;
         if (gather) pack(batch, lattice, packed);
         for (int level = 0; level < window.levels(); ++level) {
-          const std::vector<Tile> tiles = window.tiles(level, slab);
+          const Tiles tiles = window.tiles(level, slab);
           std::vector<Block> blocks;
           for (const Tile& t : tiles) blocks.push_back(t.block);
           const std::int32_t first = lattice.first_layer(level, slab);
