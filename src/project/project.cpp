@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <limits>
+#include <map>
 #include <utility>
 
 #include "project/shared_corners.h"
@@ -40,8 +42,39 @@ struct Projector::Scratch {
     TileState state;
   };
   tbb::enumerable_thread_specific<Local> local;
-  PackedBatch packed;
+  std::map<std::size_t, std::shared_ptr<const ClumpedBucket>> clumped;  ///< by number of the bucket
+
+  /// The buckets of a batch in clumps; kept for the next levels, steps and slabs while they are few.
+  ClumpedBatch load(const std::vector<std::size_t>& batch, SampleFeed& feed, const Lattice& lattice);
 };
+
+ClumpedBatch Projector::Scratch::load(const std::vector<std::size_t>& batch, SampleFeed& feed, const Lattice& lattice) {
+  constexpr std::size_t kKeep = std::size_t{1} << 19;  // samples
+  ClumpedBatch out(batch.size());
+  std::vector<std::size_t> missing;
+  std::size_t kept = 0;
+  for (const auto& [number, bucket] : clumped) kept += bucket->x.size();
+  for (std::size_t b = 0; b < batch.size(); ++b) {
+    const auto known = clumped.find(batch[b]);
+    if (known == clumped.end()) {
+      missing.push_back(b);
+    } else {
+      out[b] = known->second;
+    }
+  }
+  std::vector<std::size_t> numbers;
+  numbers.reserve(missing.size());
+  for (const std::size_t b : missing) numbers.push_back(batch[b]);
+  const Batch loaded = feed.load(numbers);
+  tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t m) {
+    out[missing[m]] = std::make_shared<const ClumpedBucket>(clump(*loaded[m], lattice));
+  });
+  for (const std::size_t b : missing) {
+    kept += out[b]->x.size();
+    if (kept <= kKeep) clumped.emplace(batch[b], out[b]);
+  }
+  return out;
+}
 
 namespace {
 
@@ -239,8 +272,10 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
   std::atomic<std::uint64_t> seen = 0;
   std::atomic<std::uint64_t> good = 0;
   std::atomic<std::uint64_t> torn = 0;
-  PackedBatch& packed = scratch_->packed;
-  std::size_t packed_number = batches.size();  // of the batch that is packed: a lone one stays so for all levels
+  // The sweep goes up: what no batch of this slab wants, none of the next ones will.
+  std::size_t lowest = std::numeric_limits<std::size_t>::max();
+  for (const auto& batch : batches) lowest = std::min(lowest, batch.front());
+  scratch_->clumped.erase(scratch_->clumped.begin(), scratch_->clumped.lower_bound(lowest));
   for (int level = 0; level < window.levels(); ++level) {
     const std::vector<Work> work = list_work(window, level, slab, settings_.centres);
     if (work.empty()) continue;
@@ -257,10 +292,9 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
       if (batches.size() == 1 && step > 0) break;
       const float halo = batches.size() == 1 || step > 0 ? level_margin : 0.0F;
       for (std::size_t b = 0; b < batches.size(); ++b) {
-        const Batch batch = feed.load(batches[b]);
-        if (packed_number != b) pack(batch, lattice, packed);
-        packed_number = b;
-        const TileBins bins = bin_samples(lattice, level, batch, first, end, blocks, halo, shift_of(settings_));
+        const ClumpedBatch batch = scratch_->load(batches[b], feed, lattice);
+        const Reach reach{level, first, end, halo, shift_of(settings_)};
+        const TileRuns bins = bin_clumps(lattice, reach, batch, blocks);
         tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t t) {
           Scratch::Local& local = scratch_->local.local();
           list_queries(work[t], local.queries);
@@ -273,8 +307,7 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
               advance(kernel_, settings_, state, local.queries, channels);
             }
           }
-          local.rows.gather(lattice, level, work[t].tile.block, packed, bins.index.data() + bins.begin[t],
-                            bins.begin[t + 1] - bins.begin[t], settings_.band);
+          local.rows.gather(lattice, reach, work[t].tile.block, bins.of(t), settings_.band);
           accumulate(kernel_, local.rows, state, channels);
           if (b + 1 < batches.size()) return;
           if (batches.size() == 1) {
