@@ -108,6 +108,7 @@ void diffuse_corner(const Window& window, int level, const Cell& corner, CornerB
     first_attribute[static_cast<std::size_t>(c) * out.count] = attributes[static_cast<std::size_t>(c)] * inv;
   }
   leaf.seen.set(offset);
+  leaf.positive.assign(offset, mean.distance >= 0);
   if (trusted) leaf.good.set(offset);
 }
 

@@ -92,17 +92,6 @@ std::uint64_t beyond(const Window& window, int level, const CornerBlock& leaf, i
   return out & leaf.seen.words[z];
 }
 
-/// Signs of the layer's corners in `wanted`, by their own distances.
-std::uint64_t own_signs(const Window& window, int level, const CornerBlock& leaf, int z, std::uint64_t wanted) {
-  std::uint64_t positive = 0;
-  const CornerValues& values = leaf.values[window.brick_of(level, z)];
-  std::uint32_t i = leaf.value_index(z * 64, window.brick_layers(level));
-  for (std::uint64_t w = leaf.near.words[z]; w != 0; w &= w - 1, ++i) {
-    if (values.channel(kDistance)[i] >= 0) positive |= w & (~w + 1);
-  }
-  return positive & wanted;
-}
-
 /// Of the layer's corners that a finer level holds.
 Signs finer_signs(const Window& window, int level, const Tile& t, int z) {
   Signs out;
@@ -146,9 +135,10 @@ void finish_tile(const Window& window, int level, const Tile& t, int begin, int 
     if (corners == 0) continue;
     const std::uint64_t shared = t.leaf->shared.words[z];
     const std::uint64_t good = t.leaf->good.words[z];
+    const std::uint64_t own = t.leaf->positive.words[z];  // as projection left them
     Signs signs;
     if (shared != 0) signs = finer_signs(window, level, t, z);
-    signs.positive |= own_signs(window, level, *t.leaf, z, good & ~shared);
+    signs.positive |= own & good & ~shared;
     signs.valued |= good & ~shared;
     signs.carried |= t.leaf->seen.words[z] & ~shared;
     if (const std::uint64_t wanted = corners & ~shared & ~good; wanted != 0) {
@@ -163,7 +153,7 @@ void finish_tile(const Window& window, int level, const Tile& t, int begin, int 
       std::uint64_t alone = lone & t.leaf->seen.words[z];
       if (alone != 0) alone &= ~beyond(window, level, *t.leaf, z, kOwnReach);
       signs.positive |= (extended.positive & extended.valued) | (lone & ~alone);
-      if (alone != 0) signs.positive |= own_signs(window, level, *t.leaf, z, alone);
+      signs.positive |= own & alone;
       signs.valued |= extended.valued | alone;
       signs.carried |= extended.carried;
     }

@@ -6,6 +6,8 @@
 #include <bit>
 #include <cstdint>
 #include <memory>
+#include <new>
+#include <utility>
 #include <vector>
 
 namespace lamina {
@@ -39,13 +41,32 @@ struct BlockMask {
 /// support radius.
 enum Channel : int { kDistance = 0, kNormalX, kNormalY, kNormalZ, kCurvature, kReach, kFirstAttribute };
 
+/// Leaves what it allocates as it is, for values that are written next.
+template <typename T>
+struct RawAllocator : std::allocator<T> {
+  template <typename U>
+  struct rebind {
+    using other = RawAllocator<U>;
+  };
+  template <typename U>
+  void construct(U* at) noexcept {
+    ::new (static_cast<void*>(at)) U;
+  }
+  template <typename U, typename... Args>
+  void construct(U* at, Args&&... args) {
+    ::new (static_cast<void*>(at)) U(std::forward<Args>(args)...);
+  }
+};
+
 /// Values of the `near` corners of one slab's layers inside a leaf, channel after channel, each in mask order.
 struct CornerValues {
-  std::vector<float> data;
+  std::vector<float, RawAllocator<float>> data;
   std::uint32_t count = 0;  ///< corners
+  /// Room for values yet to be written.
   void allocate(std::uint32_t corners, int channels) {
     count = corners;
-    data.assign(static_cast<std::size_t>(corners) * static_cast<std::size_t>(channels), 0.0F);
+    data.clear();
+    data.resize(static_cast<std::size_t>(corners) * static_cast<std::size_t>(channels));
   }
   [[nodiscard]] float* channel(int c) { return data.data() + static_cast<std::size_t>(c) * count; }
   [[nodiscard]] const float* channel(int c) const { return data.data() + static_cast<std::size_t>(c) * count; }
@@ -61,7 +82,7 @@ struct LayerNumbers {
 
 /// Points of a block that are projected, and what came of it.
 struct Projected {
-  BlockMask near;  ///< carry values (CornerValues): close enough to samples to be projected
+  BlockMask near;  ///< worth projecting, close enough to samples; once projected: carry values (CornerValues)
   BlockMask seen;  ///< subset of near: samples contributed; an edge with such an end is valid
   BlockMask good;  ///< subset of seen: own value is trusted; other corners are extended from good neighbours
   std::array<CornerValues, 8> values;  ///< by slab inside the leaf, Window::brick_of()
@@ -88,8 +109,8 @@ struct CornerBlock : Projected {
   // Corners.
   BlockMask corners;  ///< of the leaf cells in `cells`, of this level
   BlockMask shared;   ///< subset of corners: held by a finer level too, whose value counts
+  BlockMask positive;  ///< sign (outside): once projected, of the seen corners' own distances; once finished, of all
   // Set when the slab is finished.
-  BlockMask positive;  ///< sign of every corner in `corners` (outside)
   BlockMask valued;    ///< subset of corners: the sign rests on samples, its own or its neighbours'; others are a guess
   BlockMask carried;   ///< corners with samples of their own, or with trusted neighbours on all sides
 
