@@ -25,20 +25,18 @@ void gather_block(const Window& window, int level, const CornerBlock& from, int 
   if (values.count == 0) return;
   const std::uint32_t base = from.value_index(z * 64, layers);
   const std::uint64_t near = from.near.words[z];
-  const float* const d = values.channel(kDistance);
-  const float* const nx = values.channel(kNormalX);
-  const float* const ny = values.channel(kNormalY);
-  const float* const nz = values.channel(kNormalZ);
   for (; w != 0; w &= w - 1) {
     const int bit = std::countr_zero(w);
     const std::uint32_t i = base + static_cast<std::uint32_t>(std::popcount(near & ((std::uint64_t{1} << bit) - 1)));
-    const int at =
-        (to_z + 1) * CornerField::kPlane + ((bit >> 3) + dy * 8 + 1) * CornerField::kRow + (bit & 7) + dx * 8 + 1;
-    f.distance[at] = d[i];
-    f.nx[at] = nx[i];
-    f.ny[at] = ny[i];
-    f.nz[at] = nz[i];
+    const float* const v = values.of(i);
+    const int row = (bit >> 3) + dy * 8 + 1;
+    const int at = (to_z + 1) * CornerField::kPlane + row * CornerField::kRow + (bit & 7) + dx * 8 + 1;
+    f.distance[at] = v[kDistance];
+    f.nx[at] = v[kNormalX];
+    f.ny[at] = v[kNormalY];
+    f.nz[at] = v[kNormalZ];
     f.trusted[at] = 1.0F;
+    f.any[(to_z + 1) * CornerField::kRows + row] = 1;
   }
 }
 
@@ -54,6 +52,7 @@ void gather_field(const Window& window, int level, const std::array<CornerBlock*
   for (auto* a : {&f.distance, &f.nx, &f.ny, &f.nz, &f.trusted}) {
     std::fill(a->begin() + begin * CornerField::kPlane, a->begin() + (end + 2) * CornerField::kPlane, 0.0F);
   }
+  std::fill(f.any.begin() + begin * CornerField::kRows, f.any.begin() + (end + 2) * CornerField::kRows, 0);
   for (int dz = -1; dz <= 1; ++dz) {
     const int from = std::max(begin - 1, dz * 8);
     const int to = std::min(end + 1, dz * 8 + 8);

@@ -161,6 +161,17 @@ inline Vec load(const float* p) {
   return v;
 }
 
+/// A channel of three rows' corners side by side: the middle ones, and sum and difference of the outer ones.
+struct Triple {
+  Vec middle, sum, difference;
+};
+
+inline Triple triple(const float* p) {
+  const Vec low = load(p - 1);
+  const Vec high = load(p + 1);
+  return {load(p), low + high, high - low};
+}
+
 inline void extend(const CornerField& f, int y, int z, float cell, Extension& out) {
   const Vec zero = splat(0.0F);
   Vec s = zero;
@@ -173,26 +184,30 @@ inline void extend(const CornerField& f, int y, int z, float cell, Extension& ou
   Vec oz = zero;
   for (int dz = -1; dz <= 1; ++dz) {
     for (int dy = -1; dy <= 1; ++dy) {
-      for (int dx = -1; dx <= 1; ++dx) {
-        const int m = (dx != 0) + (dy != 0) + (dz != 0);
-        if (m == 0) continue;
-        const int at = (z + 1 + dz) * CornerField::kPlane + (y + 1 + dy) * CornerField::kRow + 1 + dx;
-        const Vec ax = load(&f.nx[at]);
-        const Vec ay = load(&f.ny[at]);
-        const Vec az = load(&f.nz[at]);
-        // Vector from the neighbour to the corner; the neighbour's plane there.
-        const Vec plane = load(&f.distance[at]) - cell * (ax * static_cast<float>(dx) + ay * static_cast<float>(dy) +
-                                                          az * static_cast<float>(dz));
-        const Vec k = load(&f.trusted[at]) * splat(1.0F / static_cast<float>(m * m));
-        s += k * plane;
-        w += k;
-        nx += k * ax;
-        ny += k * ay;
-        nz += k * az;
-        ox += k * static_cast<float>(dx);
-        oy += k * static_cast<float>(dy);
-        oz += k * static_cast<float>(dz);
-      }
+      if (f.any[(z + 1 + dz) * CornerField::kRows + y + 1 + dy] == 0) continue;
+      // Weights of the row's middle and outer corners; nothing is trusted in the field where it is zero.
+      const int m = (dy != 0) + (dz != 0);
+      const Vec inner = splat(m == 0 ? 0.0F : 1.0F / static_cast<float>(m * m));
+      const Vec outer = splat(1.0F / static_cast<float>((m + 1) * (m + 1)));
+      const int at = (z + 1 + dz) * CornerField::kPlane + (y + 1 + dy) * CornerField::kRow + 1;
+      const Triple t = triple(&f.trusted[at]);
+      const Triple d = triple(&f.distance[at]);
+      const Triple ax = triple(&f.nx[at]);
+      const Triple ay = triple(&f.ny[at]);
+      const Triple az = triple(&f.nz[at]);
+      const Vec row_t = inner * t.middle + outer * t.sum;
+      const Vec row_y = inner * ay.middle + outer * ay.sum;
+      const Vec row_z = inner * az.middle + outer * az.sum;
+      const Vec along = outer * ax.difference + row_y * static_cast<float>(dy) + row_z * static_cast<float>(dz);
+      // The neighbours' planes at the corner.
+      s += inner * d.middle + outer * d.sum - cell * along;
+      w += row_t;
+      nx += inner * ax.middle + outer * ax.sum;
+      ny += row_y;
+      nz += row_z;
+      ox += outer * t.difference;
+      oy += row_t * static_cast<float>(dy);
+      oz += row_t * static_cast<float>(dz);
     }
   }
   const Vec any = w > zero ? w : splat(1.0F);

@@ -34,7 +34,7 @@ void copy_shared(Window& window, int level, const Tile& tile, int begin, int end
       const CornerValues& source = from->values[window.brick_of(level - 1, o >> 6)];
       const std::uint32_t at = from->value_index(o, window.brick_layers(level - 1));
       const std::uint32_t to = leaf.value_index(offset, window.brick_layers(level));
-      for (int c = 0; c < window.channels(); ++c) values.channel(c)[to] = source.channel(c)[at];
+      std::copy_n(source.of(at), window.channels(), values.of(to));
     }
   }
 }

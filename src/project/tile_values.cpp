@@ -54,7 +54,7 @@ void take_shared(const Window& window, int level, const Work& work, int z) {
 void copy_values(const Window& window, int level, const Finer& from, CornerValues& to, std::uint32_t at) {
   const CornerValues& source = from.block->values[window.brick_of(level - 1, from.offset >> 6)];
   const std::uint32_t i = from.block->value_index(from.offset, window.brick_layers(level - 1));
-  for (int c = 0; c < window.channels(); ++c) to.channel(c)[at] = source.channel(c)[i];
+  std::copy_n(source.of(i), window.channels(), to.of(at));
 }
 
 }  // namespace
@@ -130,15 +130,16 @@ void store_values(Window& window, int level, const Work& work, const std::vector
       ++next;
       const FitOutput& out = fit.fits[g];
       const Lanes* sums = &state.sums[g * channels];
-      values.channel(kDistance)[at] = out.distance[l] * cell;
-      values.channel(kNormalX)[at] = out.nx[l];
-      values.channel(kNormalY)[at] = out.ny[l];
-      values.channel(kNormalZ)[at] = out.nz[l];
-      values.channel(kCurvature)[at] = out.curvature[l] / cell;
-      values.channel(kReach)[at] = out.reach[l];
+      float* const v = values.of(at);
+      v[kDistance] = out.distance[l] * cell;
+      v[kNormalX] = out.nx[l];
+      v[kNormalY] = out.ny[l];
+      v[kNormalZ] = out.nz[l];
+      v[kCurvature] = out.curvature[l] / cell;
+      v[kReach] = out.reach[l];
       const float inv = 1.0F / sums[kW][l];
       for (int c = 0; c < window.attributes(); ++c)
-        values.channel(kFirstAttribute + c)[at] = sums[kSums + c][l] * inv;
+        v[kFirstAttribute + c] = sums[kSums + c][l] * inv;
     }
   }
 }

@@ -1,6 +1,5 @@
 // An 8^3 block of cells and of the corners at their lower ends: what a leaf of the window's trees holds. Masks tell
-// what exists, one structure-of-arrays block per slab holds the values of the corners that have any (DESIGN "Layout of
-// the tree").
+// what exists, one array per slab holds the values of the corners that have any.
 #pragma once
 #include <array>
 #include <bit>
@@ -58,18 +57,32 @@ struct RawAllocator : std::allocator<T> {
   }
 };
 
-/// Values of the `near` corners of one slab's layers inside a leaf, channel after channel, each in mask order.
+/// Values of the `near` corners of one slab's layers inside a leaf: a record of channels per corner, in mask order.
+/// Stages ask for all of a corner, so that records touch fewer lines of the cache than an array per channel would.
 struct CornerValues {
   std::vector<float, RawAllocator<float>> data;
   std::uint32_t count = 0;  ///< corners
+  std::uint32_t channels = 0;
+
+  /// One channel of all corners.
+  template <typename T>
+  struct Strided {
+    T* first;
+    std::uint32_t stride;
+    T& operator[](std::size_t i) const { return first[i * stride]; }
+  };
+
   /// Room for values yet to be written.
-  void allocate(std::uint32_t corners, int channels) {
+  void allocate(std::uint32_t corners, int channel_count) {
     count = corners;
+    channels = static_cast<std::uint32_t>(channel_count);
     data.clear();
-    data.resize(static_cast<std::size_t>(corners) * static_cast<std::size_t>(channels));
+    data.resize(std::size_t{count} * channels);
   }
-  [[nodiscard]] float* channel(int c) { return data.data() + static_cast<std::size_t>(c) * count; }
-  [[nodiscard]] const float* channel(int c) const { return data.data() + static_cast<std::size_t>(c) * count; }
+  [[nodiscard]] float* of(std::uint32_t corner) { return data.data() + std::size_t{corner} * channels; }
+  [[nodiscard]] const float* of(std::uint32_t corner) const { return data.data() + std::size_t{corner} * channels; }
+  [[nodiscard]] Strided<float> channel(int c) { return {data.data() + c, channels}; }
+  [[nodiscard]] Strided<const float> channel(int c) const { return {data.data() + c, channels}; }
 };
 
 /// Numbers of the isovertices and surface corners of one layer, written by extraction. Tables are per slab
