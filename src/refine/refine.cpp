@@ -150,13 +150,14 @@ void inherit(Window& window, int level, std::int32_t slab) {
     for (int z = begin; z < end; ++z) {
       const std::uint64_t nodes = parent == nullptr ? 0 : from_parent(parent->split, t.block, z);
       std::uint64_t reached = t.leaf->touched.words[z];
-      std::uint64_t close = t.leaf->close.words[z];
+      std::uint64_t close = 0;
       if (parent != nullptr) {
         reached |= from_parent(parent->reached, t.block, z);
-        close |= from_parent(parent->close, t.block, z);
+        close = from_parent(parent->close, t.block, z);
       }
       t.leaf->reached.words[z] = reached & nodes;
-      t.leaf->close.words[z] = close & nodes;
+      t.leaf->above.words[z] = close & nodes;
+      t.leaf->close.words[z] = (t.leaf->close.words[z] | close) & nodes;
       t.leaf->cells.words[z] = reached & nodes & ~t.leaf->split.words[z];
     }
   });
@@ -167,11 +168,19 @@ void inherit(Window& window, int level, std::int32_t slab) {
 void mark_sample(Window& window, const Mark& mark) {
   const std::int32_t a = window.lattice().cell_size(mark.level);
   const Cell c{floor_div(mark.x, a), floor_div(mark.y, a), floor_div(mark.z, a)};
+  const auto set = [&](CornerBlock& block, BlockMask CornerBlock::*mask, int offset) {
+    const std::uint64_t bit = std::uint64_t{1} << (offset & 63);
+    std::atomic_ref<std::uint64_t> word((block.*mask).words[offset >> 6]);
+    if ((word.load(std::memory_order_relaxed) & bit) == 0) word.fetch_or(bit, std::memory_order_relaxed);
+  };
   CornerBlock& block = window.touch_shared(mark.level, block_of(c));
-  const int offset = offset_in_block(c);
-  const std::uint64_t bit = std::uint64_t{1} << (offset & 63);
-  std::atomic_ref<std::uint64_t> word(block.home.words[offset >> 6]);
-  if ((word.load(std::memory_order_relaxed) & bit) == 0) word.fetch_or(bit, std::memory_order_relaxed);
+  set(block, &CornerBlock::home, offset_in_block(c));
+  const auto upper = [a](std::int32_t v, std::int32_t cell) {
+    return std::int64_t{2} * (std::int64_t{v} - std::int64_t{cell} * a) >= a ? 1 : 0;
+  };
+  const Cell corner = c + Cell{upper(mark.x, c.x), upper(mark.y, c.y), upper(mark.z, c.z)};
+  const bool same = block_of(corner) == block_of(c);
+  set(same ? block : window.touch_shared(mark.level, block_of(corner)), &CornerBlock::nearest, offset_in_block(corner));
 }
 
 void refine_slab(Window& window, std::int32_t slab) {
@@ -201,11 +210,12 @@ void place_corners(Window& window, std::int32_t slab) {
     touch_around(window, level, slab, &CornerBlock::cells, 0, 1);
     for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
       const bits::Neighbourhood cells = gather(*t.leaf, &CornerBlock::cells);
-      const bits::Neighbourhood close = gather(*t.leaf, &CornerBlock::close);
+      const bits::Neighbourhood above = gather(*t.leaf, &CornerBlock::above);
+      const bits::Neighbourhood nearest = gather(*t.leaf, &CornerBlock::nearest);
       for (int z = begin; z < end; ++z) {
         const std::uint64_t corners = bits::dilate_layer(cells, z, 0, 1);
         t.leaf->corners.words[z] = corners;
-        t.leaf->near.words[z] = corners == 0 ? 0 : corners & bits::dilate_layer(close, z, 0, 1);
+        t.leaf->near.words[z] = corners == 0 ? 0 : corners & (bits::dilate_layer(nearest, z, -1, 1) | bits::dilate_layer(above, z, 0, 1));
       }
     });
     if (level == 0) continue;

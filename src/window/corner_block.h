@@ -115,11 +115,13 @@ struct CornerBlock : Projected {
   BlockMask home;     ///< cells that hold a sample of this level
   BlockMask touched;  ///< cells that a sample of this level reaches: within two cells of its home
   BlockMask close;    ///< cells within one cell of the home of a sample of this or a coarser level
+  BlockMask above;    ///< cells within one cell of the home of a sample of a coarser level
   BlockMask reached;  ///< cells that a sample of this or a coarser level reaches
   BlockMask split;    ///< subdivided cells
   BlockMask cells;    ///< leaf cells that take part: existing, not split, reached by a sample
 
   // Corners.
+  BlockMask nearest;  ///< corners that lie nearest to a sample of this level
   BlockMask corners;  ///< of the leaf cells in `cells`, of this level
   BlockMask shared;   ///< subset of corners: held by a finer level too, whose value counts
   BlockMask positive;  ///< sign (outside): once projected, of the seen corners' own distances; once finished, of all
