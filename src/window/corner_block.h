@@ -77,6 +77,10 @@ struct Projected {
 };
 
 struct CornerBlock : Projected {
+  /// The blocks around this one in its level, itself in the middle, null where there is none; kept by the window.
+  std::array<CornerBlock*, 27> around{};
+  static constexpr int towards(int dx, int dy, int dz) { return 13 + dx + 3 * dy + 9 * dz; }
+
   // Cells of the octree. A cell of this level exists when its parent is split (or at the coarsest level when touched).
   BlockMask home;     ///< cells that hold a sample of this level
   BlockMask touched;  ///< cells that a sample of this level reaches: within two cells of its home

@@ -59,7 +59,7 @@ class Window {
   void cover(std::int32_t slab);
   /// touch() from several threads at once (all of them through this function, nobody probing), in covered slabs.
   CornerBlock& touch_shared(int level, const Block& b);
-  /// The level's leaves that hold layers of a slab, in canonical order (z, y, x).
+  /// The level's leaves that hold layers of a slab, in canonical order (z, y, x). One thread at a time.
   [[nodiscard]] std::vector<Tile> tiles(int level, std::int32_t slab) const;
   /// Frees the values of a slab's corners; masks stay.
   void retire_values(std::int32_t slab);
