@@ -18,6 +18,10 @@ void set_shared(std::uint64_t& word, std::uint64_t bits) {
   if (bits != 0) std::atomic_ref(word).fetch_or(bits, std::memory_order_relaxed);
 }
 
+void set_layer(std::uint8_t& layers, int z, bool on) {
+  layers = static_cast<std::uint8_t>((layers & ~(1U << z)) | static_cast<unsigned>(on) << z);
+}
+
 /// The finest level that holds a corner of `level`. Levels in between need not hold it: a leaf cell may lie beside one
 /// that is subdivided twice there.
 void mark_finest(Window& window, int level, Cell corner) {
@@ -92,6 +96,8 @@ void find_crossing(const TileView& tile) {
       leaf.accepted[axis].words[z] = accepted[axis];
     }
     leaf.busy.words[z] = accepted[0] | accepted[1] | accepted[2];
+    set_layer(leaf.busy_layers, z, leaf.busy.words[z] != 0);
+    set_layer(leaf.doubtful_layers, z, accepted != change);
     leaf.surface.words[z] = 0;
   }
 }
@@ -110,6 +116,7 @@ void add_finer_busy(const TileView& tile, const Window& window) {
         const int from = 2 * (z - 4 * half);
         const std::uint64_t pair = finer->busy.words[from] | finer->busy.words[from + 1];
         leaf.busy.words[z] |= bits::even_quarter(bits::fold_pairs(pair), qx, qy);
+        set_layer(leaf.busy_layers, z, leaf.busy.words[z] != 0);
       }
     }
   }

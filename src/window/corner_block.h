@@ -102,6 +102,8 @@ struct CornerBlock : Projected {
   std::array<BlockMask, 3> accepted;  ///< subset of crossing: the isovertex is valid
   BlockMask busy;     ///< cells with an accepted edge of this or a finer level at or above their low corner
   BlockMask surface;  ///< corners at an end of an accepted edge
+  std::uint8_t busy_layers = 0;      ///< bit z: layer z of `busy` is not empty
+  std::uint8_t doubtful_layers = 0;  ///< bit z: an edge of layer z is in `crossing` and not in `accepted`
   std::array<LayerNumbers, 8> numbers{};
 
   /// Cell centres, where diffusion projects those instead of the corners; shared so that a block can be copied.
