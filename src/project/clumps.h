@@ -1,5 +1,5 @@
-// A bucket's samples in the order in which tiles want them: in clumps, cubes of a few cells of the samples' own level, so
-// that tiles look for clumps instead of samples.
+// A bucket's samples in the order in which tiles want them: in clumps, cubes of a few cells of the samples' own level,
+// so that tiles look for clumps instead of samples.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -17,10 +17,10 @@ struct Clump {
 
 /// What projection needs of a bucket's samples; those without a support are left out.
 struct ClumpedBucket {
-  std::vector<std::int32_t> x, y, z;          ///< steps
-  std::vector<float> nx, ny, nz;              ///< unit normals
-  std::vector<float> support, weight;         ///< as in ActiveBucket
-  std::vector<float> cell;                    ///< of the sample's level, steps
+  std::vector<std::int32_t> x, y, z;           ///< steps
+  std::vector<float> nx, ny, nz;               ///< unit normals
+  std::vector<float> support, weight;          ///< as in ActiveBucket
+  std::vector<float> cell;                     ///< of the sample's level, steps
   std::vector<std::vector<float>> attributes;  ///< one array per attribute
   std::vector<Clump> clumps;
 };

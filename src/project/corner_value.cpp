@@ -15,6 +15,14 @@ Place place_of(const Window& window, int level, const Cell& corner) {
   return {window.probe(level, block_of(corner)), offset_in_block(corner)};
 }
 
+/// The place beside another, at most one step away on each axis.
+Place beside(const Place& p, int dx, int dy, int dz) {
+  const int x = (p.offset & 7) + dx;
+  const int y = ((p.offset >> 3) & 7) + dy;
+  const int z = (p.offset >> 6) + dz;
+  return {p.block->around[CornerBlock::towards(x >> 3, y >> 3, z >> 3)], BlockMask::offset(x & 7, y & 7, z & 7)};
+}
+
 /// Own value; the corner must be near and its slab projected.
 void own_value(const Window& window, int level, const Place& p, CornerValue& out, float* attributes, float weight) {
   const CornerValues& values = p.block->values[window.brick_of(level, p.offset >> 6)];
@@ -49,7 +57,7 @@ bool corner_value(const Window& window, int level, const Cell& corner, CornerVal
       for (int dx = -1; dx <= 1; ++dx) {
         const int m = (dx != 0) + (dy != 0) + (dz != 0);
         if (m == 0) continue;
-        const Place p = place_of(window, level, corner + Cell{dx, dy, dz});
+        const Place p = beside(here, dx, dy, dz);
         if (p.block == nullptr || !p.block->good.test(p.offset) || !has_values(window, level, p)) continue;
         const float w = 1.0F / static_cast<float>(m * m);
         CornerValue v;

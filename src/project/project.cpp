@@ -12,6 +12,7 @@
 #include "project/queries.h"
 #include "project/tile_samples.h"
 #include "project/tile_values.h"
+#include "refine/refine.h"
 
 namespace lamina {
 struct Projector::Scratch {
@@ -66,11 +67,13 @@ std::vector<Work> list_work(Window& window, int level, std::int32_t slab, bool c
     Work w{t, t.leaf, std::max(first, 0), std::min(8, first + window.lattice().layers(level))};
     if (centres) {
       std::uint64_t any = 0;
-      for (int z = w.begin; z < w.end; ++z) any |= t.leaf->cells.words[z] & t.leaf->close.words[z];
+      std::array<std::uint64_t, 8> close{};
+      close_cells(*t.leaf, w.begin, w.end, &close[w.begin]);
+      for (int z = w.begin; z < w.end; ++z) any |= t.leaf->cells.words[z] & close[z];
       if (any == 0) continue;
       if (t.leaf->centres == nullptr) t.leaf->centres = std::make_shared<Projected>();
       w.points = t.leaf->centres.get();
-      for (int z = w.begin; z < w.end; ++z) w.points->near.words[z] = t.leaf->cells.words[z] & t.leaf->close.words[z];
+      for (int z = w.begin; z < w.end; ++z) w.points->near.words[z] = t.leaf->cells.words[z] & close[z];
     }
     std::uint64_t near = 0;
     for (int z = w.begin; z < w.end; ++z) near |= w.points->near.words[z];

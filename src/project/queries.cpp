@@ -30,8 +30,8 @@ void list_queries(const Work& work, std::vector<Query>& out) {
     for (std::uint64_t w = work.points->near.words[z]; w != 0; w &= w - 1) {
       const int bit = std::countr_zero(w);
       if (((shared >> bit) & 1U) != 0) continue;
-      out.push_back({static_cast<std::uint8_t>(bit & 7), static_cast<std::uint8_t>(bit >> 3),
-                     static_cast<std::uint8_t>(z)});
+      out.push_back(
+          {static_cast<std::uint8_t>(bit & 7), static_cast<std::uint8_t>(bit >> 3), static_cast<std::uint8_t>(z)});
     }
   }
 }

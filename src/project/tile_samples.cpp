@@ -110,9 +110,8 @@ TileRuns bin_clumps(const Lattice& lattice, const Reach& reach, const ClumpedBat
                     std::span<const Block> tiles) {
   const TileTable table(tiles);
   std::vector<std::vector<Entry>> entries(batch.size());
-  tbb::parallel_for(std::size_t{0}, batch.size(), [&](std::size_t b) {
-    bin_bucket(lattice, reach, *batch[b], tiles, table, entries[b]);
-  });
+  tbb::parallel_for(std::size_t{0}, batch.size(),
+                    [&](std::size_t b) { bin_bucket(lattice, reach, *batch[b], tiles, table, entries[b]); });
   TileRuns bins;
   bins.begin.assign(tiles.size() + 1, 0);
   for (const auto& bucket : entries) {
@@ -141,7 +140,9 @@ void RowSamples::select(const Lattice& lattice, const Reach& reach, const Block&
   const std::int32_t a = lattice.cell_size(reach.level);
   const float inv = 1.0F / static_cast<float>(a);
   // Differences are taken in integers: exact however far the tile lies from the origin.
-  const auto origin = [a](std::int32_t b) { return static_cast<std::uint32_t>(b) * 8U * static_cast<std::uint32_t>(a); };
+  const auto origin = [a](std::int32_t b) {
+    return static_cast<std::uint32_t>(b) * 8U * static_cast<std::uint32_t>(a);
+  };
   const std::uint32_t ox = origin(block.x);
   const std::uint32_t oy = origin(block.y);
   const std::uint32_t oz = origin(block.z);
@@ -177,7 +178,8 @@ void RowSamples::select(const Lattice& lattice, const Reach& reach, const Block&
         p.y[i] = y;
         p.z[i] = z;
         p.support[i] = s;
-        p.keep[i] = static_cast<int>(std::abs(x - middle) <= half + s) & static_cast<int>(std::abs(y - middle) <= half + s) &
+        p.keep[i] = static_cast<int>(std::abs(x - middle) <= half + s) &
+                    static_cast<int>(std::abs(y - middle) <= half + s) &
                     static_cast<int>(std::abs(z - z_middle) <= z_half + s);
         // Rows by the very coordinates the sums use: what ranges() cuts off lies beyond the support in these, too.
         constexpr float kLast = kRows - 1;

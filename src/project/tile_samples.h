@@ -29,8 +29,8 @@ struct TileRuns {
   }
 };
 
-/// Points of a level to look for: those of the layers [first, end), `shift` cells above the corners (0: corners, 0.5: cell
-/// centres). Supports are taken `margin` steps longer than they are.
+/// Points of a level to look for: those of the layers [first, end), `shift` cells above the corners (0: corners, 0.5:
+/// cell centres). Supports are taken `margin` steps longer than they are.
 struct Reach {
   int level = 0;
   std::int32_t first = 0, end = 0;

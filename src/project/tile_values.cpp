@@ -87,8 +87,8 @@ Tally fit_tile(const Kernel& kernel, const ProjectSettings& settings, std::size_
   return tally;
 }
 
-void store_values(Window& window, int level, const Work& work, const std::vector<Query>& queries, const TileState& state,
-                  const TileFit& fit) {
+void store_values(Window& window, int level, const Work& work, const std::vector<Query>& queries,
+                  const TileState& state, const TileFit& fit) {
   Projected& points = *work.points;
   CornerBlock& leaf = *work.tile.leaf;
   const bool corners = work.points == work.tile.leaf;
@@ -138,8 +138,7 @@ void store_values(Window& window, int level, const Work& work, const std::vector
       v[kCurvature] = out.curvature[l] / cell;
       v[kReach] = out.reach[l];
       const float inv = 1.0F / sums[kW][l];
-      for (int c = 0; c < window.attributes(); ++c)
-        v[kFirstAttribute + c] = sums[kSums + c][l] * inv;
+      for (int c = 0; c < window.attributes(); ++c) v[kFirstAttribute + c] = sums[kSums + c][l] * inv;
     }
   }
 }

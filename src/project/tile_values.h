@@ -24,9 +24,9 @@ Tally fit_tile(const Kernel& kernel, const ProjectSettings& settings, std::size_
                const std::vector<Query>& queries, TileFit& out);
 
 /// Writes what later stages need into the slab's layers of the block: `seen`, `good`, the signs of the seen points' own
-/// distances in `positive` (corners only), and the values, for the seen points alone: `near` becomes `seen`. Corners that
-/// a finer level holds take its values: it must be done.
-void store_values(Window& window, int level, const Work& work, const std::vector<Query>& queries, const TileState& state,
-                  const TileFit& fit);
+/// distances in `positive` (corners only), and the values, for the seen points alone: `near` becomes `seen`. Corners
+/// that a finer level holds take its values: it must be done.
+void store_values(Window& window, int level, const Work& work, const std::vector<Query>& queries,
+                  const TileState& state, const TileFit& fit);
 
 }  // namespace lamina

@@ -111,35 +111,37 @@ struct Projected {
 };
 
 struct CornerBlock : Projected {
+  /// The blocks around this one in its level, itself in the middle, null where there is none; kept by the window.
+  std::array<CornerBlock*, 27> around{};
+  static constexpr int towards(int dx, int dy, int dz) { return 13 + dx + 3 * dy + 9 * dz; }
+
   // Cells of the octree. A cell of this level exists when its parent is split (or at the coarsest level when touched).
   BlockMask home;     ///< cells that hold a sample of this level
   BlockMask touched;  ///< cells that a sample of this level reaches: within two cells of its home
-  BlockMask close;    ///< cells within one cell of the home of a sample of this or a coarser level
+  BlockMask close;    ///< where cells are split: within one cell of the home of a sample of this or a coarser level
   BlockMask above;    ///< cells within one cell of the home of a sample of a coarser level
   BlockMask reached;  ///< cells that a sample of this or a coarser level reaches
   BlockMask split;    ///< subdivided cells
   BlockMask cells;    ///< leaf cells that take part: existing, not split, reached by a sample
 
   // Corners.
-  BlockMask nearest;  ///< corners that lie nearest to a sample of this level
-  BlockMask corners;  ///< of the leaf cells in `cells`, of this level
-  BlockMask shared;   ///< subset of corners: held by a finer level too, whose value counts
+  BlockMask nearest;   ///< corners that lie nearest to a sample of this level
+  BlockMask corners;   ///< of the leaf cells in `cells`, of this level
+  BlockMask shared;    ///< subset of corners: held by a finer level too, whose value counts
   BlockMask positive;  ///< sign (outside): once projected, of the seen corners' own distances; once finished, of all
   // Set when the slab is finished.
-  BlockMask valued;    ///< subset of corners: the sign rests on samples, its own or its neighbours'; others are a guess
-  BlockMask carried;   ///< corners with samples of their own, or with trusted neighbours on all sides
+  BlockMask valued;   ///< subset of corners: the sign rests on samples, its own or its neighbours'; others are a guess
+  BlockMask carried;  ///< corners with samples of their own, or with trusted neighbours on all sides
 
   // Minimal edges with a sign change, by axis, keyed by their lower corner; written by extraction.
   std::array<BlockMask, 3> crossing;
   std::array<BlockMask, 3> accepted;  ///< subset of crossing: the isovertex is valid
-  BlockMask busy;     ///< cells with an accepted edge of this or a finer level at or above their low corner
-  BlockMask surface;  ///< corners at an end of an accepted edge
+  BlockMask busy;                ///< cells with an accepted edge of this or a finer level at or above their low corner
+  BlockMask surface;             ///< corners at an end of an accepted edge
+  bool inherits = false;         ///< `above` is not empty
+  std::uint8_t busy_layers = 0;  ///< bit z: layer z of `busy` is not empty
+  std::uint8_t doubtful_layers = 0;  ///< bit z: an edge of layer z is in `crossing` and not in `accepted`
   std::array<LayerNumbers, 8> numbers{};
-
-  /// The blocks around of the same level, null where there is none: [x + 1 + 3 (y + 1) + 9 (z + 1)], itself in the
-  /// middle. Kept by the window.
-  static constexpr int kHere = 13;
-  std::array<CornerBlock*, 27> around{};
 
   /// Cell centres, where diffusion projects those instead of the corners; shared so that a block can be copied.
   std::shared_ptr<Projected> centres;
