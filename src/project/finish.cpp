@@ -83,6 +83,7 @@ constexpr float kSurrounded = 0.3F * 0.3F;
 /// Corners of the layer whose own projected point lies beyond the limit.
 std::uint64_t beyond(const Window& window, int level, const CornerBlock& leaf, int z, float boundary) {
   std::uint64_t out = 0;
+  if (leaf.seen.words[z] == 0) return 0;
   const CornerValues& values = leaf.values[window.brick_of(level, z)];
   std::uint32_t i = leaf.value_index(z * 64, window.brick_layers(level));
   for (std::uint64_t w = leaf.near.words[z]; w != 0; w &= w - 1, ++i) {

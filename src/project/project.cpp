@@ -109,6 +109,11 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
   for (int level = 0; level < window.levels(); ++level) {
     const std::vector<Work> work = list_work(window, level, slab, settings_.centres);
     if (work.empty()) continue;
+    if (batches.empty()) {
+      // Nothing is seen here.
+      for (const Work& w : work) std::fill_n(&w.points->near.words[w.begin], w.end - w.begin, 0);
+      continue;
+    }
     std::vector<Block> blocks;
     blocks.reserve(work.size());
     for (const Work& w : work) blocks.push_back(w.tile.block);
