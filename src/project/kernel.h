@@ -24,7 +24,8 @@ enum Sum : int {
   kPP,       ///< sum w p.p
   kPN,       ///< sum w p.n
   kWR,       ///< sum w R
-  kNearest,  ///< min |p - x|^2 / band^2 over samples with w > 0, band = the sample's own
+  kNearest,  ///< min |p - x|^2 / band^2 over samples with w > 0, band = the sample's own; 0 where no band is narrower
+             ///< than its sample's support
   kSeen,     ///< number of samples with w > 0
   kSums      ///< then one sum w c per attribute
 };
@@ -36,6 +37,7 @@ struct TileSamples {
   std::vector<float> inv_support2;  ///< 1 / R^2
   std::vector<float> inv_band2;     ///< 1 / band^2
   std::vector<float> weight;        ///< q_i
+  bool banded = true;               ///< some sample's band is narrower than its support
   std::vector<std::vector<float>> attributes;
   void resize(std::size_t n, std::size_t attribute_count);
 };
