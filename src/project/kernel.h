@@ -80,11 +80,12 @@ struct CornerField {
   std::array<std::uint8_t, 10 * kRows> any;  ///< [z + 1][y + 1]: whether the row has trusted corners
 };
 
-/// What the trusted ones among 26 neighbours say about eight corners. Weights are 1 / m^2, m = L1 offset in cells.
+/// What the trusted ones among 26 neighbours say about eight corners, a bit each. Weights are 1 / m^2, m = L1 offset in
+/// cells.
 struct Extension {
-  Lanes distance;  ///< weighted sum of the neighbours' planes' distances, steps
-  Lanes weight;    ///< sum of weights; 0: no trusted neighbour
-  Lanes aside;     ///< squared distance, along the surface, of the neighbours' weighted mean from the corner, cells^2
+  std::uint8_t positive;    ///< the weighted sum of the neighbours' planes' distances is not negative
+  std::uint8_t valued;      ///< there are trusted neighbours
+  std::uint8_t surrounded;  ///< and their weighted mean lies near the corner, measured along the surface
 };
 
 struct Kernel {
@@ -92,8 +93,9 @@ struct Kernel {
   /// Adds samples of `ranges` to `sums` (kSums + attributes lanes).
   void (*accumulate)(const TileSamples&, const SampleRange* ranges, int count, const Queries&, Lanes* sums);
   void (*fit)(const Lanes* sums, const FitInput&, FitOutput&);
-  /// Extends trusted neighbours' planes to the eight corners of row (y, z) of a tile. `cell` in steps.
-  void (*extend)(const CornerField&, int y, int z, float cell, Extension& out);
+  /// Extends trusted neighbours' planes to the eight corners of row (y, z) of a tile. `cell` in steps; `near`: squared
+  /// distance in cells up to which a corner is surrounded.
+  Extension (*extend)(const CornerField&, int y, int z, float cell, float near);
 };
 
 /// Kernels this processor can run, best last.

@@ -177,6 +177,16 @@ inline Vec load(const float* p) {
   return v;
 }
 
+typedef int IntVec __attribute__((vector_size(32)));  // NOLINT(modernize-use-using)
+
+/// A bit for every lane where a comparison holds.
+inline std::uint8_t lanes(const IntVec& holds) {
+  const IntVec bits = holds & IntVec{1, 2, 4, 8, 16, 32, 64, 128};
+  int out = 0;
+  for (int l = 0; l < kLanes; ++l) out |= bits[l];
+  return static_cast<std::uint8_t>(out);
+}
+
 /// A channel of three rows' corners side by side: the middle ones, and sum and difference of the outer ones.
 struct Triple {
   Vec middle, sum, difference;
@@ -188,7 +198,7 @@ inline Triple triple(const float* p) {
   return {load(p), low + high, high - low};
 }
 
-inline void extend(const CornerField& f, int y, int z, float cell, Extension& out) {
+inline Extension extend(const CornerField& f, int y, int z, float cell, float near) {
   const Vec zero = splat(0.0F);
   Vec s = zero;
   Vec w = zero;
@@ -230,7 +240,6 @@ inline void extend(const CornerField& f, int y, int z, float cell, Extension& ou
   const Vec n2 = nx * nx + ny * ny + nz * nz;
   const Vec along = ox * nx + oy * ny + oz * nz;
   const Vec n2_or_one = n2 > zero ? n2 : splat(1.0F);
-  vec(out.distance) = s;
-  vec(out.weight) = w;
-  vec(out.aside) = (ox * ox + oy * oy + oz * oz - along * along / n2_or_one) / (any * any);
+  const Vec aside = (ox * ox + oy * oy + oz * oz - along * along / n2_or_one) / (any * any);
+  return {lanes(s >= zero), lanes(w > zero), lanes((w > zero) & (aside <= splat(near)))};
 }
