@@ -32,6 +32,11 @@ struct BlockMask {
   }
 };
 
+/// Asks for a mask some time before it is read: a slab's leaves do not fit the processor's cache, and lie anywhere.
+inline void prefetch(const BlockMask& m) {
+  __builtin_prefetch(m.words.data());
+}
+
 /// What a valued corner holds after projection, in channels (lengths in fixed-point steps).
 /// Distance is signed (positive outside), the normal is the fit's at the projected point, which lies at corner -
 /// distance * normal; curvature is the fit's signed curvature there (1/steps, positive where the surface bends away
