@@ -11,8 +11,8 @@
 namespace lamina {
 
 /// 512 bits, a 64-bit word per layer z; bit x + 8 y inside a word. OpenVDB's own linear order with its i axis as z:
-/// Coord(z, y, x), so that a slab is a run of words.
-struct BlockMask {
+/// Coord(z, y, x), so that a slab is a run of words. A cache line, whole.
+struct alignas(64) BlockMask {
   std::array<std::uint64_t, 8> words{};
 
   static constexpr int offset(int x, int y, int z) { return x + (y << 3) + (z << 6); }
@@ -31,11 +31,6 @@ struct BlockMask {
     return n;
   }
 };
-
-/// Asks for a mask some time before it is read: a slab's leaves do not fit the processor's cache, and lie anywhere.
-inline void prefetch(const BlockMask& m) {
-  __builtin_prefetch(m.words.data());
-}
 
 /// What a valued corner holds after projection, in channels (lengths in fixed-point steps).
 /// Distance is signed (positive outside), the normal is the fit's at the projected point, which lies at corner -
@@ -86,6 +81,11 @@ struct CornerBlock : Projected {
   std::array<CornerBlock*, 27> around{};
   static constexpr int towards(int dx, int dy, int dz) { return 13 + dx + 3 * dy + 9 * dz; }
 
+  // Layers in which extraction has something to look at, bit z for layer z: most leaves lie off the surface.
+  std::uint8_t busy_layers = 0;      ///< `busy` is not empty
+  std::uint8_t doubtful_layers = 0;  ///< an edge is in `crossing` and not in `accepted`
+  std::uint8_t surface_layers = 0;   ///< `surface` may hold corners: an accepted edge begins or ends there
+
   // Cells of the octree. A cell of this level exists when its parent is split (or at the coarsest level when touched).
   BlockMask home;     ///< cells that hold a sample of this level
   BlockMask touched;  ///< cells that a sample of this level reaches: within two cells of its home
@@ -107,8 +107,6 @@ struct CornerBlock : Projected {
   std::array<BlockMask, 3> accepted;  ///< subset of crossing: the isovertex is valid
   BlockMask busy;     ///< cells with an accepted edge of this or a finer level at or above their low corner
   BlockMask surface;  ///< corners at an end of an accepted edge
-  std::uint8_t busy_layers = 0;      ///< bit z: layer z of `busy` is not empty
-  std::uint8_t doubtful_layers = 0;  ///< bit z: an edge of layer z is in `crossing` and not in `accepted`
   std::array<LayerNumbers, 8> numbers{};
 
   /// Cell centres, where diffusion projects those instead of the corners; shared so that a block can be copied.

@@ -19,7 +19,7 @@ class CornerLeaf : public openvdb::tree::LeafNode<openvdb::ValueMask, 3> {
   using Ptr = std::shared_ptr<CornerLeaf>;
   using Coord = openvdb::Coord;
 
-  alignas(64) CornerBlock block;  // a mask is one cache line
+  CornerBlock block;
 
   CornerLeaf() = default;
   explicit CornerLeaf(const Coord& xyz, bool value = false, bool active = false) : Base(xyz, value, active) {}
