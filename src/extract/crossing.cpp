@@ -77,10 +77,9 @@ void find_crossing(const TileView& tile) {
     // The words of a mask at the other ends of the layer's edges.
     const auto ends = [&](BlockMask CornerBlock::*mask) {
       const std::uint64_t here = (leaf.*mask).words[z];
-      return std::array<std::uint64_t, 3>{
-          bits::shift_x(0, here, right == nullptr ? 0 : (right->*mask).words[z], -1),
-          bits::shift_y(0, here, up == nullptr ? 0 : (up->*mask).words[z], -1),
-          above == nullptr ? 0 : (above->*mask).words[(z + 1) & 7]};
+      return std::array<std::uint64_t, 3>{bits::shift_x(0, here, right == nullptr ? 0 : (right->*mask).words[z], -1),
+                                          bits::shift_y(0, here, up == nullptr ? 0 : (up->*mask).words[z], -1),
+                                          above == nullptr ? 0 : (above->*mask).words[(z + 1) & 7]};
     };
     std::array<std::uint64_t, 3> change{};
     std::array<std::uint64_t, 3> accepted{};

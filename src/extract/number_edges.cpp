@@ -63,7 +63,6 @@ void fill_corners(const Window& window, const TileView& tile, IsoSlab& out) {
     const std::uint64_t trusted = near & leaf.good.words[z];
     const std::uint64_t seen = leaf.seen.words[z];
     const CornerValues& values = leaf.values[z / brick_layers];
-    const std::size_t n = values.count;
     std::uint32_t id = leaf.numbers[z].corner_base;
     for_bits(leaf.surface.words[z], [&](int bit) {
       const Cell cell = tile.cell(z * 64 + bit);
@@ -74,10 +73,9 @@ void fill_corners(const Window& window, const TileView& tile, IsoSlab& out) {
       CornerValue value;
       bool valued = true;
       if ((trusted & one) != 0) {
-        const float* v = values.data.data() + rank + std::popcount(near & (one - 1));
-        value = {
-            v[kDistance * n], {v[kNormalX * n], v[kNormalY * n], v[kNormalZ * n]}, v[kCurvature * n], v[kReach * n]};
-        for (int a = 0; a < attributes; ++a) extra[a] = v[(kFirstAttribute + a) * n];
+        const float* v = values.of(rank + static_cast<std::uint32_t>(std::popcount(near & (one - 1))));
+        value = {v[kDistance], {v[kNormalX], v[kNormalY], v[kNormalZ]}, v[kCurvature], v[kReach]};
+        for (int a = 0; a < attributes; ++a) extra[a] = v[kFirstAttribute + a];
       } else {
         valued = corner_value(window, tile.level, cell, value, extra.data());
       }

@@ -27,12 +27,10 @@ Place beside(const Place& p, int dx, int dy, int dz) {
 void own_value(const Window& window, int level, const Place& p, CornerValue& out, float* attributes, float weight) {
   const CornerValues& values = p.block->values[window.brick_of(level, p.offset >> 6)];
   const std::uint32_t i = p.block->value_index(p.offset, window.brick_layers(level));
-  out.distance = values.channel(kDistance)[i];
-  out.normal = {values.channel(kNormalX)[i], values.channel(kNormalY)[i], values.channel(kNormalZ)[i]};
-  out.curvature = values.channel(kCurvature)[i];
-  out.reach = values.channel(kReach)[i];
+  const float* const v = values.of(i);
+  out = {v[kDistance], {v[kNormalX], v[kNormalY], v[kNormalZ]}, v[kCurvature], v[kReach]};
   if (attributes == nullptr) return;
-  for (int c = 0; c < window.attributes(); ++c) attributes[c] += weight * values.channel(kFirstAttribute + c)[i];
+  for (int c = 0; c < window.attributes(); ++c) attributes[c] += weight * v[kFirstAttribute + c];
 }
 
 bool has_values(const Window& window, int level, const Place& p) {

@@ -16,7 +16,7 @@ namespace {
 /// Cells a sample reaches around its home. A radius is estimated too small by up to a fifth and a cell may be less than
 /// half of it, so gaps between samples are up to five cells wide: with two, they came out as holes.
 constexpr int kReachCells = 3;
-/// Cells around the home whose corners are projected; with two, nothing gained and half as many corners more.
+/// Cells around the home that finer samples' cells inherit closeness from, and whose centres are projected.
 constexpr int kCloseCells = 1;
 
 bits::Neighbourhood gather(const CornerBlock& leaf, BlockMask CornerBlock::*mask, int hi) {
@@ -46,7 +46,7 @@ LeafLayers leaf_layers(const Window& window, int level, std::int32_t slab, const
 
 template <typename Body>
 void for_tiles(Window& window, int level, std::int32_t slab, const Body& body) {
-  const std::vector<Tile> tiles = window.tiles(level, slab);
+  const Tiles tiles = window.tiles(level, slab);
   tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
     const LeafLayers layers = leaf_layers(window, level, slab, tiles[i].block);
     body(tiles[i], layers.begin, layers.end);
@@ -155,37 +155,65 @@ void inherit(Window& window, int level, std::int32_t slab) {
     for (int octant = 0; octant < 8; ++octant) {
       const std::uint64_t quarter = std::uint64_t{0x0F0F0F0F} << (4 * (octant & 1) + 32 * ((octant >> 1) & 1));
       if ((nodes[octant >> 2] & quarter) == 0) continue;
-      window.touch(level, {t.block.x * 2 + (octant & 1), t.block.y * 2 + ((octant >> 1) & 1),
-                           t.block.z * 2 + (octant >> 2)});
+      window.touch(level,
+                   {t.block.x * 2 + (octant & 1), t.block.y * 2 + ((octant >> 1) & 1), t.block.z * 2 + (octant >> 2)});
     }
   }
+  for_tiles(window, parent_level, slab, [&](const Tile& t, int begin, int end) {
+    std::uint64_t split = 0;
+    for (int z = begin; z < end; ++z) split |= t.leaf->split.words[z];
+    if (split != 0) close_cells(*t.leaf, begin, end, &t.leaf->close.words[begin]);
+  });
   for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
     const CornerBlock* parent = std::as_const(window).probe(parent_level, parent_block(t.block));
+    std::uint64_t any_above = 0;
     for (int z = begin; z < end; ++z) {
       const std::uint64_t nodes = parent == nullptr ? 0 : from_parent(parent->split, t.block, z);
       std::uint64_t reached = t.leaf->touched.words[z];
-      std::uint64_t close = t.leaf->close.words[z];
       if (parent != nullptr) {
         reached |= from_parent(parent->reached, t.block, z);
-        close |= from_parent(parent->close, t.block, z);
+        t.leaf->above.words[z] = from_parent(parent->close, t.block, z) & nodes;
+        any_above |= t.leaf->above.words[z];
       }
       t.leaf->reached.words[z] = reached & nodes;
-      t.leaf->close.words[z] = close & nodes;
       t.leaf->cells.words[z] = reached & nodes & ~t.leaf->split.words[z];
     }
+    t.leaf->inherits = t.leaf->inherits || any_above != 0;
   });
+}
+
+/// Whether cells of coarser samples' closeness touch the block's corners.
+bool inherits(const CornerBlock& leaf) {
+  for (int i = 0; i < 8; ++i) {
+    const CornerBlock* const block = leaf.around[CornerBlock::towards(-(i & 1), -((i >> 1) & 1), -(i >> 2))];
+    if (block != nullptr && block->inherits) return true;
+  }
+  return false;
 }
 
 }  // namespace
 
+void close_cells(const CornerBlock& leaf, int begin, int end, std::uint64_t* out) {
+  bits::dilate_layers<-kCloseCells, kCloseCells>(gather(leaf, &CornerBlock::home, 1), begin, end, out);
+  for (int z = begin; z < end; ++z) out[z - begin] |= leaf.above.words[z];
+}
+
 void mark_sample(Window& window, const Mark& mark) {
   const std::int32_t a = window.lattice().cell_size(mark.level);
   const Cell c{floor_div(mark.x, a), floor_div(mark.y, a), floor_div(mark.z, a)};
+  const auto set = [&](CornerBlock& block, BlockMask CornerBlock::*mask, int offset) {
+    const std::uint64_t bit = std::uint64_t{1} << (offset & 63);
+    std::atomic_ref<std::uint64_t> word((block.*mask).words[offset >> 6]);
+    if ((word.load(std::memory_order_relaxed) & bit) == 0) word.fetch_or(bit, std::memory_order_relaxed);
+  };
   CornerBlock& block = window.touch_shared(mark.level, block_of(c));
-  const int offset = offset_in_block(c);
-  const std::uint64_t bit = std::uint64_t{1} << (offset & 63);
-  std::atomic_ref<std::uint64_t> word(block.home.words[offset >> 6]);
-  if ((word.load(std::memory_order_relaxed) & bit) == 0) word.fetch_or(bit, std::memory_order_relaxed);
+  set(block, &CornerBlock::home, offset_in_block(c));
+  const auto upper = [a](std::int32_t v, std::int32_t cell) {
+    return std::int64_t{2} * (std::int64_t{v} - std::int64_t{cell} * a) >= a ? 1 : 0;
+  };
+  const Cell corner = c + Cell{upper(mark.x, c.x), upper(mark.y, c.y), upper(mark.z, c.z)};
+  const bool same = block_of(corner) == block_of(c);
+  set(same ? block : window.touch_shared(mark.level, block_of(corner)), &CornerBlock::nearest, offset_in_block(corner));
 }
 
 void refine_slab(Window& window, std::int32_t slab) {
@@ -195,7 +223,6 @@ void refine_slab(Window& window, std::int32_t slab) {
     for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
       const bits::Neighbourhood home = gather(*t.leaf, &CornerBlock::home, 1);
       bits::dilate_layers<-kReachCells, kReachCells>(home, begin, end, &t.leaf->touched.words[begin]);
-      bits::dilate_layers<-kCloseCells, kCloseCells>(home, begin, end, &t.leaf->close.words[begin]);
     });
   }
   for (int level = 0; level + 1 < levels; ++level) split_parents(window, level, slab);
@@ -213,9 +240,14 @@ void place_corners(Window& window, std::int32_t slab) {
     touch_around(window, level, slab, &CornerBlock::cells, 0, 1);
     for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
       const bits::Neighbourhood cells = gather(*t.leaf, &CornerBlock::cells, 0);
-      const bits::Neighbourhood close = gather(*t.leaf, &CornerBlock::close, 0);
+      const bits::Neighbourhood nearest = gather(*t.leaf, &CornerBlock::nearest, 1);
       bits::dilate_layers<0, 1>(cells, begin, end, &t.leaf->corners.words[begin]);
-      bits::dilate_layers<0, 1>(close, begin, end, &t.leaf->near.words[begin]);
+      bits::dilate_layers<-1, 1>(nearest, begin, end, &t.leaf->near.words[begin]);
+      if (inherits(*t.leaf)) {
+        std::array<std::uint64_t, 8> above{};
+        bits::dilate_layers<0, 1>(gather(*t.leaf, &CornerBlock::above, 0), begin, end, above.data());
+        for (int z = begin; z < end; ++z) t.leaf->near.words[z] |= above[z - begin];
+      }
       for (int z = begin; z < end; ++z) t.leaf->near.words[z] &= t.leaf->corners.words[z];
     });
     if (level == 0) continue;

@@ -53,7 +53,7 @@ void Pipeline::mark(const ActiveBucket& bucket) {
   constexpr std::size_t kPiece = 4096;
   const std::size_t n = bucket.samples.size();
   const auto [low, high] = std::minmax_element(bucket.samples.z.begin(), bucket.samples.z.end());
-  for (covered_ = std::min(covered_, resolved_.lattice.slab_of(*low)); covered_ <= resolved_.lattice.slab_of(*high);
+  for (covered_ = std::min(covered_, resolved_.lattice.slab_of(*low)); covered_ <= resolved_.lattice.slab_of(*high) + 1;
        ++covered_) {
     window_.cover(covered_);
   }

@@ -48,7 +48,7 @@ void retire_branches(CornerTree& tree, Branches& branches, std::int32_t end) {
 }  // namespace
 
 struct Window::Trees {
-  /// The leaves of one layer of blocks: in order of creation, and by place for quick lookup.
+  /// The leaves of one layer of blocks: as a list, put in order when it is asked for, and by place for quick lookup.
   struct Layer {
     std::vector<Tile> tiles;
     std::size_t ordered = 0;  ///< so many of the tiles are in canonical order
@@ -80,6 +80,8 @@ struct Window::Trees {
   CornerBlock* find(int l, const Block& b) {
     Level& level = levels[l];
     if (CornerBlock** s = slot(level, b)) return *s;
+    // Every leaf has its layer.
+    if (b.z < level.z_base || b.z - level.z_base >= static_cast<std::int32_t>(level.layers.size())) return nullptr;
     CornerLeaf* leaf = level.tree.probeLeaf(leaf_origin(b));
     return leaf == nullptr ? nullptr : &leaf->block;
   }
@@ -141,12 +143,13 @@ struct Window::Trees {
     }
   }
 
-  static void order(Layer& layer) {
-    if (layer.ordered == layer.tiles.size()) return;
+  static std::span<const Tile> in_order(Layer& layer) {
+    if (layer.ordered == layer.tiles.size()) return layer.tiles;
     const auto added = layer.tiles.begin() + static_cast<std::ptrdiff_t>(layer.ordered);
     std::sort(added, layer.tiles.end(), before);
     std::inplace_merge(layer.tiles.begin(), added, layer.tiles.end(), before);
     layer.ordered = layer.tiles.size();
+    return layer.tiles;
   }
 };
 
@@ -198,18 +201,20 @@ CornerBlock& Window::touch_shared(int level, const Block& b) {
   return touch(level, b);
 }
 
-std::vector<Tile> Window::tiles(int level, std::int32_t slab) const {
+Tiles Window::tiles(int level, std::int32_t slab) const {
   const std::int32_t first = lattice_.first_layer(level, slab);
   const std::int32_t last = first + lattice_.layers(level) - 1;
   Trees::Level& l = trees_->levels[level];
-  std::vector<Tile> out;
-  for (std::int32_t z = std::max(first >> 3, l.z_base); z <= (last >> 3); ++z) {
-    const std::int32_t i = z - l.z_base;
-    if (i >= static_cast<std::int32_t>(l.layers.size())) break;
-    Trees::order(l.layers[i]);
-    out.insert(out.end(), l.layers[i].tiles.begin(), l.layers[i].tiles.end());
+  const std::int32_t z_end = std::min(last >> 3, l.z_base + static_cast<std::int32_t>(l.layers.size()) - 1);
+  const std::int32_t z_begin = std::max(first >> 3, l.z_base);
+  if (z_begin > z_end) return Tiles(std::span<const Tile>{});
+  if (z_begin == z_end) return Tiles(Trees::in_order(l.layers[z_begin - l.z_base]));
+  std::vector<Tile> joined;
+  for (std::int32_t z = z_begin; z <= z_end; ++z) {
+    const std::span<const Tile> layer = Trees::in_order(l.layers[z - l.z_base]);
+    joined.insert(joined.end(), layer.begin(), layer.end());
   }
-  return out;
+  return Tiles(std::move(joined));
 }
 
 void Window::retire_values(std::int32_t slab) {
