@@ -152,6 +152,7 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
           } else if (step + 1 < settings_.steps) {
             return;
           }
+          settle(state, channels);
           const Tally tally = fit_tile(kernel_, settings_, channels, state, local.queries, local.fit);
           store_values(window, level, work[t], local.queries, state, local.fit);
           seen.fetch_add(tally.seen, std::memory_order_relaxed);

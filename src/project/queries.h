@@ -21,10 +21,19 @@ struct Query {
   std::uint8_t x, y, z;
 };
 
-/// What a tile keeps between batches and steps: per query the query point and the running sums, lane groups of eight.
-struct TileState {
-  std::vector<Queries> points;  ///< query points, cells relative to the tile
+/// Query points and their running sums, in lane groups of eight; the last group is filled up with copies of its last
+/// point.
+struct Lot {
+  std::vector<Queries> points;  ///< cells relative to the tile
   std::vector<Lanes> sums;      ///< per group kSums + attributes lanes
+};
+
+/// What a tile keeps between batches and steps.
+struct TileState {
+  Lot all;                            ///< every query's
+  std::vector<std::uint32_t> moving;  ///< queries that still move, after the first step
+  Lot moved;                          ///< of those
+  bool stepped = false;               ///< `moved` is the one to add samples to
 };
 
 /// Cell centres lie half a cell above their corner.
@@ -34,17 +43,21 @@ inline float shift_of(const ProjectSettings& settings) {
 
 /// Corners farther than this (cells) from their surface gain nothing from further steps.
 inline constexpr float kStepLimit = 1.5F;
+/// Query points that a step moves by no more than this (cells) stay where they are, with the sums they have.
+inline constexpr float kStill = 1e-3F;
 
 /// The near points of the slab that this level projects itself: not those that a finer level holds too.
 void list_queries(const Work& work, std::vector<Query>& out);
 /// Puts the query points on the corners (or centres) and clears the sums.
 void start(TileState& state, const std::vector<Query>& queries, std::size_t channels, float shift);
-/// Moves the query points to the projected points for the next step and clears the sums.
+/// Moves the query points to the projected points for the next step; only those that move go on.
 void advance(const Kernel& kernel, const ProjectSettings& settings, TileState& state, const std::vector<Query>& queries,
              std::size_t channels);
-/// Adds the samples to the sums.
+/// Adds the samples to the sums of the points that still move.
 void accumulate(const Kernel& kernel, const RowSamples& rows, TileState& state, std::size_t channels);
-/// How the sums of a group become points.
+/// Ends the steps: `all` has every query's last point and sums.
+void settle(TileState& state, std::size_t channels);
+/// How the sums of a group of `all` become points.
 FitInput fit_input(const TileState& state, const std::vector<Query>& queries, std::size_t group, Fit fit, float shift);
 
 }  // namespace lamina

@@ -61,13 +61,13 @@ void copy_values(const Window& window, int level, const Finer& from, CornerValue
 
 Tally fit_tile(const Kernel& kernel, const ProjectSettings& settings, std::size_t channels, const TileState& state,
                const std::vector<Query>& queries, TileFit& out) {
-  const std::size_t groups = state.points.size();
+  const std::size_t groups = state.all.points.size();
   out.fits.resize(std::max(groups, out.fits.size()));
   out.seen.assign(groups * kLanes, 0);
   out.good.assign(groups * kLanes, 0);
   Tally tally;
   for (std::size_t g = 0; g < groups; ++g) {
-    const Lanes* sums = &state.sums[g * channels];
+    const Lanes* sums = &state.all.sums[g * channels];
     if (!any_seen(sums)) continue;
     FitOutput& fit = out.fits[g];
     kernel.fit(sums, fit_input(state, queries, g, settings.fit, shift_of(settings)), fit);
@@ -129,7 +129,7 @@ void store_values(Window& window, int level, const Work& work, const std::vector
       const int l = static_cast<int>(next % kLanes);
       ++next;
       const FitOutput& out = fit.fits[g];
-      const Lanes* sums = &state.sums[g * channels];
+      const Lanes* sums = &state.all.sums[g * channels];
       float* const v = values.of(at);
       v[kDistance] = out.distance[l] * cell;
       v[kNormalX] = out.nx[l];

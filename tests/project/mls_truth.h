@@ -68,8 +68,16 @@ class MlsTruth {
       constexpr double kLimit = 1.5;
       if (fit.weight > 0 && std::abs(std::abs(fit.out[0]) - kLimit) <= fit.error[0]) undecided = true;
       if (fit.weight <= 0 || std::abs(fit.out[0]) > kLimit) continue;
-      for (int k = 0; k < 3; ++k) query[k] = corner[k] - fit.out[0] * fit.out[1 + k];
-      query_error = fit.error[0] + std::abs(fit.out[0]) * (fit.error[1] + fit.error[2] + fit.error[3]) + 16 * kUnit;
+      Vec3 next{};
+      for (int k = 0; k < 3; ++k) next[k] = corner[k] - fit.out[0] * fit.out[1 + k];
+      const double by = std::hypot(next[0] - query[0], next[1] - query[1], next[2] - query[2]);
+      const double next_error =
+          fit.error[0] + std::abs(fit.out[0]) * (fit.error[1] + fit.error[2] + fit.error[3]) + 16 * kUnit;
+      constexpr double kStill = 1e-3;  // points that hardly move stay where they are
+      const bool either = std::abs(by - kStill) <= next_error + query_error;
+      if (by <= kStill && !either) break;
+      query = next;
+      query_error = next_error + (either ? kStill : 0);
     }
     TruthValue v;
     v.undecided = undecided;
