@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "project/shared_corners.h"
+#include "window/block_cache.h"
 
 namespace lamina {
 namespace {
@@ -20,23 +21,23 @@ struct Leaf {
 
 /// The leaf cell that fills an octant (bit 0: x, 1: y, 2: z; set = above) around a corner of `level`, whatever its
 /// level.
-Leaf leaf_in_octant(const Window& window, int level, const Cell& corner, int octant) {
+Leaf leaf_in_octant(BlockCache& cache, int level, const Cell& corner, int octant) {
   const Cell toward{(octant & 1) - 1, ((octant >> 1) & 1) - 1, (octant >> 2) - 1};
   Cell cell = corner + toward;
   Cell at = corner;
-  const CornerBlock* block = window.probe(level, block_of(cell));
+  const CornerBlock* block = cache.block(level, cell);
   if (block != nullptr && block->split.test(offset_in_block(cell))) {
     // Down to the child that touches the corner, until one is not split.
     while (block != nullptr && block->split.test(offset_in_block(cell))) {
       at = {at.x * 2, at.y * 2, at.z * 2};
       cell = at + toward;
-      block = window.probe(--level, block_of(cell));
+      block = cache.block(--level, cell);
     }
     if (block == nullptr || !block->cells.test(offset_in_block(cell))) return {};
     return {level, cell};
   }
-  for (; level < window.levels(); ++level) {
-    block = window.probe(level, block_of(cell));
+  for (; level < cache.window().levels(); ++level) {
+    block = cache.block(level, cell);
     if (block != nullptr && block->cells.test(offset_in_block(cell))) return {level, cell};
     if (block != nullptr && block->split.test(offset_in_block(cell))) return {};
     cell = {cell.x >> 1, cell.y >> 1, cell.z >> 1};
@@ -52,7 +53,8 @@ struct Mean {
 };
 
 /// Adds a centre's surface as it is seen from the corner: the second-order distance of the osculating sphere.
-void add(const Window& window, const Leaf& leaf, const float* v, int corner_level, const Cell& corner, Mean& mean, float* attributes) {
+void add(const Window& window, const Leaf& leaf, const float* v, int corner_level, const Cell& corner, Mean& mean,
+         float* attributes) {
   const auto cell = static_cast<float>(window.lattice().cell_size(leaf.level));
   const auto corner_at = window.lattice().position(corner_level, corner);
   const auto cell_at = window.lattice().position(leaf.level, leaf.cell);
@@ -70,27 +72,30 @@ void add(const Window& window, const Leaf& leaf, const float* v, int corner_leve
   for (int c = 0; c < window.attributes(); ++c) attributes[c] += w * v[kFirstAttribute + c];
 }
 
-void diffuse_corner(const Window& window, int level, const Cell& corner, CornerBlock& leaf, int offset,
-                    CornerValues& out, std::uint32_t at) {
+void diffuse_corner(BlockCache& cache, int level, const Cell& corner, CornerBlock& leaf, int offset, CornerValues& out,
+                    std::uint32_t at, std::vector<float>& attributes) {
+  const Window& window = cache.window();
   std::array<Leaf, 8> leaves{};
+  std::array<const Projected*, 8> centres{};
   int count = 0;
   bool trusted = false;
   for (int octant = 0; octant < 8; ++octant) {
-    const Leaf l = leaf_in_octant(window, level, corner, octant);
+    const Leaf l = leaf_in_octant(cache, level, corner, octant);
     if (l.level < 0 || std::find(leaves.begin(), leaves.begin() + count, l) != leaves.begin() + count) continue;
-    const CornerBlock* block = window.probe(l.level, block_of(l.cell));
+    const CornerBlock* block = cache.block(l.level, l.cell);
     if (block->centres == nullptr || !block->centres->seen.test(offset_in_block(l.cell))) continue;
     trusted = trusted || block->centres->good.test(offset_in_block(l.cell));
+    centres[count] = block->centres.get();
     leaves[count++] = l;
   }
   Mean mean;
-  std::vector<float> attributes(static_cast<std::size_t>(window.attributes()), 0.0F);
+  attributes.assign(static_cast<std::size_t>(window.attributes()), 0.0F);
   for (int k = 0; k < count; ++k) {
-    const Projected& centres = *window.probe(leaves[k].level, block_of(leaves[k].cell))->centres;
+    const Projected& from = *centres[k];
     const int o = offset_in_block(leaves[k].cell);
-    if (trusted && !centres.good.test(o)) continue;
-    const CornerValues& values = centres.values[window.brick_of(leaves[k].level, o >> 6)];
-    add(window, leaves[k], values.of(centres.value_index(o, window.brick_layers(leaves[k].level))), level, corner, mean,
+    if (trusted && !from.good.test(o)) continue;
+    const CornerValues& values = from.values[window.brick_of(leaves[k].level, o >> 6)];
+    add(window, leaves[k], values.of(from.value_index(o, window.brick_layers(leaves[k].level))), level, corner, mean,
         attributes.data());
   }
   const float length =
@@ -122,13 +127,15 @@ void diffuse_slab(Window& window, std::int32_t slab) {
       const int end = std::min(8, first + window.lattice().layers(level));
       if (!allocate_values(window, level, *t.leaf, begin, end)) return;
       CornerValues& values = t.leaf->values[window.brick_of(level, begin)];
+      BlockCache cache(window);
+      std::vector<float> attributes;
       std::uint32_t at = 0;
       for (int z = begin; z < end; ++z) {
         for (std::uint64_t w = t.leaf->near.words[z]; w != 0; w &= w - 1, ++at) {
           const int bit = std::countr_zero(w);
           if (((t.leaf->shared.words[z] >> bit) & 1U) != 0) continue;
           const Cell corner{t.block.x * 8 + (bit & 7), t.block.y * 8 + (bit >> 3), t.block.z * 8 + z};
-          diffuse_corner(window, level, corner, *t.leaf, z * 64 + bit, values, at);
+          diffuse_corner(cache, level, corner, *t.leaf, z * 64 + bit, values, at, attributes);
         }
       }
       copy_shared(window, level, t, begin, end);
