@@ -246,6 +246,8 @@ void Window::retire_below(std::int32_t slab) {
     retire_branches<Upper>(level.tree, level.upper, first);
     if (level.upper.size() < before) level.tree.root().eraseBackgroundTiles();
   }
+  // A slab behind the widest cross-section gives its memory back.
+  if (const std::size_t used = leaf_count(); trees_->spare.size() > used) trees_->spare.resize(used);
 }
 
 std::size_t Window::leaf_count() const {
