@@ -1,5 +1,6 @@
 #include "refine/refine.h"
 
+#include <tbb/combinable.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -89,16 +90,21 @@ void touch_around(Window& window, int level, std::int32_t slab, BlockMask Corner
   const std::int32_t end = first + lattice.layers(level);
   const std::int32_t slab_lo = lattice.slab_of_layer(level, first - hi);
   const std::int32_t slab_hi = lattice.slab_of_layer(level, end - 1 - lo);
-  std::vector<Block> missing;
+  tbb::combinable<std::vector<Block>> missing;
   std::int32_t done = std::numeric_limits<std::int32_t>::min();
   for (std::int32_t s = slab_lo; s <= slab_hi; ++s) {
-    for (const Tile& t : window.tiles(level, s)) {
+    const Tiles tiles = window.tiles(level, s);
+    tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
+      const Tile& t = tiles[i];
       // Slabs share leaves at coarse levels.
-      if (t.block.z > done) list_missing(t, t.leaf->*mask, {first, end}, lo, hi, missing);
-    }
+      if (t.block.z > done) list_missing(t, t.leaf->*mask, {first, end}, lo, hi, missing.local());
+    });
     done = (lattice.first_layer(level, s) + lattice.layers(level) - 1) >> 3;
   }
-  for (const Block& b : missing) window.touch(level, b);
+  // In any order: the window puts its tiles in order.
+  missing.combine_each([&](const std::vector<Block>& blocks) {
+    for (const Block& b : blocks) window.touch(level, b);
+  });
 }
 
 Block parent_block(const Block& b) {

@@ -232,10 +232,14 @@ void Window::retire_below(std::int32_t slab) {
     Trees::Level& level = trees_->levels[l];
     const std::int32_t first = lattice_.first_layer(l, slab);
     while (!level.layers.empty() && level.z_base * 8 + 8 <= first) {
+      openvdb::Coord last = openvdb::Coord::max();
       for (const Tile& t : level.layers.front().tiles) {
         const openvdb::Coord origin = leaf_origin(t.block);
         trees_->retire(level, t);
-        level.lower.insert(origin & ~(static_cast<std::int32_t>(Lower::DIM) - 1));
+        const openvdb::Coord lower = origin & ~(static_cast<std::int32_t>(Lower::DIM) - 1);
+        if (lower == last) continue;  // neighbours mostly share their inner nodes
+        last = lower;
+        level.lower.insert(lower);
         level.upper.insert(origin & ~(static_cast<std::int32_t>(Upper::DIM) - 1));
       }
       level.layers.pop_front();
@@ -246,6 +250,8 @@ void Window::retire_below(std::int32_t slab) {
     retire_branches<Upper>(level.tree, level.upper, first);
     if (level.upper.size() < before) level.tree.root().eraseBackgroundTiles();
   }
+  // A slab behind the widest cross-section gives its memory back.
+  if (const std::size_t used = leaf_count(); trees_->spare.size() > used) trees_->spare.resize(used);
 }
 
 std::size_t Window::leaf_count() const {

@@ -80,7 +80,7 @@ class Window {
   /// Frees every leaf whose last layer lies below the slab.
   void retire_below(std::int32_t slab);
   [[nodiscard]] std::size_t leaf_count() const;
-  [[nodiscard]] std::size_t memory() const;  ///< bytes held by nodes and values
+  [[nodiscard]] std::size_t memory() const;  ///< bytes held by nodes, values and retired leaves kept for reuse
 
  private:
   struct Trees;  // keeps openvdb.h out of this header

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>
 
+#include <functional>
 #include <numbers>
 
 #include "extract/stream.h"
@@ -78,10 +79,10 @@ struct Case {
     s.valued = noise(seed + 3, p) < 0.6;
     return s;
   }
-  [[nodiscard]] WholeMesh mesh() {
+  [[nodiscard]] WholeMesh mesh(const std::function<void(IsoSlab&)>& prepare = {}) {
     Window window(Lattice{kCell, octree.levels()}, 0);
     octree.fill(window, [this](const Position& p) { return field(p); });
-    return extract_all(window, octree.first_slab(), octree.end_slab());
+    return extract_all(window, octree.first_slab(), octree.end_slab(), prepare);
   }
 };
 
@@ -237,6 +238,35 @@ double signed_volume(const WholeMesh& mesh) {
     }
   }
   return volume / (static_cast<double>(kCell) * kCell * kCell);
+}
+
+TEST(Extract, NothingStaysOfWhatASlabHeldBefore) {
+  Case c = Case::make(5, 3, {4, 4, 2});
+  c.kind = 1;
+  c.unseen = 0.2;
+  const WholeMesh fresh = c.mesh();
+  const WholeMesh used = c.mesh([](IsoSlab& slab) {
+    slab.slab = 99;
+    slab.corners.assign(3000, {{1, 2, 3}, {1, 1, 1}, {1, 1, 1}, 1, 1, 1, 1});
+    slab.corner_attributes.assign(2, std::vector<float>(7000, 5.0F));
+    slab.vertices.assign(3000, {{77}, {88}, 0.9F, 2, 7, true, 15});
+    slab.triangles.assign(5000, {SlabIndex{1}, SlabIndex{2}, SlabIndex{3}});
+  });
+  EXPECT_EQ(fresh.triangles, used.triangles);
+  EXPECT_EQ(fresh.named(), used.named());
+  ASSERT_EQ(fresh.slabs.size(), used.slabs.size());
+  for (std::size_t i = 0; i < fresh.slabs.size(); ++i) {
+    const IsoSlab &a = fresh.slabs[i], &b = used.slabs[i];
+    EXPECT_EQ(a.slab, b.slab);
+    EXPECT_EQ(a.corner_attributes, b.corner_attributes);
+    ASSERT_EQ(a.corners.size(), b.corners.size());
+    for (std::size_t k = 0; k < a.corners.size(); ++k) {
+      EXPECT_EQ(std::tie(a.corners[k].position, a.corners[k].offset, a.corners[k].normal, a.corners[k].distance,
+                         a.corners[k].curvature, a.corners[k].cell, a.corners[k].reach),
+                std::tie(b.corners[k].position, b.corners[k].offset, b.corners[k].normal, b.corners[k].distance,
+                         b.corners[k].curvature, b.corners[k].cell, b.corners[k].reach));
+    }
+  }
 }
 
 TEST(Extract, SphereIsASphere) {

@@ -1,6 +1,8 @@
 // Extraction of a filled window slab by slab, the way the job does it, and the whole mesh that comes of it.
 #pragma once
+#include <algorithm>
 #include <array>
+#include <functional>
 #include <tuple>
 #include <vector>
 
@@ -34,9 +36,12 @@ struct WholeMesh {
   }
 };
 
-inline WholeMesh extract_all(Window& window, std::int32_t first, std::int32_t end) {
+/// `prepare` sees every slab's storage before it is filled.
+inline WholeMesh extract_all(Window& window, std::int32_t first, std::int32_t end,
+                             const std::function<void(IsoSlab&)>& prepare = {}) {
   WholeMesh mesh;
   mesh.slabs.resize(static_cast<std::size_t>(end - first) + 1);
+  if (prepare) std::for_each(mesh.slabs.begin(), mesh.slabs.end(), prepare);
   for (std::int32_t s = first; s <= end; ++s) {
     const std::size_t i = static_cast<std::size_t>(s - first);
     number_edges(window, s, i > 0 ? &mesh.slabs[i - 1] : nullptr, mesh.slabs[i]);

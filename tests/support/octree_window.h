@@ -134,6 +134,7 @@ class Octree {
     if (brick < 0) return;
     CornerValues& values = t.leaf->values[brick];
     values.allocate(static_cast<std::uint32_t>(samples.size()), window.channels());
+    std::fill(values.data.begin(), values.data.end(), 0.0F);  // curvature and reach stay so
     for (std::size_t i = 0; i < samples.size(); ++i) {
       values.channel(kDistance)[i] = samples[i].distance;
       for (int a = 0; a < 3; ++a) values.channel(kNormalX + a)[i] = samples[i].normal[a];

@@ -127,6 +127,27 @@ TEST(Window, NothingIsLeftBehindTheSweep) {
   EXPECT_EQ(window.memory(), empty);
 }
 
+TEST(Window, LeavesUsedAgainAreEmpty) {
+  const Lattice lattice{10, 1};
+  Window window(lattice, 1, {0, 400, 0, 400});
+  for (std::int32_t z = 0; z < 4; ++z) {
+    for (std::int32_t x = 0; x < 5; ++x) {
+      CornerBlock& block = window.touch(0, {x, 0, z});
+      EXPECT_FALSE(block.home.any() || block.surface.any() || block.near.any());
+      EXPECT_EQ(block.busy_layers | block.doubtful_layers | block.surface_layers, 0);
+      EXPECT_TRUE(block.values[0].data.empty());
+      EXPECT_EQ(block.values[0].count, 0U);
+      EXPECT_EQ(block.centres, nullptr);
+      for (BlockMask* m : {&block.home, &block.surface, &block.near}) m->set(x);
+      block.busy_layers = block.doubtful_layers = block.surface_layers = 1;
+      block.values[0].allocate(7, window.channels());
+      block.centres = std::make_shared<Projected>();
+    }
+    window.retire_below(z * 8);  // the layer before
+  }
+  EXPECT_EQ(window.leaf_count(), 5U);
+}
+
 TEST(Window, SlantedSheetsLeaveNothingBehindEither) {
   // Leaves move sideways with the sweep, so that most inner nodes have none in their last layer.
   for (const std::int32_t slope : {-16, 0, 3, 16}) {
