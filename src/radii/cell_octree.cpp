@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <limits>
+#include <utility>
 
 #include "lamina/error.h"
 
@@ -79,54 +80,54 @@ void for_each_bit(std::uint64_t bits, F&& f) {
   for (; bits != 0; bits &= bits - 1) f(static_cast<std::uint32_t>(std::countr_zero(bits)));
 }
 
-/// Which sides of their block cells (as a bit set) touch.
-struct Sides {
-  explicit Sides(std::uint64_t cells) {
-    constexpr std::uint64_t x_low = 0x1111'1111'1111'1111U, y_low = 0x000F'000F'000F'000FU, z_low = 0xFFFFU;
-    x = {(cells & x_low) != 0, true, (cells & x_low << (kBlockSide - 1)) != 0};
-    y = {(cells & y_low) != 0, true, (cells & y_low << (kBlockSide - 1) * kBlockSide) != 0};
-    z = {(cells & z_low) != 0, true, (cells & z_low << (kBlockSide - 1) * kBlockSide * kBlockSide) != 0};
-  }
-  std::array<bool, 3> x, y, z;  ///< whether cells touch the neighbours at -1, 0, 1
-};
+/// The cells of a block that touch a neighbour of it at d (-1, 0, 1) along an axis: all when it lies beside the block.
+constexpr std::uint64_t cells_towards(int dx, int dy, int dz) {
+  std::uint64_t cells = ~std::uint64_t{0};
+  if (dx != 0) cells &= 0x1111'1111'1111'1111U << (dx > 0 ? kBlockSide - 1 : 0);
+  if (dy != 0) cells &= 0x000F'000F'000F'000FU << (dy > 0 ? kBlockSide * (kBlockSide - 1) : 0);
+  if (dz != 0) cells &= std::uint64_t{0xFFFF} << (dz > 0 ? kLayer * (kBlockSide - 1) : 0);
+  return cells;
+}
 
-/// Counts of the cells that may bound their neighbours' radii, and zero for all others. A cell does when it holds
-/// enough samples itself and none of its children does: see find_block_radii(). Left out is what none of `cells`
-/// touches.
-HaloCounts bounding_counts(const CellBlocks& level, CellBlock& block, std::uint64_t cells, std::uint32_t enough) {
-  HaloCounts halo{};
-  const Sides sides(cells);
-  const auto first = [](int d) { return d > 0 ? kBlockSide : d < 0 ? -1 : 0; };
-  const auto last = [](int d) { return d > 0 ? kBlockSide : d < 0 ? -1 : kBlockSide - 1; };
-  for (int n = 0; n < 27; ++n) {
-    const int dx = n % 3 - 1, dy = n / 3 % 3 - 1, dz = n / 9 - 1;
-    if (!sides.x[n % 3] || !sides.y[n / 3 % 3] || !sides.z[n / 9]) continue;
-    const std::uint32_t index = level.find({block.key.x + dx, block.key.y + dy, block.key.z + dz});
-    if (index == CellBlocks::kNone || level[index].most < enough) continue;
-    const CellBlock& from = level[index];
-    block.most_around = std::max(block.most_around, from.most);
-    for (int z = first(dz); z <= last(dz); ++z) {
-      for (int y = first(dy); y <= last(dy); ++y) {
-        for (int x = first(dx); x <= last(dx); ++x) {
-          const std::uint32_t cell = cell_in_block(x, y, z);
-          const bool bounds = from.counts[cell] >= enough && (from.refined >> cell & 1U) == 0;
-          if (bounds) halo[halo_index(x, y, z)] = from.counts[cell];
-        }
+/// Counts of the cells that bound the radii of `cells` and their neighbours, zero for all others; false when there are
+/// none. Left out is what none of `cells` touches. Notes whether a block around has refined cells.
+bool bounding_counts(const CellBlocks& level, CellBlock& block, std::uint64_t cells, HaloCounts& halo) {
+  bool any = false;
+  for (int dz = -1; dz <= 1; ++dz) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        if ((cells & cells_towards(dx, dy, dz)) == 0) continue;
+        const std::uint32_t index = level.find({block.key.x + dx, block.key.y + dy, block.key.z + dz});
+        if (index == CellBlocks::kNone) continue;
+        const CellBlock& from = level[index];
+        block.refined_around = block.refined_around || from.refined != 0;
+        const std::uint64_t touching = from.bounding & cells_towards(-dx, -dy, -dz);
+        if (touching == 0) continue;
+        if (!std::exchange(any, true)) halo.fill(0);
+        for_each_bit(touching, [&](std::uint32_t cell) {
+          halo[halo_index(cell_x(cell) + dx * kBlockSide, cell_y(cell) + dy * kBlockSide,
+                          cell_z(cell) + dz * kBlockSide)] = from.counts[cell];
+        });
       }
     }
   }
-  return halo;
+  return any;
 }
 
 /// Replaces the value of every inner cell by the largest of the 27 around it, one axis after the other.
 void spread_maximum(HaloCounts& halo) {
-  const std::size_t n = halo.size();
-  for (const std::size_t stride : {std::size_t{1}, std::size_t{kHalo}, std::size_t{kHalo * kHalo}}) {
-    const HaloCounts from = halo;
-    for (std::size_t i = stride; i + stride < n; ++i) {
-      halo[i] = std::max(from[i], std::max(from[i - stride], from[i + stride]));
+  HaloCounts other;
+  const auto along = [](const HaloCounts& from, std::size_t stride, HaloCounts& to) {
+    for (std::size_t i = stride; i + stride < from.size(); ++i) {
+      to[i] = std::max(from[i], std::max(from[i - stride], from[i + stride]));
     }
-  }
+  };
+  other = halo;
+  along(halo, 1, other);
+  along(other, kHalo, halo);
+  other = halo;
+  along(halo, std::size_t{kHalo} * kHalo, other);
+  halo = other;
 }
 
 }  // namespace
@@ -194,7 +195,15 @@ void CellOctree::aggregate_block(int level, std::uint32_t index, ZRange range) {
       top[i] = std::max(top[i], counts[i]);
     }
   }
-  for (const auto& layer : most) from.most = std::max(from.most, *std::max_element(layer.begin(), layer.end()));
+  const std::uint32_t enough = is_coarsest(level) ? 1 : settings_.min_samples;
+  std::uint32_t greatest = 0;
+  for (const auto& layer : most) greatest = std::max(greatest, *std::max_element(layer.begin(), layer.end()));
+  if (greatest >= enough) {
+    from.enough = true;
+    for_each_bit(occupied_cells(from, layers) & ~from.refined, [&](std::uint32_t cell) {
+      if (from.counts[cell] >= enough) from.bounding |= std::uint64_t{1} << cell;
+    });
+  }
   if (is_coarsest(level)) return;
   CellBlocks& coarse = levels_[static_cast<std::size_t>(level) + 1];
   if (from.parent == CellBlock::kNone) from.parent = coarse.insert(parent_key(from.key));
@@ -240,23 +249,22 @@ void CellOctree::find_block_radii(int level, std::uint32_t index, ZRange range) 
   CellBlock& block = blocks[index];
   const CellBlock* parents = is_coarsest(level) ? nullptr : &levels_[static_cast<std::size_t>(level) + 1][block.parent];
   const std::uint32_t enough = parents == nullptr ? 1 : settings_.min_samples;
-  const bool may_be_bounded = parents == nullptr || parents->most_around >= enough;
-  // Most blocks of the finest levels: every cell has its parent's radius.
-  if (!may_be_bounded && block.most < enough) return;
+  // A cell that could bound here has a refined parent. Most blocks of the finest levels have none around, and every
+  // cell of theirs has its parent's radius.
+  const bool may_be_bounded = parents == nullptr || parents->refined_around;
+  if (!may_be_bounded && !block.enough) return;
   const std::uint64_t cells = occupied_cells(block, Layers(block, range.begin, range.end));
-  HaloCounts bounding{};
-  if (may_be_bounded) {
-    bounding = bounding_counts(blocks, block, cells, enough);
-    if (block.most < enough && block.most_around < enough) return;
-    spread_maximum(bounding);
-  }
+  HaloCounts bounding;
+  const bool bounded = may_be_bounded && bounding_counts(blocks, block, cells, bounding);
+  if (!bounded && !block.enough) return;
+  if (bounded) spread_maximum(bounding);
   const double diameter = 2.0 * settings_.finest_cell * static_cast<double>(std::int64_t{1} << level);
   const auto radius_of = [&](std::uint32_t count) {
     return static_cast<float>(diameter / std::sqrt(static_cast<double>(count)));
   };
   for_each_bit(cells, [&](std::uint32_t cell) {
     const std::uint32_t count = block.counts[cell];
-    const std::uint32_t most = bounding[halo_index(cell_x(cell), cell_y(cell), cell_z(cell))];
+    const std::uint32_t most = bounded ? bounding[halo_index(cell_x(cell), cell_y(cell), cell_z(cell))] : 0;
     if (count < enough && most == 0) return;
     float radius = count >= enough
                        ? radius_of(count)

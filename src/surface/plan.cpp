@@ -45,18 +45,18 @@ Levels choose_levels(const SurfaceSettings& s, double ratio, const RadiusSurvey&
 /// Counting cells of 16 samples are four spacings, two radii wide: the finest begin at half of that for the finest
 /// cells' radius, and the coarsest serve the radius of the coarsest cells.
 void set_counting_cells(const SurfaceSettings& s, const RadiusSurvey& survey, Resolved& out) {
-  constexpr double kHalfWidth = 1.15;
+  constexpr double kWidth = 2.3;
   out.radii.min_samples = s.density;
   double finest_radius = survey.low;
-  out.radii.levels = out.lattice.levels + 1;
+  out.radii.levels = out.lattice.levels;
   if (out.feed.fixed_cell) {
     const double octaves = std::log2(std::max(1.0F, survey.high / survey.low));
-    out.radii.levels = std::clamp(static_cast<int>(std::ceil(octaves)) + 4, 4, kMaxLevels);
+    out.radii.levels = std::clamp(static_cast<int>(std::ceil(octaves)) + 3, 3, kMaxLevels);
   } else {
     const double blend = out.feed.cell_follows_support ? s.blend : 1.0;
     finest_radius = out.lattice.cell / (kMainCell * out.feed.cell_ratio * blend);
   }
-  const double cell = kHalfWidth * std::sqrt(s.density / 16.0) * finest_radius / s.radius_scale;
+  const double cell = kWidth * std::sqrt(s.density / 16.0) * finest_radius / s.radius_scale;
   out.radii.finest_cell = static_cast<std::int32_t>(std::clamp(std::lrint(cell), 1L, 1L << 24));
 }
 
