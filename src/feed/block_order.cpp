@@ -25,9 +25,14 @@ struct Axis {
 };
 
 Axis axis_of(const std::vector<std::int32_t>& values, const FloorDivider& cell, int shift) {
-  const auto [low, high] = std::minmax_element(values.begin(), values.end());
-  Axis axis{cell(*low) >> shift, 1};
-  axis.blocks += static_cast<std::uint64_t>(std::int64_t{cell(*high) >> shift} - axis.low);
+  std::int32_t low = values.front();
+  std::int32_t high = low;
+  for (const std::int32_t v : values) {
+    low = std::min(low, v);
+    high = std::max(high, v);
+  }
+  Axis axis{cell(low) >> shift, 1};
+  axis.blocks += static_cast<std::uint64_t>(std::int64_t{cell(high) >> shift} - axis.low);
   return axis;
 }
 

@@ -73,10 +73,10 @@ void require_two_files(const SurfaceSettings& settings) {
 
 /// Float positions keep a hundredth of a cell as long as the coordinates are below some ten thousand cells;
 /// georeferenced ones are not. Nor can float hold the very large and the very small.
-bool needs_double(const Survey& survey, double finest_cell) {
+bool needs_double(const Census& census, double finest_cell) {
   constexpr double kLargest = 1e37;
   constexpr double kSmallestCell = 1e-35;
-  const double largest = std::max(survey.low.cwiseAbs().maxCoeff(), survey.high.cwiseAbs().maxCoeff());
+  const double largest = std::max(census.low.cwiseAbs().maxCoeff(), census.high.cwiseAbs().maxCoeff());
   return largest * 0x1p-24 > 0.01 * finest_cell || largest > kLargest || finest_cell < kSmallestCell;
 }
 
@@ -155,6 +155,31 @@ std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceS
                                             input_name(settings), mb(needed), mb(allowed), remedy));
 }
 
+/// Fills the store. A large input is read once, in a frame chosen by a part of its rows; twice where samples lie
+/// outside what these promised.
+Ingested read_input(PointSource& source, const SurfaceSettings& settings, const std::string& tmp, const RunContext& run,
+                    Stopwatch& watch, Frame& frame) {
+  require_samples(source.info());
+  std::optional<Ingested> ingested;
+  const auto fill = [&](const Survey& survey) {
+    frame = choose_frame(survey, settings.frame);
+    watch.time("store", [&] { ingested.emplace(ingest(source, survey, frame, settings.radius_scale, tmp, run)); });
+  };
+  std::optional<Survey> survey;
+  watch.time("survey", [&] { survey = survey_part(source); });
+  if (survey) {
+    fill(*survey);
+    if (ingested->complete) {
+      judge(ingested->census, source.info(), settings.bad_samples, run);
+      return std::move(*ingested);
+    }
+    ingested.reset();
+  }
+  watch.time("survey", [&] { survey = survey_input(source, settings.bad_samples, run); });
+  fill(*survey);
+  return std::move(*ingested);
+}
+
 SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run) {
   SurfaceStats stats;
   Stopwatch watch;
@@ -170,11 +195,9 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
 
   const std::unique_ptr<PointSource> source = open_points(settings.input, tmp);
   const PointSourceInfo& info = source->info();
-  Survey survey;
-  watch.time("survey", [&] { survey = survey_input(*source, settings.bad_samples, run); });
-  const Frame frame = choose_frame(survey, settings.frame);
-  std::optional<Ingested> ingested;
-  watch.time("store", [&] { ingested.emplace(ingest(*source, survey, frame, settings.radius_scale, tmp, run)); });
+  Frame frame;
+  std::optional<Ingested> ingested = read_input(*source, settings, tmp, run, watch, frame);
+  const Census& census = ingested->census;
   const auto plan_for = [&](const SurfaceSettings& s) {
     Resolved r = resolve_plan(s, frame, ingested->store, ingested->extent, info.has_radius, info.attributes.size());
     r.plan.memory_bytes += table_bytes(r.lattice, *ingested);
@@ -184,10 +207,10 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
   watch.time("plan", [&] { resolved = plan_for(settings); });
   stats.plan = resolved.plan;
   stats.samples_read = info.count;
-  stats.replaced_attributes = survey.unusable_attributes;
+  stats.replaced_attributes = census.unusable_attributes;
   for (int k = 1; k < kDefects; ++k) {
-    if (survey.rejected[k] > 0) {
-      stats.rejected.push_back({describe(static_cast<Defect>(k)), survey.rejected[k], survey.first_row[k]});
+    if (census.rejected[k] > 0) {
+      stats.rejected.push_back({describe(static_cast<Defect>(k)), census.rejected[k], census.first_row[k]});
     }
   }
   run.info(describe(resolved.plan, settings));
@@ -208,7 +231,7 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
   stats.disk_bytes = ingested->store.disk_bytes();
   if (!settings.dry_run) {
     out.attributes = info.attributes;
-    out.double_positions = needs_double(survey, resolved.plan.finest_cell);
+    out.double_positions = needs_double(census, resolved.plan.finest_cell);
     MeshSink sink(out);
     SampleFeed feed(ingested->store, resolved.lattice, resolved.feed, resolved.radii, info.has_radius);
     Pipeline pipeline(settings, resolved, frame, ingested->extent, feed, info.attributes.size(), sink);
