@@ -15,10 +15,6 @@ constexpr std::uint64_t kSurveySamples = 1u << 18;  ///< samples whose radii are
 /// The size of most cells in units of the largest the median radius allows: with 0.64 the radii of an evenly sampled
 /// surface (which scatter by 0.75 to 1.25 around their median) all ask for the same level.
 constexpr double kMainCell = 0.7;
-/// Cells of the 1 % smallest radii may be this much larger than they ask for (0.9 R becomes 1.07 R; the paper's leaves
-/// reach 1.15 R) before a level is added for them. Their radii come out at 0.6 to 0.8 of the median on evenly sampled
-/// surfaces, and a level that hardly any sample needs costs a sixth of the time.
-constexpr double kTooLarge = 1.19;
 constexpr int kDefaultLevels = 4;
 constexpr int kMaxLevels = 12;
 constexpr std::int32_t kMinSteps = 64;  ///< fixed-point steps a finest cell must have for exact enough positions
@@ -40,7 +36,7 @@ struct Levels {
 /// Main cells follow the median radius; levels are added below for the 1 % smallest and above for the 1 % largest.
 Levels choose_levels(const SurfaceSettings& s, double ratio, const RadiusSurvey& radii) {
   const double main = kMainCell * ratio * radii.median;
-  const int finer = std::max(0, static_cast<int>(std::ceil(std::log2(main / (kTooLarge * ratio * radii.low)) - 1e-9)));
+  const int finer = std::max(0, static_cast<int>(std::ceil(std::log2(main / (ratio * radii.low)) - 1e-9)));
   const int coarser = std::max(0, static_cast<int>(std::floor(std::log2(ratio * radii.high / main))));
   const int count = s.levels > 0 ? s.levels : std::clamp(finer + coarser + 1, kDefaultLevels, kMaxLevels);
   return {std::ldexp(main, -std::min(finer, count - 1)), count};
