@@ -42,10 +42,10 @@ Levels choose_levels(const SurfaceSettings& s, double ratio, const RadiusSurvey&
   return {std::ldexp(main, -std::min(finer, count - 1)), count};
 }
 
-/// Counting cells of 16 samples are four spacings, two radii wide: the finest begin at half of that for the finest
-/// cells' radius, and the coarsest serve the radius of the coarsest cells.
+/// Counting cells of 16 samples are four spacings, two radii wide: so are the finest for the finest cells' radius (finer
+/// ones would rarely hold as many, and take most of the time), and the coarsest serve the radius of the coarsest cells.
 void set_counting_cells(const SurfaceSettings& s, const RadiusSurvey& survey, Resolved& out) {
-  constexpr double kWidth = 2.3;
+  constexpr double kHalfWidth = 1.15;
   out.radii.min_samples = s.density;
   double finest_radius = survey.low;
   out.radii.levels = out.lattice.levels;
@@ -56,8 +56,8 @@ void set_counting_cells(const SurfaceSettings& s, const RadiusSurvey& survey, Re
     const double blend = out.feed.cell_follows_support ? s.blend : 1.0;
     finest_radius = out.lattice.cell / (kMainCell * out.feed.cell_ratio * blend);
   }
-  const double cell = kWidth * std::sqrt(s.density / 16.0) * finest_radius / s.radius_scale;
-  out.radii.finest_cell = static_cast<std::int32_t>(std::clamp(std::lrint(cell), 1L, 1L << 24));
+  const double half = kHalfWidth * std::sqrt(s.density / 16.0) * finest_radius / s.radius_scale;
+  out.radii.finest_cell = static_cast<std::int32_t>(2 * std::clamp(std::lrint(half), 1L, 1L << 24));
 }
 
 /// Faces wait on disk for the vertices. A sample stands for a quarter of its radius squared of surface; a main cell's
