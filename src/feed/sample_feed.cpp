@@ -20,7 +20,7 @@ std::uint8_t level_for(double size, const Lattice& lattice) {
 
 }  // namespace
 
-SampleFeed::SampleFeed(const SlabStore& store, const Lattice& lattice, const FeedSettings& settings,
+SampleFeed::SampleFeed(SlabStore& store, const Lattice& lattice, const FeedSettings& settings,
                        const RadiiSettings& radii, bool given_radii)
     : store_(store), lattice_(lattice), settings_(settings), cache_(store, lattice, settings.cache_bytes) {
   if (!given_radii) estimator_ = std::make_unique<RadiusEstimator>(radii);
@@ -149,6 +149,7 @@ void SampleFeed::release(std::int64_t z) {
     cache_.drop(first_);
     ++first_;
   }
+  store_.release_before(first_);
 }
 
 }  // namespace lamina

@@ -40,7 +40,8 @@ struct FeedCounts {
 /// speed. The next buckets are read while the stages work.
 class SampleFeed {
  public:
-  SampleFeed(const SlabStore& store, const Lattice& lattice, const FeedSettings& settings, const RadiiSettings& radii,
+  /// Gives buckets released back to the store.
+  SampleFeed(SlabStore& store, const Lattice& lattice, const FeedSettings& settings, const RadiiSettings& radii,
              bool given_radii);
 
   /// Called for every bucket in ascending order once its radii are known.
@@ -69,7 +70,7 @@ class SampleFeed {
   std::shared_ptr<const ActiveBucket> fetch(std::size_t bucket);
   void learn(std::vector<float> radii, const OnReady& on_ready);
 
-  const SlabStore& store_;
+  SlabStore& store_;
   Lattice lattice_;
   FeedSettings settings_;
   std::unique_ptr<RadiusEstimator> estimator_;  ///< null when the input gave radii

@@ -34,12 +34,15 @@ std::uint64_t SlabStore::total() const {
   return impl_->total;
 }
 std::uint64_t SlabStore::disk_bytes() const {
-  return impl_->file.size();
+  std::uint64_t bytes = 0;
+  for (const TempFile& file : impl_->files) bytes += file.size();
+  return bytes;
 }
 
 void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
   const auto& [blocks, count, z_lower, z_upper] = impl_->buckets[bucket];
   const auto& columns = impl_->columns;
+  const TempFile& file = impl_->file_of(bucket);
   columns.resize(out, count);
   std::vector<std::size_t> first(blocks.size());
   for (std::size_t i = 1; i < blocks.size(); ++i) first[i] = first[i - 1] + blocks[i - 1].count;
@@ -47,16 +50,25 @@ void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
     std::vector<std::byte> bytes;
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       bytes.resize(blocks[i].bytes);
-      impl_->file.read(blocks[i].offset, bytes);
+      file.read(blocks[i].offset, bytes);
       if (!decode_block(columns, bytes, blocks[i].count, out, first[i])) {
         throw Error(
             ExitCode::budget,
             fmt::format("the temporary file in '{}' is damaged at byte {} (samples of bucket {}); check the disk "
                         "or choose another with --tmp-dir",
-                        impl_->file.directory(), blocks[i].offset, bucket));
+                        file.directory(), blocks[i].offset, bucket));
       }
     }
   });
+}
+
+void SlabStore::release_before(std::size_t bucket) {
+  while (impl_->released < impl_->files.size()) {
+    const std::size_t end =
+        ((impl_->released + 1) * impl_->buckets.size() + impl_->files.size() - 1) / impl_->files.size();
+    if (end > bucket) return;
+    impl_->files[impl_->released++].discard();
+  }
 }
 
 }  // namespace lamina

@@ -14,7 +14,7 @@
 namespace lamina {
 namespace {
 
-constexpr std::size_t kHeldBytes = 1U << 18;
+constexpr std::size_t kHeldBytes = 1U << 17;
 
 std::string reason(int error) {
   return std::generic_category().message(error);
@@ -57,6 +57,12 @@ TempFile& TempFile::operator=(TempFile&& other) noexcept {
   std::swap(written_, other.written_);
   std::swap(held_, other.held_);
   return *this;
+}
+
+void TempFile::discard() {
+  ::close(std::exchange(descriptor_, -1));
+  written_ = 0;
+  held_ = {};
 }
 
 std::uint64_t TempFile::append(std::span<const std::byte> bytes) {

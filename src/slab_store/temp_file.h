@@ -23,6 +23,8 @@ class TempFile {
   void flush();
   /// Fills `bytes` from `offset`; safe from several threads. Throws Error(budget) when they cannot be read.
   void read(std::uint64_t offset, std::span<std::byte> bytes) const;
+  /// Gives the disk space back; nothing can be appended or read any more.
+  void discard();
   [[nodiscard]] std::uint64_t size() const { return written_ + held_.size(); }
   [[nodiscard]] const std::string& directory() const { return directory_; }
 

@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 #include <mutex>
+#include <tuple>
 #include <vector>
 
 #include "lamina/error.h"
@@ -23,9 +24,14 @@ constexpr std::uint64_t kMaxBuckets = 4096;
 constexpr double kMostSteps = (1 << 29) + (1 << 25);
 constexpr double kMostQuality = 1 << 20;
 
+constexpr std::int32_t kMax = std::numeric_limits<std::int32_t>::max();
+constexpr std::int32_t kMin = std::numeric_limits<std::int32_t>::min();
+constexpr Extent kNothing{{kMax, kMin, kMax, kMin}, kMax, kMin};
+
 struct Piece {
   SampleBatch rows;
   LocalSamples local;
+  Extent extent = kNothing;
   Census census;
   bool within = true;  ///< every sample lies where it may
 };
@@ -76,7 +82,17 @@ void resize(LocalSamples& out, const SampleBatch& rows, std::size_t n) {
   for (auto& values : out.attributes) values.resize(n);
 }
 
-/// Fills `piece.local` and `piece.census` from `piece.rows`.
+std::pair<std::int32_t, std::int32_t> range_of(const std::vector<std::int32_t>& values) {
+  std::int32_t low = kMax;
+  std::int32_t high = kMin;
+  for (const std::int32_t v : values) {
+    low = std::min(low, v);
+    high = std::max(high, v);
+  }
+  return {low, high};
+}
+
+/// Fills the rest of a piece from `piece.rows`.
 void to_local(Piece& piece, const AttributeLayout& layout, const Frame& frame, double radius_scale,
               double quality_scale) {
   const SampleBatch& rows = piece.rows;
@@ -122,19 +138,18 @@ void to_local(Piece& piece, const AttributeLayout& layout, const Frame& frame, d
   census.usable = n;
   piece.within = farthest <= kMostSteps && census.max_quality * quality_scale <= kMostQuality;
   resize(out, rows, n);
+  std::tie(piece.extent.x_min, piece.extent.x_max) = range_of(out.x);
+  std::tie(piece.extent.y_min, piece.extent.y_max) = range_of(out.y);
+  std::tie(piece.extent.z_min, piece.extent.z_max) = range_of(out.z);
 }
 
-void widen(Extent& b, const LocalSamples& s) {
-  if (s.size() == 0) return;
-  const auto [x0, x1] = std::minmax_element(s.x.begin(), s.x.end());
-  const auto [y0, y1] = std::minmax_element(s.y.begin(), s.y.end());
-  b.x_min = std::min(b.x_min, *x0);
-  b.x_max = std::max(b.x_max, *x1);
-  b.y_min = std::min(b.y_min, *y0);
-  b.y_max = std::max(b.y_max, *y1);
-  const auto [z0, z1] = std::minmax_element(s.z.begin(), s.z.end());
-  b.z_min = std::min(b.z_min, *z0);
-  b.z_max = std::max(b.z_max, *z1);
+void widen(Extent& b, const Extent& by) {
+  b.x_min = std::min(b.x_min, by.x_min);
+  b.x_max = std::max(b.x_max, by.x_max);
+  b.y_min = std::min(b.y_min, by.y_min);
+  b.y_max = std::max(b.y_max, by.y_max);
+  b.z_min = std::min(b.z_min, by.z_min);
+  b.z_max = std::max(b.z_max, by.z_max);
 }
 
 StoreSettings store_settings(const Survey& survey, const Frame& frame, const std::string& directory) {
@@ -158,9 +173,7 @@ Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, d
   const PointSourceInfo& info = source.info();
   const StoreSettings buckets = store_settings(survey, frame, directory);
   SlabStoreWriter writer({info.has_radius, info.has_quality, info.attributes}, buckets);
-  constexpr std::int32_t kMax = std::numeric_limits<std::int32_t>::max();
-  constexpr std::int32_t kMin = std::numeric_limits<std::int32_t>::min();
-  Extent extent{{kMax, kMin, kMax, kMin}, kMax, kMin};
+  Extent extent = kNothing;
   Census census;
   bool complete = true;
   const double quality = quality_scale(survey);
@@ -185,7 +198,7 @@ Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, d
     return piece;
   };
   const auto append = [&](Piece* piece) {
-    widen(extent, piece->local);
+    widen(extent, piece->extent);
     census.merge(piece->census);
     // Buckets at the ends that swallow whatever lies beyond them would be tall, and full.
     complete =

@@ -117,7 +117,7 @@ TEST(SampleFeed, GivenRadiiBecomeSupportsLevelsAndWeights) {
   std::uint64_t clamped = 0;
   EXPECT_TRUE(rc::check("annotations", [&] {
     const Case c = random_case(*rc::gen::arbitrary<std::uint64_t>());
-    const Stored stored(c.cloud, c.lattice, c.bucket_height);
+    Stored stored(c.cloud, c.lattice, c.bucket_height);
     SampleFeed feed(stored.store, c.lattice, c.settings, {}, true);
     FeedCounts expected;
     std::vector<std::size_t> order;  // non-empty buckets
@@ -161,7 +161,7 @@ TEST(SampleFeed, EstimatedRadiiAreTheEstimatorsScaled) {
     c.settings.radius_scale = 0.5F + 0.25F * static_cast<float>(seed);
     c.settings.max_radius = seed % 2 == 0 ? 0.0F : 120.0F;
     const RadiiSettings radii{60, 4};
-    const Stored stored(cloud, c.lattice, c.bucket_height);
+    Stored stored(cloud, c.lattice, c.bucket_height);
     RadiusEstimator estimator(radii);
     for (const LocalSamples& b : stored.buckets) estimator.push(b);
     estimator.finish();
@@ -232,7 +232,7 @@ TEST(SampleFeed, BatchesHoldEverySampleInReachOnceWhateverTheCache) {
   EXPECT_TRUE(rc::check("batches", [] {
     const std::uint64_t seed = *rc::gen::arbitrary<std::uint64_t>();
     const Case c = random_case(seed);
-    const Stored stored(c.cloud, c.lattice, c.bucket_height);
+    Stored stored(c.cloud, c.lattice, c.bucket_height);
     SampleFeed feed(stored.store, c.lattice, c.settings, {}, true);
     feed.prepare(kEverything, [](const ActiveBucket&) {});
     std::mt19937_64 random(seed);
@@ -249,7 +249,7 @@ TEST(SampleFeed, ReleaseForgetsOnlyWhatEndsBelow) {
   EXPECT_TRUE(rc::check("release", [] {
     const std::uint64_t seed = *rc::gen::arbitrary<std::uint64_t>();
     const Case c = random_case(seed);
-    const Stored stored(c.cloud, c.lattice, c.bucket_height);
+    Stored stored(c.cloud, c.lattice, c.bucket_height);
     SampleFeed feed(stored.store, c.lattice, c.settings, {}, true);
     SampleFeed whole(stored.store, c.lattice, c.settings, {}, true);
     whole.prepare(kEverything, [](const ActiveBucket&) {});
@@ -277,7 +277,7 @@ TEST(SampleFeed, ReleaseForgetsOnlyWhatEndsBelow) {
 
 TEST(SampleFeed, CacheHoldsWhatItsBudgetAllows) {
   const LocalSamples cloud = random_cloud({Shape::sphere, 2000, {0, 0, 0}, 1000}, 3);
-  const Stored stored(cloud, {64, 4}, 200);
+  Stored stored(cloud, {64, 4}, 200);
   const std::uint64_t n = stored.buckets.size();
   const auto reads_of = [&](std::size_t cache_bytes) {
     FeedSettings settings;
@@ -296,7 +296,7 @@ TEST(SampleFeed, CacheHoldsWhatItsBudgetAllows) {
 
 TEST(SampleFeed, LoadedSamplesOutliveTheCache) {
   const LocalSamples cloud = random_cloud({Shape::sphere, 500, {0, 0, 0}, 1000}, 4);
-  const Stored stored(cloud, {64, 4}, 150);
+  Stored stored(cloud, {64, 4}, 150);
   FeedSettings settings;
   settings.cache_bytes = 1;
   SampleFeed feed(stored.store, {64, 4}, settings, {}, true);
