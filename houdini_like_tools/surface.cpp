@@ -2,6 +2,7 @@
 #include "lamina/surface.h"
 
 #include <fmt/format.h>
+#include <malloc.h>
 
 #include <map>
 #include <memory>
@@ -67,7 +68,17 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
   return j;
 }
 
+/// Large arrays go back to the system when they are freed. By default the C library raises the size from which they do
+/// with the first one freed, and keeps gaps between what lives long: a fifth of the memory at 16 million samples.
+void return_large_arrays() {
+#ifdef __GLIBC__
+  constexpr int kLarge = 128 << 10;
+  mallopt(M_MMAP_THRESHOLD, kLarge);
+#endif
+}
+
 void run_surface(const SurfaceOptions& o) {
+  return_large_arrays();
   SurfaceSettings settings = o.settings;
   settings.input = pipe_name(settings.input);
   settings.output = pipe_name(settings.output);

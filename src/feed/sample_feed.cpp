@@ -10,6 +10,8 @@ namespace {
 
 /// Buckets on their way from the store while the stages work.
 constexpr int kReadAhead = 2;
+/// Buckets beyond them that the system is told of.
+constexpr int kAnnounceAhead = 6;
 
 /// Coarsest level whose cell is at most `size`.
 std::uint8_t level_for(double size, const Lattice& lattice) {
@@ -46,6 +48,12 @@ void SampleFeed::prepare(std::int64_t z_limit, const OnReady& on_ready) {
   const auto read_ahead = [&] {
     std::size_t next = front;
     for (int i = 0; i < kReadAhead && (next = next_filled(next)) < store_.buckets(); ++i) cache_.prefetch(next++);
+    announced_ = std::max(announced_, next);
+    for (int i = 0; i < kAnnounceAhead && (next = next_filled(next)) < store_.buckets(); ++i, ++next) {
+      if (next < announced_) continue;
+      store_.will_read(next);
+      announced_ = next + 1;
+    }
   };
   while (ready_ < store_.buckets()) {
     // Buckets are ascending and disjoint in z: the next one decides.

@@ -76,9 +76,10 @@ class SampleFeed {
   std::unique_ptr<RadiusEstimator> estimator_;  ///< null when the input gave radii
   float support_limit_;
   float radius_limit_;
-  std::size_t pushed_ = 0;  ///< buckets handed to the estimator
-  std::size_t ready_ = 0;   ///< buckets with known radii
-  std::size_t first_ = 0;   ///< first bucket not released
+  std::size_t pushed_ = 0;     ///< buckets handed to the estimator
+  std::size_t announced_ = 0;  ///< buckets the store knows are wanted
+  std::size_t ready_ = 0;      ///< buckets with known radii
+  std::size_t first_ = 0;      ///< first bucket not released
   std::unordered_map<std::size_t, Known> known_;
   BucketCache cache_;
   std::uint64_t released_ = 0;

@@ -62,6 +62,21 @@ void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
   });
 }
 
+void SlabStore::will_read(std::size_t bucket) const {
+  const TempFile& file = impl_->file_of(bucket);
+  std::uint64_t begin = 0;
+  std::uint64_t end = 0;
+  // Blocks next to each other are one request.
+  for (const BlockEntry& block : impl_->buckets[bucket].blocks) {
+    if (block.offset != end) {
+      file.will_read(begin, end - begin);
+      begin = block.offset;
+    }
+    end = block.offset + block.bytes;
+  }
+  file.will_read(begin, end - begin);
+}
+
 void SlabStore::release_before(std::size_t bucket) {
   while (impl_->released < impl_->files.size()) {
     const std::size_t end =

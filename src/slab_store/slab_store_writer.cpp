@@ -21,6 +21,9 @@ constexpr std::size_t kPieceRows = 32768;
 /// Blocks being compressed or written at once, at most.
 constexpr std::size_t kBlocksInFlight = 16;
 
+/// Buffers on their way to the disk.
+constexpr std::size_t kBuffersInFlight = 16;
+
 /// Files of a store; one for as few buckets as give back little.
 constexpr std::size_t kFiles = 16;
 constexpr std::size_t kBucketsPerFile = 8;
@@ -82,6 +85,7 @@ struct SlabStoreWriter::Impl {
   std::vector<std::uint32_t> bucket_of;
   PackedNormals normals;  ///< of the samples being appended
   std::array<Piece, kBlocksInFlight> pieces;
+  BackgroundWriter disk{TempFile::kBufferBytes, kBuffersInFlight};
 };
 
 void SlabStoreWriter::Impl::pack(const LocalSamples& s) {
@@ -158,7 +162,7 @@ void SlabStoreWriter::Impl::flush(std::span<const std::size_t> which) {
   };
   const auto write = [&](Piece* piece) {
     BucketIndex& index = store->buckets[piece->bucket];
-    const std::uint64_t offset = store->file_of(piece->bucket).append({piece->block.get(), piece->bytes});
+    const std::uint64_t offset = store->file_of(piece->bucket).append({piece->block.get(), piece->bytes}, disk);
     index.blocks.push_back(
         {offset, static_cast<std::uint32_t>(piece->bytes), static_cast<std::uint32_t>(piece->count)});
     index.count += piece->count;
@@ -203,7 +207,8 @@ SlabStore SlabStoreWriter::finish() {
   std::vector<std::size_t> all(impl_->buffers.buckets());
   std::iota(all.begin(), all.end(), std::size_t{0});
   impl_->flush(all);
-  for (TempFile& file : impl_->store->files) file.flush();
+  for (TempFile& file : impl_->store->files) file.flush(impl_->disk);
+  impl_->store->files.front().check(impl_->disk.drain());
   SlabStore store(std::move(impl_->store));
   impl_.reset();
   return store;
