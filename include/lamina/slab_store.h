@@ -54,13 +54,14 @@ class SlabStore {
       std::size_t bucket) const;  ///< largest z stored in the bucket (exact); least int32 when it is empty
   [[nodiscard]] std::uint64_t total() const;
   [[nodiscard]] std::uint64_t disk_bytes() const;  ///< not given back
+  [[nodiscard]] std::size_t files() const;         ///< that the buckets are in, each a run of them
   /// Decompresses one bucket into `out` (resized to it); safe from several threads. Throws Error(budget) naming the
   /// directory when the file cannot be read or is damaged.
   void read(std::size_t bucket, LocalSamples& out) const;
   /// Says that a bucket will be read soon, so that a slow disk begins to.
   void will_read(std::size_t bucket) const;
-  /// Says that buckets before this one will not be read again. Their disk space is given back, a sixteenth of the
-  /// buckets at a time.
+  /// Says that buckets before this one will not be read again. Their disk space is given back, a file at a
+  /// time.
   void release_before(std::size_t bucket);
 
  private:

@@ -54,7 +54,8 @@ class SampleFeed {
   [[nodiscard]] Batch load(const std::vector<std::size_t>& batch);
   /// Forgets buckets that end below z.
   void release(std::int64_t z);
-  [[nodiscard]] std::uint64_t released() const { return released_; }  ///< samples forgotten so far
+  [[nodiscard]] std::uint64_t released() const { return released_; }              ///< samples forgotten so far
+  [[nodiscard]] std::uint64_t disk_bytes() const { return store_.disk_bytes(); }  ///< of the store, now
   [[nodiscard]] FeedCounts counts() const;
   /// Largest influence a sample can have, steps: the look-ahead that prepare() needs.
   [[nodiscard]] float support_limit() const { return support_limit_; }

@@ -56,7 +56,7 @@ ReadResult pread_all(int fd, void* data, std::size_t bytes, std::uint64_t offset
 int copy_all(int from, std::uint64_t bytes, int to);
 
 /// The same, and gives the disk space of what has been copied back as it goes (where the file system can): `from` holds
-/// nothing of use afterwards.
+/// nothing of use afterwards. `to` is a regular file: a pipe may still refer to what is given back.
 int move_all(int from, std::uint64_t bytes, int to);
 
 }  // namespace lamina

@@ -75,7 +75,7 @@ struct MeshSink::Impl {
     if (output.streams()) {
       Descriptor to = output.destination();
       check_vertices(copy_all(output.fd(), header.size() + vertex_writer.written(), to.get()));
-      check_vertices(move_all(face_file.get(), face_writer.written(), to.get()));
+      check_vertices(copy_all(face_file.get(), face_writer.written(), to.get()));
       check_vertices(to.close());
     } else {
       check_vertices(move_all(face_file.get(), face_writer.written(), output.fd()));

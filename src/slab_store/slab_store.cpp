@@ -39,6 +39,10 @@ std::uint64_t SlabStore::disk_bytes() const {
   return bytes;
 }
 
+std::size_t SlabStore::files() const {
+  return impl_->files.size();
+}
+
 void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
   const auto& [blocks, count, z_lower, z_upper] = impl_->buckets[bucket];
   const auto& columns = impl_->columns;

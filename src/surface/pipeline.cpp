@@ -153,6 +153,8 @@ void Pipeline::run(const RunContext& run, Stopwatch& watch) {
     watch.time("number", [&] { number_to(top + 1); });
     watch.time("triangulate", [&] { triangulate_to(top); });
     watch.time("cluster and write", [&] { write_finished(); });
+    constexpr std::uint64_t kFaceBytes = 13;  // a count of 1 byte and three indices of 4
+    disk_bytes_ = std::max(disk_bytes_, feed_.disk_bytes() + kFaceBytes * sink_.triangles());
     retire();
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
     if (run.progress)
@@ -174,6 +176,7 @@ void Pipeline::report(SurfaceStats& stats) const {
   stats.crossing_cells = extracted_.crossing_cells;
   stats.leaf_cells = leaf_cells_;
   stats.clusters = clusterer_.counts();
+  stats.disk_bytes = disk_bytes_;
 }
 
 }  // namespace lamina

@@ -50,6 +50,7 @@ class Pipeline {
   std::deque<std::shared_ptr<IsoSlab>> iso_;  ///< slabs written_ .. numbered_ - 1
   VertexBatch vertices_;
   ExtractCounts extracted_;
+  std::uint64_t disk_bytes_ = 0;  ///< temporary, the most at once
   std::uint64_t isovertices_ = 0, isotriangles_ = 0;
   std::vector<std::uint64_t> leaf_cells_;
 };

@@ -117,7 +117,7 @@ std::uint64_t table_bytes(const Lattice& lattice, const Ingested& in) {
 }
 
 /// Changes that lower the memory a run takes, mildest first. A larger support has larger cells unless these follow r.
-std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceSettings& settings) {
+std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceSettings& settings, int levels_now) {
   std::vector<std::pair<std::string, SurfaceSettings>> runs;
   SurfaceSettings s = settings;
   std::string base;
@@ -127,7 +127,14 @@ std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceS
     runs.emplace_back(base, s);
     base += " ";
   }
-  for (const int factor : {2, 4, 8}) {
+  // A lower slab; what is sparser than the coarsest level serves comes out thinner.
+  constexpr int kFewestLevels = 3;
+  for (int levels = levels_now - 1; levels >= kFewestLevels; --levels) {
+    SurfaceSettings fewer = s;
+    fewer.levels = levels;
+    runs.emplace_back(fmt::format("{}--levels {}", base, levels), fewer);
+  }
+  for (const double factor : {1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0}) {
     SurfaceSettings coarser = s;
     if (s.cell.unit == Length::Unit::influence_radius) {
       coarser.blend = s.blend * factor;
@@ -140,11 +147,12 @@ std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceS
   return runs;
 }
 
-[[noreturn]] void refuse_memory(const SurfaceSettings& settings, std::uint64_t needed, std::uint64_t allowed,
+[[noreturn]] void refuse_memory(const SurfaceSettings& settings, int levels, std::uint64_t needed,
+                                std::uint64_t allowed,
                                 const std::function<std::uint64_t(const SurfaceSettings&)>& memory_of) {
   const auto mb = [](std::uint64_t bytes) { return static_cast<double>(bytes) / 1e6; };
   std::string remedy;
-  for (const auto& [words, changed] : smaller_runs(settings)) {
+  for (const auto& [words, changed] : smaller_runs(settings, levels)) {
     const std::uint64_t bytes = memory_of(changed);
     if (bytes > allowed) continue;
     remedy = fmt::format("; {} would fit ({:.0f} MB)", words, mb(bytes));
@@ -180,6 +188,25 @@ Ingested read_input(PointSource& source, const SurfaceSettings& settings, const 
   return std::move(*ingested);
 }
 
+/// How long the whole run will take, judging by how fast this machine has read the input.
+void expect_time(const SurfaceSettings& settings, const PointSourceInfo& source, Resolved& resolved,
+                 const Stopwatch& watch, double elapsed) {
+  SurfacePlan& plan = resolved.plan;
+  plan.threads = tbb::this_task_arena::max_concurrency();
+  const double whole = expected_cpu_seconds(settings, resolved, source.attributes.size());
+  const double reading = kReferenceRead * static_cast<double>(plan.samples);
+  double slowness = 1;
+  constexpr std::uint64_t kEnough = 1'000'000;  // fewer are read too fast to tell
+  for (const StageTime& s : watch.stages()) {
+    // Formats that cost more to read say little of the rest.
+    if (s.stage == "store" && source.random_access && plan.samples >= kEnough) {
+      slowness = std::clamp(s.cpu / reading, 0.5, 3.0);
+    }
+  }
+  constexpr double kEfficiency = 0.92;  // of each thread beyond the first
+  plan.seconds = elapsed + slowness * (whole - reading) / (1 + kEfficiency * (plan.threads - 1));
+}
+
 SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run) {
   SurfaceStats stats;
   Stopwatch watch;
@@ -205,6 +232,7 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
   };
   Resolved resolved;
   watch.time("plan", [&] { resolved = plan_for(settings); });
+  expect_time(settings, info, resolved, watch, Stopwatch::now().wall - began.wall);
   stats.plan = resolved.plan;
   stats.samples_read = info.count;
   stats.replaced_attributes = census.unusable_attributes;
@@ -224,7 +252,7 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
                             resolved.plan.radius_median));
   }
   if (run.max_memory > 0 && resolved.plan.memory_bytes > run.max_memory) {
-    refuse_memory(settings, resolved.plan.memory_bytes, run.max_memory,
+    refuse_memory(settings, resolved.plan.levels, resolved.plan.memory_bytes, run.max_memory,
                   [&](const SurfaceSettings& s) { return plan_for(s).plan.memory_bytes; });
   }
 
@@ -252,8 +280,6 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
     watch.time("commit", [&] { sink.commit(); });
     stats.vertices = sink.vertices();
     stats.triangles = sink.triangles();
-    constexpr std::uint64_t kFaceBytes = 13;  // a count of 1 byte and three indices of 4
-    stats.disk_bytes += stats.triangles * kFaceBytes;
   }
   stats.stages = watch.stages();
   const Stopwatch::Moment ended = Stopwatch::now();
