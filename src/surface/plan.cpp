@@ -99,9 +99,9 @@ std::uint64_t expected_memory(const SurfaceSettings& s, const Resolved& r, const
   const double window = per_slab * ((3.0 + s.window) * corner_bytes + (5.0 + s.window) * surface_bytes);
   const double cached = std::min(static_cast<double>(r.feed.cache_bytes),
                                  static_cast<double>(store.total()) * (37 + 4.0 * static_cast<double>(attributes)));
-  constexpr double kProgram = 40e6;
+  constexpr double kProgram = 60e6;
   // What the model leaves out goes with the window, too: counting cells, clustering, bins, and the allocator's gaps.
-  constexpr double kRest = 2.1;
+  constexpr double kRest = 2.0;
   return static_cast<std::uint64_t>(kProgram + cached + kRest * window);
 }
 
@@ -203,10 +203,10 @@ double expected_cpu_seconds(const SurfaceSettings& s, const Resolved& r, std::si
   // Seconds a sample: read and stored, counted, marked, gathered for its tiles; its share of the sums, by projection
   // steps; and per cell of surface, which a sample gives some: refined, numbered, triangulated, clustered, written.
   // Coefficients: docs/performance.md.
-  constexpr double kSample = 220e-9;
+  constexpr double kSample = 250e-9;
   constexpr double kAttribute = 45e-9;
-  constexpr double kSums = 250e-9;
-  constexpr double kCell = 850e-9;
+  constexpr double kSums = 390e-9;
+  constexpr double kCell = 1320e-9;
   constexpr double kStep = 0.75;         // a further projection step against the first
   constexpr double kSupport = 1 / 0.63;  // influence radius of a main cell, cells
   const double influence = s.blend * r.plan.radius_median;

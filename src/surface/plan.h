@@ -27,7 +27,7 @@ Resolved resolve_plan(const SurfaceSettings& settings, const Frame& frame, const
 /// Processor seconds of a whole run on the machine the model was made on; of which reading the input takes
 /// kReferenceRead a sample.
 double expected_cpu_seconds(const SurfaceSettings& settings, const Resolved& resolved, std::size_t attributes);
-inline constexpr double kReferenceRead = 70e-9;
+inline constexpr double kReferenceRead = 80e-9;
 
 /// The plan in lines for a reader.
 std::string describe(const SurfacePlan& plan, const SurfaceSettings& settings);

@@ -6,6 +6,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -200,7 +201,8 @@ void expect_time(const SurfaceSettings& settings, const PointSourceInfo& source,
   for (const StageTime& s : watch.stages()) {
     // Formats that cost more to read say little of the rest.
     if (s.stage == "store" && source.random_access && plan.samples >= kEnough) {
-      slowness = std::clamp(s.cpu / reading, 0.5, 3.0);
+      // Half of reading is the system's copying, which other programs disturb more than computing.
+      slowness = std::clamp(std::sqrt(s.cpu / reading), 0.7, 1.5);
     }
   }
   constexpr double kEfficiency = 0.92;  // of each thread beyond the first
