@@ -203,10 +203,10 @@ double expected_cpu_seconds(const SurfaceSettings& s, const Resolved& r, std::si
   // Seconds a sample: read and stored, counted, marked, gathered for its tiles; its share of the sums, by projection
   // steps; and per cell of surface, which a sample gives some: refined, numbered, triangulated, clustered, written.
   // Coefficients: docs/performance.md.
-  constexpr double kSample = 250e-9;
+  constexpr double kSample = 230e-9;
   constexpr double kAttribute = 45e-9;
-  constexpr double kSums = 390e-9;
-  constexpr double kCell = 1320e-9;
+  constexpr double kSums = 300e-9;
+  constexpr double kCell = 1190e-9;
   constexpr double kStep = 0.75;         // a further projection step against the first
   constexpr double kSupport = 1 / 0.63;  // influence radius of a main cell, cells
   const double influence = s.blend * r.plan.radius_median;
