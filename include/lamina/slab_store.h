@@ -1,4 +1,4 @@
-// The out-of-core store: samples bucketed along the sweep axis, Blosc-compressed blocks in one temporary file.
+// The out-of-core store: samples bucketed along the sweep axis, Blosc-compressed blocks in temporary files.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -13,7 +13,7 @@ namespace lamina {
 /// Samples in fixed-point local coordinates; arrays are parallel, optional ones empty.
 struct LocalSamples {
   std::vector<std::int32_t> x, y, z;           ///< steps of the frame
-  std::vector<float> nx, ny, nz;               ///< unit normals in the local frame
+  std::vector<float> nx, ny, nz;               ///< unit normals in the local frame; the store keeps them within 5e-7
   std::vector<float> radius;                   ///< influence radius in steps, when the input gave one
   std::vector<float> quality;                  ///< when the input gave one
   std::vector<std::vector<float>> attributes;  ///< one array per attribute
@@ -30,7 +30,7 @@ struct StoreLayout {
 };
 
 struct StoreSettings {
-  std::string directory;                 ///< where the temporary file goes
+  std::string directory;                 ///< where the temporary files go
   std::int32_t z_min = 0;                ///< bucket 0 begins here; lower samples go to bucket 0
   std::int32_t bucket_height = 1;        ///< steps, > 0
   std::size_t buckets = 1;               ///< samples above the last bucket go to the last
@@ -53,10 +53,16 @@ class SlabStore {
   [[nodiscard]] std::int32_t z_upper(
       std::size_t bucket) const;  ///< largest z stored in the bucket (exact); least int32 when it is empty
   [[nodiscard]] std::uint64_t total() const;
-  [[nodiscard]] std::uint64_t disk_bytes() const;
+  [[nodiscard]] std::uint64_t disk_bytes() const;  ///< not given back
+  [[nodiscard]] std::size_t files() const;         ///< that the buckets are in, each a run of them
   /// Decompresses one bucket into `out` (resized to it); safe from several threads. Throws Error(budget) naming the
   /// directory when the file cannot be read or is damaged.
   void read(std::size_t bucket, LocalSamples& out) const;
+  /// Says that a bucket will be read soon, so that a slow disk begins to.
+  void will_read(std::size_t bucket) const;
+  /// Says that buckets before this one will not be read again. Their disk space is given back, a file at a
+  /// time.
+  void release_before(std::size_t bucket);
 
  private:
   friend class SlabStoreWriter;
@@ -65,7 +71,7 @@ class SlabStore {
   std::unique_ptr<Impl> impl_;
 };
 
-/// Fills a store. The temporary file is unlinked at creation, so it is gone whatever happens.
+/// Fills a store. Its temporary files are unlinked at creation, so they are gone whatever happens.
 class SlabStoreWriter {
  public:
   /// Throws Error(budget) when the directory does not exist or cannot be written, naming it.

@@ -54,8 +54,10 @@ struct SurfacePlan {
   double slab_height = 0;
   std::int64_t slabs = 0;
   std::uint64_t buckets = 0;
-  std::uint64_t disk_bytes = 0;    ///< temporary disk, expected: the samples' store (measured) and the faces
+  std::uint64_t disk_bytes = 0;  ///< most temporary disk at once, expected: the samples' store (measured) and the faces
   std::uint64_t memory_bytes = 0;  ///< peak memory, expected
+  int threads = 1;                 ///< what `seconds` is for
+  double seconds = 0;  ///< wall clock of the whole run, expected of this machine at the speed it read the input
 };
 
 struct StageTime {
@@ -88,7 +90,7 @@ struct SurfaceStats {
   std::vector<StageTime> stages;
   double wall = 0, cpu = 0;
   std::uint64_t peak_memory = 0;  ///< bytes, of the process
-  std::uint64_t disk_bytes = 0;   ///< temporary: the samples' store and the faces
+  std::uint64_t disk_bytes = 0;   ///< temporary: the most that the samples' store and the faces took at once
 };
 
 /// Runs the job. Reports the plan through `run.info`, progress through `run.progress`; obeys run.cancel by throwing

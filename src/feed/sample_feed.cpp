@@ -1,15 +1,17 @@
 #include "feed/sample_feed.h"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 
 namespace lamina {
 namespace {
 
-std::size_t bytes_of(const ActiveBucket& b) {
-  const LocalSamples& s = b.samples;
-  return s.size() * (9 * sizeof(float) + 1 + s.attributes.size() * sizeof(float));
-}
+/// Buckets on their way from the store while the stages work.
+constexpr int kReadAhead = 2;
+/// Buckets beyond them that the system is told of.
+constexpr int kAnnounceAhead = 6;
 
 /// Coarsest level whose cell is at most `size`.
 std::uint8_t level_for(double size, const Lattice& lattice) {
@@ -20,9 +22,9 @@ std::uint8_t level_for(double size, const Lattice& lattice) {
 
 }  // namespace
 
-SampleFeed::SampleFeed(const SlabStore& store, const Lattice& lattice, const FeedSettings& settings,
+SampleFeed::SampleFeed(SlabStore& store, const Lattice& lattice, const FeedSettings& settings,
                        const RadiiSettings& radii, bool given_radii)
-    : store_(store), lattice_(lattice), settings_(settings) {
+    : store_(store), lattice_(lattice), settings_(settings), cache_(store, lattice, settings.cache_bytes) {
   if (!given_radii) estimator_ = std::make_unique<RadiusEstimator>(radii);
   // A radius that asks for cells larger than the coarsest level has gives no more than that level can use.
   const double coarsest = 2.0 * lattice.cell_size(lattice.levels - 1) / settings.cell_ratio;
@@ -30,30 +32,49 @@ SampleFeed::SampleFeed(const SlabStore& store, const Lattice& lattice, const Fee
   support_limit_ = radius_limit_ * settings.blend;
 }
 
+FeedCounts SampleFeed::counts() const {
+  FeedCounts counts = counts_;
+  counts.bucket_reads = cache_.reads();
+  return counts;
+}
+
+std::size_t SampleFeed::next_filled(std::size_t bucket) const {
+  while (bucket < store_.buckets() && store_.count(bucket) == 0) ++bucket;
+  return bucket;
+}
+
 void SampleFeed::prepare(std::int64_t z_limit, const OnReady& on_ready) {
+  std::size_t& front = estimator_ == nullptr ? ready_ : pushed_;  // next to be read for the first time
+  const auto read_ahead = [&] {
+    std::size_t next = front;
+    for (int i = 0; i < kReadAhead && (next = next_filled(next)) < store_.buckets(); ++i) cache_.prefetch(next++);
+    announced_ = std::max(announced_, next);
+    for (int i = 0; i < kAnnounceAhead && (next = next_filled(next)) < store_.buckets(); ++i, ++next) {
+      if (next < announced_) continue;
+      store_.will_read(next);
+      announced_ = next + 1;
+    }
+  };
   while (ready_ < store_.buckets()) {
     // Buckets are ascending and disjoint in z: the next one decides.
-    std::size_t next = ready_;
-    while (next < store_.buckets() && store_.count(next) == 0) ++next;
-    if (next == store_.buckets() || store_.z_lower(next) >= z_limit) return;
+    const std::size_t next = next_filled(ready_);
+    if (next == store_.buckets() || store_.z_lower(next) >= z_limit) break;
     std::vector<float> radii;
     if (estimator_ == nullptr) {
-      LocalSamples samples;
-      store_.read(ready_, samples);
-      ++counts_.bucket_reads;
-      learn(std::move(samples.radius), on_ready);
+      read_ahead();
+      if (store_.count(ready_) > 0) radii = cache_.get(ready_)->samples.radius;
+      learn(std::move(radii), on_ready);
       continue;
     }
     if (estimator_->pop(radii)) {
       learn(std::move(radii), on_ready);
       continue;
     }
-    LocalSamples samples;
-    store_.read(pushed_, samples);
-    ++counts_.bucket_reads;
-    estimator_->push(samples);
+    read_ahead();
+    estimator_->push(store_.count(pushed_) > 0 ? cache_.get(pushed_)->samples : LocalSamples{});
     if (++pushed_ == store_.buckets()) estimator_->finish();
   }
+  read_ahead();
 }
 
 void SampleFeed::learn(std::vector<float> radii, const OnReady& on_ready) {
@@ -84,33 +105,23 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
   out.max_support = known.max_support;
   const auto finest = static_cast<float>(lattice_.cell);
   const double ratio = settings_.cell_ratio * (settings_.cell_follows_support ? settings_.blend : 1.0F);
-  for (std::size_t i = 0; i < n; ++i) {
-    const float r = known.radius[i];
-    out.support[i] = r * settings_.blend;
-    // q_i is proportional to the sampling density 1 / r^2 (METHOD 3.1), scaled by the finest cell to stay near one.
-    const float q = r > 0 ? finest / r : 0.0F;
-    out.weight[i] = q * q * (out.samples.quality.empty() ? 1.0F : out.samples.quality[i]);
-    out.level[i] = settings_.fixed_cell ? std::uint8_t{0} : level_for(static_cast<double>(r) * ratio, lattice_);
-  }
+  const bool has_quality = !out.samples.quality.empty();
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 8192), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      const float r = known.radius[i];
+      out.support[i] = r * settings_.blend;
+      // q_i is proportional to the sampling density 1 / r^2 (METHOD 3.1), scaled by the finest cell to stay near one.
+      const float q = r > 0 ? finest / r : 0.0F;
+      out.weight[i] = q * q * (has_quality ? out.samples.quality[i] : 1.0F);
+      out.level[i] = settings_.fixed_cell ? std::uint8_t{0} : level_for(static_cast<double>(r) * ratio, lattice_);
+    }
+  });
 }
 
 std::shared_ptr<const ActiveBucket> SampleFeed::fetch(std::size_t bucket) {
-  const auto hit = std::find_if(cache_.begin(), cache_.end(), [&](const auto& e) { return e.first == bucket; });
-  if (hit != cache_.end()) {
-    cache_.splice(cache_.begin(), cache_, hit);
-    return cache_.front().second;
-  }
-  auto loaded = std::make_shared<ActiveBucket>();
-  store_.read(bucket, loaded->samples);
-  ++counts_.bucket_reads;
-  annotate(bucket, *loaded);
-  cached_bytes_ += bytes_of(*loaded);
-  cache_.emplace_front(bucket, loaded);
-  while (cached_bytes_ > settings_.cache_bytes && cache_.size() > 1) {
-    cached_bytes_ -= bytes_of(*cache_.back().second);
-    cache_.pop_back();
-  }
-  return loaded;
+  auto active = cache_.get(bucket);
+  if (active->support.size() != active->samples.size()) annotate(bucket, *active);
+  return active;
 }
 
 std::vector<std::vector<std::size_t>> SampleFeed::batches(std::int64_t lo, std::int64_t hi, float margin) const {
@@ -134,6 +145,7 @@ std::vector<std::vector<std::size_t>> SampleFeed::batches(std::int64_t lo, std::
 Batch SampleFeed::load(const std::vector<std::size_t>& batch) {
   Batch out;
   out.reserve(batch.size());
+  for (const std::size_t b : batch) cache_.prefetch(b);
   for (const std::size_t b : batch) out.push_back(fetch(b));
   return out;
 }
@@ -142,13 +154,10 @@ void SampleFeed::release(std::int64_t z) {
   while (first_ < ready_ && (store_.count(first_) == 0 || store_.z_upper(first_) < z)) {
     released_ += store_.count(first_);
     known_.erase(first_);
-    const auto hit = std::find_if(cache_.begin(), cache_.end(), [&](const auto& e) { return e.first == first_; });
-    if (hit != cache_.end()) {
-      cached_bytes_ -= bytes_of(*hit->second);
-      cache_.erase(hit);
-    }
+    cache_.drop(first_);
     ++first_;
   }
+  store_.release_before(first_);
 }
 
 }  // namespace lamina

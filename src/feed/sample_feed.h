@@ -3,25 +3,17 @@
 #pragma once
 #include <cstdint>
 #include <functional>
-#include <list>
 #include <memory>
 #include <unordered_map>
 #include <vector>
 
+#include "feed/bucket_cache.h"
 #include "lamina/lattice.h"
 #include "lamina/radii.h"
 #include "lamina/slab_store.h"
 
 namespace lamina {
 
-/// A bucket's samples with what refinement and projection need of each.
-struct ActiveBucket {
-  LocalSamples samples;
-  std::vector<float> support;       ///< R_i = H r_i, steps; 0: the sample is left out
-  std::vector<float> weight;        ///< q_i
-  std::vector<std::uint8_t> level;  ///< coarsest level whose cells are small enough for the sample
-  float max_support = 0;            ///< largest R_i, steps
-};
 using Batch = std::vector<std::shared_ptr<const ActiveBucket>>;
 
 struct FeedSettings {
@@ -43,10 +35,13 @@ struct FeedCounts {
   std::uint64_t bucket_reads = 0;  ///< times a bucket was decompressed
 };
 
-/// Buckets go by ascending z: prepare() runs ahead, release() follows behind.
+/// Buckets go by ascending z: prepare() runs ahead, release() follows behind. Inside a bucket samples are sorted by
+/// blocks of cells (feed/block_order.h): successive ones lie close to each other, which the stages may rely on for
+/// speed. The next buckets are read while the stages work.
 class SampleFeed {
  public:
-  SampleFeed(const SlabStore& store, const Lattice& lattice, const FeedSettings& settings, const RadiiSettings& radii,
+  /// Gives buckets released back to the store.
+  SampleFeed(SlabStore& store, const Lattice& lattice, const FeedSettings& settings, const RadiiSettings& radii,
              bool given_radii);
 
   /// Called for every bucket in ascending order once its radii are known.
@@ -59,8 +54,9 @@ class SampleFeed {
   [[nodiscard]] Batch load(const std::vector<std::size_t>& batch);
   /// Forgets buckets that end below z.
   void release(std::int64_t z);
-  [[nodiscard]] std::uint64_t released() const { return released_; }  ///< samples forgotten so far
-  [[nodiscard]] const FeedCounts& counts() const { return counts_; }
+  [[nodiscard]] std::uint64_t released() const { return released_; }              ///< samples forgotten so far
+  [[nodiscard]] std::uint64_t disk_bytes() const { return store_.disk_bytes(); }  ///< of the store, now
+  [[nodiscard]] FeedCounts counts() const;
   /// Largest influence a sample can have, steps: the look-ahead that prepare() needs.
   [[nodiscard]] float support_limit() const { return support_limit_; }
 
@@ -70,21 +66,23 @@ class SampleFeed {
     float max_support = 0;
   };
   void annotate(std::size_t bucket, ActiveBucket& out) const;
+  /// The next bucket with samples from `bucket` on, the number of buckets when there is none.
+  [[nodiscard]] std::size_t next_filled(std::size_t bucket) const;
   std::shared_ptr<const ActiveBucket> fetch(std::size_t bucket);
   void learn(std::vector<float> radii, const OnReady& on_ready);
 
-  const SlabStore& store_;
+  SlabStore& store_;
   Lattice lattice_;
   FeedSettings settings_;
   std::unique_ptr<RadiusEstimator> estimator_;  ///< null when the input gave radii
   float support_limit_;
   float radius_limit_;
-  std::size_t pushed_ = 0;  ///< buckets handed to the estimator
-  std::size_t ready_ = 0;   ///< buckets with known radii
-  std::size_t first_ = 0;   ///< first bucket not released
+  std::size_t pushed_ = 0;     ///< buckets handed to the estimator
+  std::size_t announced_ = 0;  ///< buckets the store knows are wanted
+  std::size_t ready_ = 0;      ///< buckets with known radii
+  std::size_t first_ = 0;      ///< first bucket not released
   std::unordered_map<std::size_t, Known> known_;
-  std::list<std::pair<std::size_t, std::shared_ptr<const ActiveBucket>>> cache_;  ///< most recently used first
-  std::size_t cached_bytes_ = 0;
+  BucketCache cache_;
   std::uint64_t released_ = 0;
   FeedCounts counts_;
 };

@@ -48,6 +48,15 @@ int copy_through_memory(int from, off_t offset, std::uint64_t left, int to) {
   return 0;
 }
 
+int copy_range(int from, std::uint64_t begin, std::uint64_t bytes, int to) {
+  // Each way goes on where the one before gave up; only the last, which works on everything, reports why.
+  auto offset = static_cast<off_t>(begin);
+  std::uint64_t left =
+      copy_while(bytes, [&](std::size_t n) { return ::copy_file_range(from, &offset, to, nullptr, n, 0); });
+  left = copy_while(left, [&](std::size_t n) { return ::sendfile(to, from, &offset, n); });
+  return copy_through_memory(from, offset, left, to);
+}
+
 }  // namespace
 
 int Descriptor::close() {
@@ -126,12 +135,19 @@ ReadResult pread_all(int fd, void* data, std::size_t bytes, std::uint64_t offset
 }
 
 int copy_all(int from, std::uint64_t bytes, int to) {
-  // Each way goes on where the one before gave up; only the last, which works on everything, reports why.
-  off_t offset = 0;
-  std::uint64_t left =
-      copy_while(bytes, [&](std::size_t n) { return ::copy_file_range(from, &offset, to, nullptr, n, 0); });
-  left = copy_while(left, [&](std::size_t n) { return ::sendfile(to, from, &offset, n); });
-  return copy_through_memory(from, offset, left, to);
+  return copy_range(from, 0, bytes, to);
+}
+
+int move_all(int from, std::uint64_t bytes, int to) {
+  constexpr std::uint64_t kPiece = 64 << 20;
+  for (std::uint64_t done = 0; done < bytes; done += kPiece) {
+    const std::uint64_t piece = std::min(kPiece, bytes - done);
+    if (const int error = copy_range(from, done, piece, to); error != 0) return error;
+    // Where holes are unknown the space comes back when the file is closed.
+    (void)::fallocate(from, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, static_cast<off_t>(done),
+                      static_cast<off_t>(piece));
+  }
+  return 0;
 }
 
 }  // namespace lamina

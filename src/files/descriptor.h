@@ -55,4 +55,8 @@ ReadResult pread_all(int fd, void* data, std::size_t bytes, std::uint64_t offset
 /// kernel where it can. 0 or an errno value; EIO when `from` is shorter.
 int copy_all(int from, std::uint64_t bytes, int to);
 
+/// The same, and gives the disk space of what has been copied back as it goes (where the file system can): `from` holds
+/// nothing of use afterwards. `to` is a regular file: a pipe may still refer to what is given back.
+int move_all(int from, std::uint64_t bytes, int to);
+
 }  // namespace lamina

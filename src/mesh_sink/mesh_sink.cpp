@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "files/background_writer.h"
 #include "files/descriptor.h"
 #include "lamina/error.h"
 #include "mesh_sink/mesh_header.h"
@@ -16,6 +17,8 @@
 
 namespace lamina {
 namespace {
+
+constexpr std::size_t kBuffers = 6;  ///< on their way to the disk
 
 MeshSinkSettings checked(MeshSinkSettings settings) {
   require_ply_names(settings.attributes);
@@ -30,12 +33,17 @@ struct MeshSink::Impl {
         output(settings.path, settings.tmp_dir),
         face_directory(settings.tmp_dir.empty() ? output.directory() : settings.tmp_dir),
         face_file(open_unlinked(face_directory)),
-        vertex_writer(vertex_record_bytes(settings.attributes, settings.double_positions)),
-        face_writer(kFaceRecordBytes) {
+        writer(buffer_bytes(settings), kBuffers),
+        vertex_writer(writer, vertex_record_bytes(settings.attributes, settings.double_positions)),
+        face_writer(writer, kFaceRecordBytes) {
     const std::string reserved(mesh_header_bytes(settings), ' ');
     check_vertices(write_all(output.fd(), reserved.data(), reserved.size()));
   }
 
+  /// Of which a vertex with very many attributes needs more.
+  static std::size_t buffer_bytes(const MeshSinkSettings& s) {
+    return std::max(RecordWriter::kBytes, vertex_record_bytes(s.attributes, s.double_positions));
+  }
   void check_vertices(int error) const {
     if (error != 0) report_write_error(output.name(), error);
   }
@@ -61,6 +69,7 @@ struct MeshSink::Impl {
     require_indices();
     check_vertices(vertex_writer.flush(output.fd()));
     check_faces(face_writer.flush(face_file.get()));
+    check_vertices(writer.drain());
     const std::string header = mesh_header(settings, vertices, triangles);
     check_vertices(pwrite_all(output.fd(), header.data(), header.size(), 0));
     if (output.streams()) {
@@ -69,7 +78,7 @@ struct MeshSink::Impl {
       check_vertices(copy_all(face_file.get(), face_writer.written(), to.get()));
       check_vertices(to.close());
     } else {
-      check_vertices(copy_all(face_file.get(), face_writer.written(), output.fd()));
+      check_vertices(move_all(face_file.get(), face_writer.written(), output.fd()));
       output.publish();
     }
     committed = true;
@@ -79,6 +88,7 @@ struct MeshSink::Impl {
   OutputFile output;
   std::string face_directory;
   Descriptor face_file;
+  BackgroundWriter writer;
   RecordWriter vertex_writer, face_writer;
   std::uint64_t vertices = 0, triangles = 0;
   std::uint32_t largest_index = 0;

@@ -58,6 +58,7 @@ void CellBlocks::drop_below(std::int64_t z_end) {
   bool dropped = false;
   while (!layers_.empty() && (static_cast<std::int64_t>(layers_.begin()->first) + 1) * kBlockSide <= z_end) {
     const auto& layer = layers_.begin()->second;
+    for (const std::uint32_t block : layer) blocks_[block].radii.reset();
     free_.insert(free_.end(), layer.begin(), layer.end());
     layers_.erase(layers_.begin());
     dropped = true;

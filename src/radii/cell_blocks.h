@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <vector>
 
 namespace lamina {
@@ -44,20 +45,27 @@ constexpr std::uint32_t parent_cell(const BlockKey& key, std::uint32_t cell) {
                        (key.z & 1) * half + cell_z(cell) / 2);
 }
 
+using Radii = std::array<float, kBlockCells>;
+
 struct CellBlock {
+  static constexpr std::uint32_t kNone = ~0U;
+
   BlockKey key;
+  std::uint32_t parent = kNone;  ///< block one level up, once aggregated
+  std::uint64_t refined = 0;     ///< bit per cell: a child holds enough samples to stand for itself
+  std::uint64_t bounding = 0;    ///< bit per cell: holds enough samples to bound the radii around, and is not refined
+  std::uint64_t own = 0;         ///< bit per cell: `radii` is final; the others have their parent cell's radius
+  bool enough = false;           ///< a cell holds enough samples
+  bool refined_around = false;   ///< one of the 27 blocks here has refined cells
+  std::unique_ptr<Radii> radii;  ///< only where a cell has one of its own: few do in the finest levels
   std::array<std::uint32_t, kBlockCells> counts{};
-  std::array<float, kBlockCells> radii{};  ///< of the samples in each cell, once final
-  std::uint32_t most = 0;                  ///< greatest of the counts summed up so far
-  std::uint32_t most_around = 0;           ///< greatest `most` of the 27 blocks here
-  std::uint64_t refined = 0;               ///< bit per cell: a child holds enough samples to stand for itself
 };
-static_assert(kBlockCells == 64, "refined has one bit per cell");
+static_assert(kBlockCells == 64, "refined and own have one bit per cell");
 
 /// Blocks keep their index until they are dropped; indices are reused.
 class CellBlocks {
  public:
-  static constexpr std::uint32_t kNone = ~0U;
+  static constexpr std::uint32_t kNone = CellBlock::kNone;
 
   /// Index of a block, kNone when there is none; safe from several threads while nothing is inserted.
   [[nodiscard]] std::uint32_t find(const BlockKey& key) const;

@@ -19,7 +19,8 @@ class CellOctree {
   /// Shift from a finest cell's z to its group.
   [[nodiscard]] int group_shift() const { return settings_.levels - 1; }
 
-  /// Counts samples given by their finest cells and writes where each was counted. Throws Error(budget) when the window
+  /// Counts samples given by their finest cells and writes where each was counted: fastest where successive samples lie
+  /// close to each other. Throws Error(budget) when the window
   /// holds more blocks than a CellRef can name.
   void count(std::span<const std::int32_t> x, std::span<const std::int32_t> y, std::span<const std::int32_t> z,
              std::span<CellRef> refs);
@@ -27,7 +28,7 @@ class CellOctree {
   void aggregate(std::int64_t begin, std::int64_t end);
   /// Radii of groups [begin, end); they and the groups begin - 1 and end have been aggregated.
   void find_radii(std::int64_t begin, std::int64_t end);
-  [[nodiscard]] float radius(CellRef ref) const { return levels_[0][ref / kBlockCells].radii[ref % kBlockCells]; }
+  [[nodiscard]] float radius(CellRef ref) const { return radius(0, ref / kBlockCells, ref % kBlockCells); }
   /// Forgets the groups before `group`.
   void drop_below(std::int64_t group);
 
@@ -37,7 +38,10 @@ class CellOctree {
   };
   [[nodiscard]] bool is_coarsest(int level) const { return level + 1 == settings_.levels; }
   [[nodiscard]] ZRange cells_of(std::int64_t begin, std::int64_t end, int level) const;
+  void aggregate_block(int level, std::uint32_t index, ZRange range);
   void find_block_radii(int level, std::uint32_t index, ZRange range);
+  /// The radius of a cell: its own, else the nearest one above.
+  [[nodiscard]] float radius(std::size_t level, std::uint32_t block, std::uint32_t cell) const;
 
   RadiiSettings settings_;
   std::vector<CellBlocks> levels_;  ///< finest first

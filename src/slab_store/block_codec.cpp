@@ -87,8 +87,9 @@ std::size_t encode_block(const SampleColumns& columns, std::span<const std::byte
     if (SampleColumns::is_position(c)) flatten(scratch.first(count), header);
     // Given more room than this, Blosc may use it for small blocks instead of storing them plainly.
     const std::size_t room = count * value_bytes + BLOSC_MAX_OVERHEAD;
-    const int bytes = blosc_compress_ctx(kLevel, BLOSC_SHUFFLE, value_bytes, count * value_bytes, scratch.data(),
-                                         block.data() + end, room, kCompressor, 0, 1);
+    const int bytes =
+        blosc_compress_ctx(SampleColumns::is_noise(c) ? 0 : kLevel, BLOSC_SHUFFLE, value_bytes, count * value_bytes,
+                           scratch.data(), block.data() + end, room, kCompressor, 0, 1);
     if (bytes <= 0) throw Error(ExitCode::internal, fmt::format("slab store: Blosc refused {} values", count));
     header.bytes = static_cast<std::uint32_t>(bytes);
     std::memcpy(block.data() + c * sizeof(ColumnHeader), &header, sizeof(header));
@@ -102,6 +103,7 @@ bool decode_block(const SampleColumns& columns, std::span<const std::byte> block
   std::size_t begin = columns.size() * sizeof(ColumnHeader);
   if (block.size() < begin) return false;
   std::vector<std::byte> scratch;
+  std::vector<std::uint16_t> normals;  // the three columns after each other
   for (std::size_t c = 0; c < columns.size(); ++c) {
     ColumnHeader header;
     std::memcpy(&header, block.data() + c * sizeof(ColumnHeader), sizeof(header));
@@ -112,7 +114,10 @@ bool decode_block(const SampleColumns& columns, std::span<const std::byte> block
       return false;
     }
     std::byte* to = nullptr;
-    if (columns.is_direct(c)) {
+    if (SampleColumns::is_normal(c)) {
+      normals.resize(3 * count);
+      to = reinterpret_cast<std::byte*>(normals.data() + (c - 3) * count);
+    } else if (columns.is_direct(c)) {
       to = columns.data(out, c) + first * columns.bytes(c);
     } else {
       scratch.resize(bytes);
@@ -121,7 +126,11 @@ bool decode_block(const SampleColumns& columns, std::span<const std::byte> block
     if (blosc_decompress_ctx(block.data() + begin, to, bytes, 1) != static_cast<int>(bytes)) return false;
     if (SampleColumns::is_position(c)) {
       unflatten({reinterpret_cast<std::uint32_t*>(to), count}, header);
-    } else if (!columns.is_direct(c)) {
+    } else if (c == 5) {
+      const std::uint16_t* const u = normals.data();
+      unpack_normals(u, u + count, u + 2 * count, count, out.nx.data() + first, out.ny.data() + first,
+                     out.nz.data() + first);
+    } else if (!SampleColumns::is_normal(c) && !columns.is_direct(c)) {
       columns.convert(to, count, out, c, first);
     }
     begin += header.bytes;

@@ -26,7 +26,7 @@ std::uint32_t BucketBuffers::take_chunk() {
   return chunk;
 }
 
-std::size_t BucketBuffers::add(const LocalSamples& samples, std::size_t first,
+std::size_t BucketBuffers::add(const LocalSamples& samples, const PackedNormals& normals, std::size_t first,
                                std::span<const std::uint32_t> bucket_of) {
   arriving_slots_.clear();
   place_.assign(buckets() + 1, 0);
@@ -51,7 +51,9 @@ std::size_t BucketBuffers::add(const LocalSamples& samples, std::size_t first,
     rows_[to] = static_cast<std::uint32_t>(first + i);
     slots_[to] = arriving_slots_[i];
   }
-  const auto scatter = [&](std::size_t column) { columns_.scatter(samples, column, rows_, slots_, pool_.get()); };
+  const auto scatter = [&](std::size_t column) {
+    columns_.scatter(samples, normals, column, rows_, slots_, pool_.get());
+  };
   tbb::parallel_for(std::size_t{0}, columns_.size(), scatter);
   return added;
 }

@@ -17,7 +17,8 @@ class BucketBuffers {
 
   /// Adds rows [first, first + bucket_of.size()), less than 2^32 in all, to their buckets until the pool is full;
   /// returns how many went in.
-  std::size_t add(const LocalSamples& samples, std::size_t first, std::span<const std::uint32_t> bucket_of);
+  std::size_t add(const LocalSamples& samples, const PackedNormals& normals, std::size_t first,
+                  std::span<const std::uint32_t> bucket_of);
   [[nodiscard]] std::size_t buckets() const { return count_.size(); }
   [[nodiscard]] std::size_t waiting(std::size_t bucket) const { return count_[bucket]; }
   [[nodiscard]] std::size_t chunks() const { return next_.size(); }

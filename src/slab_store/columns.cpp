@@ -52,6 +52,7 @@ void with_type(ScalarType type, F&& f) {
 
 constexpr std::array kPositions{&LocalSamples::x, &LocalSamples::y, &LocalSamples::z};
 constexpr std::array kNormals{&LocalSamples::nx, &LocalSamples::ny, &LocalSamples::nz};
+constexpr std::array kPacked{&PackedNormals::u, &PackedNormals::v, &PackedNormals::low};
 
 /// Writes make(values[rows[i]]) to its slot; `column` points at the column's values in the first chunk.
 template <class T, class Make>
@@ -70,7 +71,7 @@ void scatter_values(const T* values, std::span<const std::uint32_t> rows, std::s
 SampleColumns::SampleColumns(const StoreLayout& layout)
     : has_radius_(layout.has_radius), has_quality_(layout.has_quality) {
   types_.assign(3, ScalarType::int32);
-  types_.insert(types_.end(), 3, ScalarType::float32);
+  types_.insert(types_.end(), 3, ScalarType::uint16);
   for (const bool present : {has_radius_, has_quality_}) {
     if (present) types_.push_back(ScalarType::float32);
   }
@@ -110,13 +111,18 @@ void SampleColumns::resize(LocalSamples& samples, std::size_t n) const {
   for (std::size_t c = 3; c < size(); ++c) floats(samples, c).resize(n);
 }
 
-void SampleColumns::scatter(const LocalSamples& samples, std::size_t column, std::span<const std::uint32_t> rows,
-                            std::span<const std::uint32_t> slots, std::byte* chunks) const {
+void SampleColumns::scatter(const LocalSamples& samples, const PackedNormals& normals, std::size_t column,
+                            std::span<const std::uint32_t> rows, std::span<const std::uint32_t> slots,
+                            std::byte* chunks) const {
   const std::size_t chunk_bytes = kChunkRows * row_bytes();
   std::byte* to = chunks + kChunkRows * bytes_before(column);
   if (is_position(column)) {
     const std::int32_t* values = (samples.*kPositions[column]).data();
     return scatter_values(values, rows, slots, to, chunk_bytes, [](std::int32_t v) { return v; });
+  }
+  if (is_normal(column)) {
+    const std::uint16_t* values = (normals.*kPacked[column - 3]).data();
+    return scatter_values(values, rows, slots, to, chunk_bytes, [](std::uint16_t v) { return v; });
   }
   const float* values = floats(samples, column).data();
   with_type(types_[column], [&]<class T>(T) { scatter_values(values, rows, slots, to, chunk_bytes, to_rest<T>); });

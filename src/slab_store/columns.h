@@ -6,13 +6,14 @@
 #include <vector>
 
 #include "lamina/slab_store.h"
+#include "slab_store/unit_normal.h"
 
 namespace lamina {
 
 /// Samples wait for the disk in chunks of this many: small, as every bucket has one that is partly filled.
 inline constexpr std::uint32_t kChunkRows = 64;
 
-/// Columns in the order they are stored: x y z, nx ny nz, [radius], [quality], attributes.
+/// Columns in the order they are stored: x y z, three of the normal (PackedNormals), [radius], [quality], attributes.
 class SampleColumns {
  public:
   explicit SampleColumns(const StoreLayout& layout);
@@ -26,6 +27,9 @@ class SampleColumns {
   [[nodiscard]] std::size_t row_bytes() const { return bytes_before_.back(); }
   /// Positions: int32 on both sides, worth an offset or a difference before compression.
   [[nodiscard]] static bool is_position(std::size_t column) { return column < 3; }
+  [[nodiscard]] static bool is_normal(std::size_t column) { return column >= 3 && column < 6; }
+  /// The lowest bits of a measurement: compressing them is time lost.
+  [[nodiscard]] static bool is_noise(std::size_t column) { return column == 5; }
   /// At rest as it is in memory: no conversion on reading.
   [[nodiscard]] bool is_direct(std::size_t column) const {
     return is_position(column) || types_[column] == ScalarType::float32;
@@ -37,8 +41,9 @@ class SampleColumns {
   void resize(LocalSamples& samples, std::size_t n) const;
   /// Value rows[i] goes to slots[i], converted to the column's type: rounded and clamped for integers, NaN as zero.
   /// Slot s is row s % kChunkRows of chunk s / kChunkRows; a chunk holds kChunkRows values of each column in turn.
-  void scatter(const LocalSamples& samples, std::size_t column, std::span<const std::uint32_t> rows,
-               std::span<const std::uint32_t> slots, std::byte* chunks) const;
+  /// Normals come packed.
+  void scatter(const LocalSamples& samples, const PackedNormals& normals, std::size_t column,
+               std::span<const std::uint32_t> rows, std::span<const std::uint32_t> slots, std::byte* chunks) const;
   /// Where a column's values live in memory, as bytes.
   [[nodiscard]] std::byte* data(LocalSamples& samples, std::size_t column) const;
   /// Converts `count` values at rest into rows [first, first + count) of a column that is not direct.

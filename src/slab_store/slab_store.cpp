@@ -34,12 +34,19 @@ std::uint64_t SlabStore::total() const {
   return impl_->total;
 }
 std::uint64_t SlabStore::disk_bytes() const {
-  return impl_->file.size();
+  std::uint64_t bytes = 0;
+  for (const TempFile& file : impl_->files) bytes += file.size();
+  return bytes;
+}
+
+std::size_t SlabStore::files() const {
+  return impl_->files.size();
 }
 
 void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
   const auto& [blocks, count, z_lower, z_upper] = impl_->buckets[bucket];
   const auto& columns = impl_->columns;
+  const TempFile& file = impl_->file_of(bucket);
   columns.resize(out, count);
   std::vector<std::size_t> first(blocks.size());
   for (std::size_t i = 1; i < blocks.size(); ++i) first[i] = first[i - 1] + blocks[i - 1].count;
@@ -47,16 +54,40 @@ void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
     std::vector<std::byte> bytes;
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       bytes.resize(blocks[i].bytes);
-      impl_->file.read(blocks[i].offset, bytes);
+      file.read(blocks[i].offset, bytes);
       if (!decode_block(columns, bytes, blocks[i].count, out, first[i])) {
         throw Error(
             ExitCode::budget,
             fmt::format("the temporary file in '{}' is damaged at byte {} (samples of bucket {}); check the disk "
                         "or choose another with --tmp-dir",
-                        impl_->file.directory(), blocks[i].offset, bucket));
+                        file.directory(), blocks[i].offset, bucket));
       }
     }
   });
+}
+
+void SlabStore::will_read(std::size_t bucket) const {
+  const TempFile& file = impl_->file_of(bucket);
+  std::uint64_t begin = 0;
+  std::uint64_t end = 0;
+  // Blocks next to each other are one request.
+  for (const BlockEntry& block : impl_->buckets[bucket].blocks) {
+    if (block.offset != end) {
+      file.will_read(begin, end - begin);
+      begin = block.offset;
+    }
+    end = block.offset + block.bytes;
+  }
+  file.will_read(begin, end - begin);
+}
+
+void SlabStore::release_before(std::size_t bucket) {
+  while (impl_->released < impl_->files.size()) {
+    const std::size_t end =
+        ((impl_->released + 1) * impl_->buckets.size() + impl_->files.size() - 1) / impl_->files.size();
+    if (end > bucket) return;
+    impl_->files[impl_->released++].discard();
+  }
 }
 
 }  // namespace lamina

@@ -1,3 +1,4 @@
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_pipeline.h>
 
 #include <algorithm>
@@ -19,6 +20,13 @@ constexpr std::size_t kPieceRows = 32768;
 
 /// Blocks being compressed or written at once, at most.
 constexpr std::size_t kBlocksInFlight = 16;
+
+/// Buffers on their way to the disk.
+constexpr std::size_t kBuffersInFlight = 16;
+
+/// Files of a store; one for as few buckets as give back little.
+constexpr std::size_t kFiles = 16;
+constexpr std::size_t kBucketsPerFile = 8;
 
 /// Part of a bucket on its way to the disk.
 struct Piece {
@@ -51,8 +59,7 @@ void find_z_range(const SampleColumns& columns, Piece& piece) {
 struct SlabStoreWriter::Impl {
   Impl(const StoreLayout& layout, const StoreSettings& s)
       : settings(s),
-        store(new SlabStore::Impl{SampleColumns(layout), layout, TempFile(s.directory),
-                                  std::vector<BucketIndex>(s.buckets)}),
+        store(new SlabStore::Impl{SampleColumns(layout), layout, make_files(s), std::vector<BucketIndex>(s.buckets)}),
         buffers(store->columns, s.buckets, s.buffer_bytes - s.buffer_bytes / 4),
         block_rows(block_rows_for(s.buffer_bytes / 4 / (store->columns.row_bytes() + sizeof(std::uint32_t)))) {}
 
@@ -60,6 +67,13 @@ struct SlabStoreWriter::Impl {
   [[nodiscard]] static std::size_t block_rows_for(std::size_t rows_in_flight) {
     return std::clamp<std::size_t>(rows_in_flight / kBlocksInFlight / kChunkRows * kChunkRows, 1024, kBlockRows);
   }
+  [[nodiscard]] static std::vector<TempFile> make_files(const StoreSettings& s) {
+    std::vector<TempFile> files;
+    const std::size_t n = std::clamp<std::size_t>(s.buckets / kBucketsPerFile, 1, kFiles);
+    while (files.size() < n) files.emplace_back(s.directory);
+    return files;
+  }
+  void pack(const LocalSamples& samples);
   void find_buckets(const LocalSamples& samples, std::size_t first, std::size_t count);
   void flush_fullest();
   void flush(std::span<const std::size_t> which);
@@ -69,8 +83,19 @@ struct SlabStoreWriter::Impl {
   BucketBuffers buffers;
   std::size_t block_rows;
   std::vector<std::uint32_t> bucket_of;
+  PackedNormals normals;  ///< of the samples being appended
   std::array<Piece, kBlocksInFlight> pieces;
+  BackgroundWriter disk{TempFile::kBufferBytes, kBuffersInFlight};
 };
+
+void SlabStoreWriter::Impl::pack(const LocalSamples& s) {
+  normals.resize(s.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, s.size(), 8192), [&](const auto& range) {
+    const std::size_t i = range.begin();
+    pack_normals(s.nx.data() + i, s.ny.data() + i, s.nz.data() + i, range.size(), normals.u.data() + i,
+                 normals.v.data() + i, normals.low.data() + i);
+  });
+}
 
 void SlabStoreWriter::Impl::find_buckets(const LocalSamples& samples, std::size_t first, std::size_t count) {
   const std::int64_t last = settings.z_min + static_cast<std::int64_t>(settings.buckets - 1) * settings.bucket_height;
@@ -137,7 +162,7 @@ void SlabStoreWriter::Impl::flush(std::span<const std::size_t> which) {
   };
   const auto write = [&](Piece* piece) {
     BucketIndex& index = store->buckets[piece->bucket];
-    const std::uint64_t offset = store->file.append({piece->block.get(), piece->bytes});
+    const std::uint64_t offset = store->file_of(piece->bucket).append({piece->block.get(), piece->bytes}, disk);
     index.blocks.push_back(
         {offset, static_cast<std::uint32_t>(piece->bytes), static_cast<std::uint32_t>(piece->count)});
     index.count += piece->count;
@@ -163,12 +188,13 @@ SlabStoreWriter::~SlabStoreWriter() = default;
 void SlabStoreWriter::append(const LocalSamples& samples) {
   if (!impl_) throw Error(ExitCode::internal, "slab store: append after finish");
   impl_->store->columns.check(samples);
+  impl_->pack(samples);
   for (std::size_t first = 0; first < samples.size(); first += kPieceRows) {
     const std::size_t count = std::min(kPieceRows, samples.size() - first);
     impl_->find_buckets(samples, first, count);
     std::span<const std::uint32_t> left = impl_->bucket_of;
     while (!left.empty()) {
-      const std::size_t added = impl_->buffers.add(samples, first + count - left.size(), left);
+      const std::size_t added = impl_->buffers.add(samples, impl_->normals, first + count - left.size(), left);
       left = left.subspan(added);
       if (!left.empty()) impl_->flush_fullest();
     }
@@ -181,7 +207,8 @@ SlabStore SlabStoreWriter::finish() {
   std::vector<std::size_t> all(impl_->buffers.buckets());
   std::iota(all.begin(), all.end(), std::size_t{0});
   impl_->flush(all);
-  impl_->store->file.flush();
+  for (TempFile& file : impl_->store->files) file.flush(impl_->disk);
+  impl_->store->files.front().check(impl_->disk.drain());
   SlabStore store(std::move(impl_->store));
   impl_.reset();
   return store;

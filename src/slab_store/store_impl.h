@@ -20,9 +20,12 @@ struct BucketIndex {
 struct SlabStore::Impl {
   SampleColumns columns;
   StoreLayout layout;
-  TempFile file;
+  std::vector<TempFile> files;  ///< each holds a run of buckets, so that the disk they take can be given back
   std::vector<BucketIndex> buckets;
   std::uint64_t total = 0;
+  std::size_t released = 0;  ///< files before this one are gone
+
+  [[nodiscard]] TempFile& file_of(std::size_t bucket) { return files[bucket * files.size() / buckets.size()]; }
 };
 
 }  // namespace lamina

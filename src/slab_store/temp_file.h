@@ -4,12 +4,15 @@
 #include <cstdint>
 #include <span>
 #include <string>
-#include <vector>
+
+#include "files/background_writer.h"
 
 namespace lamina {
 
 class TempFile {
  public:
+  static constexpr std::size_t kBufferBytes = 1U << 17;
+
   /// Throws Error(budget) naming the directory when no file can be made in it.
   explicit TempFile(std::string directory);
   ~TempFile();
@@ -17,20 +20,29 @@ class TempFile {
   TempFile& operator=(TempFile&& other) noexcept;
 
   /// Adds bytes at the end and returns their offset. They are written in large pieces at whole pages: small writes cost
-  /// the kernel twice the work. Throws Error(budget) naming the directory and the bytes written so far.
-  std::uint64_t append(std::span<const std::byte> bytes);
-  /// Writes what append() still holds; before that it cannot be read. Throws as append() does.
-  void flush();
+  /// the kernel twice the work, by `writer` (buffers of kBufferBytes) and later. Throws Error(budget) naming the
+  /// directory and the bytes written so far when a write has failed.
+  std::uint64_t append(std::span<const std::byte> bytes, BackgroundWriter& writer);
+  /// Hands over what append() still holds; before that, and before the writer is drained, it cannot be read. Throws as
+  /// append() does.
+  void flush(BackgroundWriter& writer);
+  /// Throws what a failed write is worth. `error`: of the writer, 0 for none.
+  void check(int error) const;
   /// Fills `bytes` from `offset`; safe from several threads. Throws Error(budget) when they cannot be read.
   void read(std::uint64_t offset, std::span<std::byte> bytes) const;
-  [[nodiscard]] std::uint64_t size() const { return written_ + held_.size(); }
+  /// Starts reading into the system's cache.
+  void will_read(std::uint64_t offset, std::uint64_t bytes) const;
+  /// Gives the disk space back; nothing can be appended or read any more.
+  void discard();
+  [[nodiscard]] std::uint64_t size() const { return written_ + held_bytes_; }
   [[nodiscard]] const std::string& directory() const { return directory_; }
 
  private:
   std::string directory_;
   int descriptor_ = -1;
   std::uint64_t written_ = 0;
-  std::vector<std::byte> held_;
+  BackgroundWriter::Buffer held_;
+  std::size_t held_bytes_ = 0;
 };
 
 }  // namespace lamina

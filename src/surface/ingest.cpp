@@ -3,9 +3,13 @@
 #include <tbb/parallel_pipeline.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <mutex>
+#include <tuple>
+#include <vector>
 
 #include "lamina/error.h"
 
@@ -16,9 +20,44 @@ constexpr std::size_t kChunk = 1u << 15;            ///< rows a piece
 constexpr std::uint64_t kBucketSamples = 1u << 15;  ///< samples a bucket should hold
 constexpr std::uint64_t kMaxBuckets = 4096;
 
+/// Fixed-point coordinates may reach a little beyond the box surveyed, and qualities beyond the greatest seen.
+constexpr double kMostSteps = (1 << 29) + (1 << 25);
+constexpr double kMostQuality = 1 << 20;
+
+constexpr std::int32_t kMax = std::numeric_limits<std::int32_t>::max();
+constexpr std::int32_t kMin = std::numeric_limits<std::int32_t>::min();
+constexpr Extent kNothing{{kMax, kMin, kMax, kMin}, kMax, kMin};
+
 struct Piece {
   SampleBatch rows;
   LocalSamples local;
+  Extent extent = kNothing;
+  Census census;
+  bool within = true;  ///< every sample lies where it may
+};
+
+/// Pieces in use by the pipeline; their memory goes from one to the next.
+class PiecePool {
+ public:
+  Piece* take() {
+    const std::lock_guard lock(mutex_);
+    if (idle_.empty()) {
+      pieces_.push_back(std::make_unique<Piece>());
+      return pieces_.back().get();
+    }
+    Piece* const piece = idle_.back();
+    idle_.pop_back();
+    return piece;
+  }
+  void give_back(Piece* piece) {
+    const std::lock_guard lock(mutex_);
+    idle_.push_back(piece);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<Piece>> pieces_;
+  std::vector<Piece*> idle_;
 };
 
 /// Factor that brings the greatest quality to at most 1, so that sums of weights cannot overflow. A power of two: the
@@ -34,49 +73,90 @@ float radius_in_steps(double radius) {
   return static_cast<float>(std::clamp(radius, 1.0, kDiagonal));
 }
 
-void to_local(const SampleBatch& rows, const Frame& frame, double radius_scale, double quality_scale,
-              LocalSamples& out) {
-  out.clear();
-  out.reserve(rows.size());
+void resize(LocalSamples& out, const SampleBatch& rows, std::size_t n) {
+  for (auto* values : {&out.x, &out.y, &out.z}) values->resize(n);
+  for (auto* values : {&out.nx, &out.ny, &out.nz}) values->resize(n);
+  out.radius.resize(rows.radius.empty() ? 0 : n);
+  out.quality.resize(rows.quality.empty() ? 0 : n);
   out.attributes.resize(rows.attributes.size());
+  for (auto& values : out.attributes) values.resize(n);
+}
+
+std::pair<std::int32_t, std::int32_t> range_of(const std::vector<std::int32_t>& values) {
+  std::int32_t low = kMax;
+  std::int32_t high = kMin;
+  for (const std::int32_t v : values) {
+    low = std::min(low, v);
+    high = std::max(high, v);
+  }
+  return {low, high};
+}
+
+/// Fills the rest of a piece from `piece.rows`.
+void to_local(Piece& piece, const AttributeLayout& layout, const Frame& frame, double radius_scale,
+              double quality_scale) {
+  const SampleBatch& rows = piece.rows;
+  LocalSamples& out = piece.local;
+  Census& census = piece.census;
+  census = {};
+  census.count_attributes(rows, layout);
+  resize(out, rows, rows.size());
   const Eigen::Matrix3d turn = frame.rotation;
   const Eigen::Matrix3d scale = frame.rotation / frame.step;
   const double radius = radius_scale / frame.step;
+  double farthest = 0;
+  std::size_t n = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (defect_of(rows, i) != Defect::none) continue;
-    const Eigen::Vector3d p = scale * (Eigen::Vector3d(rows.x[i], rows.y[i], rows.z[i]) - frame.origin);
-    const Eigen::Vector3d n = (turn * Eigen::Vector3d(rows.nx[i], rows.ny[i], rows.nz[i])).normalized();
-    out.x.push_back(static_cast<std::int32_t>(std::lrint(p.x())));
-    out.y.push_back(static_cast<std::int32_t>(std::lrint(p.y())));
-    out.z.push_back(static_cast<std::int32_t>(std::lrint(p.z())));
-    out.nx.push_back(static_cast<float>(n.x()));
-    out.ny.push_back(static_cast<float>(n.y()));
-    out.nz.push_back(static_cast<float>(n.z()));
-    if (!rows.radius.empty()) out.radius.push_back(radius_in_steps(rows.radius[i] * radius));
-    if (!rows.quality.empty()) out.quality.push_back(static_cast<float>(rows.quality[i] * quality_scale));
-    for (std::size_t c = 0; c < rows.attributes.size(); ++c) {
-      out.attributes[c].push_back(usable_attribute(rows.attributes[c][i]));
+    const Defect defect = defect_of(rows, i);
+    if (defect != Defect::none) {
+      census.reject(defect, rows.first + i);
+      continue;
     }
+    const Eigen::Vector3d at(rows.x[i], rows.y[i], rows.z[i]);
+    census.low = census.low.cwiseMin(at);
+    census.high = census.high.cwiseMax(at);
+    const Eigen::Vector3d p = scale * (at - frame.origin);
+    const Eigen::Vector3d normal = (turn * Eigen::Vector3d(rows.nx[i], rows.ny[i], rows.nz[i])).normalized();
+    farthest = std::max(farthest, p.cwiseAbs().maxCoeff());
+    const Eigen::Vector3d q = p.cwiseMax(-kMostSteps).cwiseMin(kMostSteps);
+    out.x[n] = static_cast<std::int32_t>(std::lrint(q.x()));
+    out.y[n] = static_cast<std::int32_t>(std::lrint(q.y()));
+    out.z[n] = static_cast<std::int32_t>(std::lrint(q.z()));
+    out.nx[n] = static_cast<float>(normal.x());
+    out.ny[n] = static_cast<float>(normal.y());
+    out.nz[n] = static_cast<float>(normal.z());
+    if (!rows.radius.empty()) out.radius[n] = radius_in_steps(rows.radius[i] * radius);
+    if (!rows.quality.empty()) {
+      census.max_quality = std::max(census.max_quality, rows.quality[i]);
+      out.quality[n] = static_cast<float>(rows.quality[i] * quality_scale);
+    }
+    for (std::size_t c = 0; c < rows.attributes.size(); ++c) {
+      out.attributes[c][n] = usable_attribute(rows.attributes[c][i]);
+    }
+    ++n;
   }
+  census.usable = n;
+  piece.within = farthest <= kMostSteps && census.max_quality * quality_scale <= kMostQuality;
+  resize(out, rows, n);
+  std::tie(piece.extent.x_min, piece.extent.x_max) = range_of(out.x);
+  std::tie(piece.extent.y_min, piece.extent.y_max) = range_of(out.y);
+  std::tie(piece.extent.z_min, piece.extent.z_max) = range_of(out.z);
 }
 
-void widen(Extent& b, const LocalSamples& s) {
-  if (s.size() == 0) return;
-  const auto [x0, x1] = std::minmax_element(s.x.begin(), s.x.end());
-  const auto [y0, y1] = std::minmax_element(s.y.begin(), s.y.end());
-  b.x_min = std::min(b.x_min, *x0);
-  b.x_max = std::max(b.x_max, *x1);
-  b.y_min = std::min(b.y_min, *y0);
-  b.y_max = std::max(b.y_max, *y1);
-  const auto [z0, z1] = std::minmax_element(s.z.begin(), s.z.end());
-  b.z_min = std::min(b.z_min, *z0);
-  b.z_max = std::max(b.z_max, *z1);
+void widen(Extent& b, const Extent& by) {
+  b.x_min = std::min(b.x_min, by.x_min);
+  b.x_max = std::max(b.x_max, by.x_max);
+  b.y_min = std::min(b.y_min, by.y_min);
+  b.y_max = std::max(b.y_max, by.y_max);
+  b.z_min = std::min(b.z_min, by.z_min);
+  b.z_max = std::max(b.z_max, by.z_max);
 }
 
 StoreSettings store_settings(const Survey& survey, const Frame& frame, const std::string& directory) {
   // The rotated bounding box bounds the samples' z.
   const Eigen::Vector3d half = 0.5 * (survey.high - survey.low) / frame.step;
-  const double reach = frame.rotation.row(2).cwiseAbs().dot(half.transpose()) + 1;
+  constexpr double kMargin = 1.0625;  // where only a part of the samples has been seen, others lie a little outside
+  const double reach = kMargin * frame.rotation.row(2).cwiseAbs().dot(half.transpose()) + 1;
   StoreSettings s;
   s.directory = directory;
   s.z_min = static_cast<std::int32_t>(-std::ceil(reach));
@@ -91,42 +171,49 @@ StoreSettings store_settings(const Survey& survey, const Frame& frame, const std
 Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, double radius_scale,
                 const std::string& directory, const RunContext& run) {
   const PointSourceInfo& info = source.info();
-  SlabStoreWriter writer({info.has_radius, info.has_quality, info.attributes},
-                         store_settings(survey, frame, directory));
-  constexpr std::int32_t kMax = std::numeric_limits<std::int32_t>::max();
-  constexpr std::int32_t kMin = std::numeric_limits<std::int32_t>::min();
-  Extent extent{{kMax, kMin, kMax, kMin}, kMax, kMin};
+  const StoreSettings buckets = store_settings(survey, frame, directory);
+  SlabStoreWriter writer({info.has_radius, info.has_quality, info.attributes}, buckets);
+  Extent extent = kNothing;
+  Census census;
+  bool complete = true;
   const double quality = quality_scale(survey);
+  const std::int64_t top = buckets.z_min + static_cast<std::int64_t>(buckets.buckets) * buckets.bucket_height;
+  PiecePool pool;
   std::uint64_t next = 0;
-  const auto take = [&](tbb::flow_control& flow) -> std::shared_ptr<Piece> {
-    if (next >= info.count || run.cancelled()) {
+  std::atomic<bool> stopped = false;
+  const auto take = [&](tbb::flow_control& flow) -> Piece* {
+    if (next >= info.count || stopped || run.cancelled()) {
       flow.stop();
       return nullptr;
     }
-    auto piece = std::make_shared<Piece>();
+    Piece* const piece = pool.take();
     piece->rows.first = next;
     if (!info.random_access) source.read(next, kChunk, piece->rows);
     next += kChunk;
     return piece;
   };
-  const auto convert = [&](const std::shared_ptr<Piece>& piece) {
+  const auto convert = [&](Piece* piece) {
     if (info.random_access) source.read(piece->rows.first, kChunk, piece->rows);
-    to_local(piece->rows, frame, radius_scale, quality, piece->local);
+    to_local(*piece, info.attributes, frame, radius_scale, quality);
     return piece;
   };
-  const auto append = [&](const std::shared_ptr<Piece>& piece) {
-    widen(extent, piece->local);
-    writer.append(piece->local);
+  const auto append = [&](Piece* piece) {
+    widen(extent, piece->extent);
+    census.merge(piece->census);
+    // Buckets at the ends that swallow whatever lies beyond them would be tall, and full.
+    complete =
+        complete && piece->within && (census.usable == 0 || (extent.z_min >= buckets.z_min && extent.z_max < top));
+    stopped = !complete;
+    if (complete) writer.append(piece->local);
     if (run.progress) run.progress({"read", std::min(piece->rows.first + kChunk, info.count), info.count, 0, 0});
+    pool.give_back(piece);
   };
   constexpr std::size_t kInFlight = 8;
-  tbb::parallel_pipeline(
-      kInFlight,
-      tbb::make_filter<void, std::shared_ptr<Piece>>(tbb::filter_mode::serial_in_order, take) &
-          tbb::make_filter<std::shared_ptr<Piece>, std::shared_ptr<Piece>>(tbb::filter_mode::parallel, convert) &
-          tbb::make_filter<std::shared_ptr<Piece>, void>(tbb::filter_mode::serial_in_order, append));
+  tbb::parallel_pipeline(kInFlight, tbb::make_filter<void, Piece*>(tbb::filter_mode::serial_in_order, take) &
+                                        tbb::make_filter<Piece*, Piece*>(tbb::filter_mode::parallel, convert) &
+                                        tbb::make_filter<Piece*, void>(tbb::filter_mode::serial_in_order, append));
   if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
-  return {writer.finish(), extent};
+  return {writer.finish(), extent, census, complete};
 }
 
 }  // namespace lamina

@@ -20,9 +20,12 @@ struct Extent : Bounds {
 struct Ingested {
   SlabStore store;
   Extent extent;
+  Census census;         ///< of the rows read
+  bool complete = true;  ///< false: a sample lies too far outside the box surveyed, and reading stopped there
 };
 
-/// Second pass over the input; samples with a defect are left out.
+/// Reads the whole input into the store; samples with a defect are left out. After a survey of all rows the result is
+/// always complete; after one of a part it need not be.
 Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, double radius_scale,
                 const std::string& directory, const RunContext& run);
 

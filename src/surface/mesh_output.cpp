@@ -58,6 +58,7 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
     place_vertices(done, *clustered_.front(), next, frame_, chord_, vertices_);
     sink_.append_vertices(vertices_);
     sink_.append_triangles(done.triangles);
+    triangles_ += done.triangles.size();
     if (clustered_.front().use_count() == 1) {
       const std::lock_guard lock(mutex_);
       spares_.push_back(std::move(clustered_.front()));

@@ -2,6 +2,8 @@
 #pragma once
 #include <tbb/task_group.h>
 
+#include <atomic>
+#include <cstdint>
 #include <deque>
 #include <memory>
 #include <mutex>
@@ -33,6 +35,8 @@ class MeshOutput {
   void finish();
   /// An empty slab, with the storage of one that was written where there is any.
   std::shared_ptr<IsoSlab> spare();
+  /// Written so far; at any time.
+  [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
   /// After finish().
   [[nodiscard]] const ClusterCounts& counts() const { return clusterer_.counts(); }
 
@@ -48,6 +52,7 @@ class MeshOutput {
   VertexBatch vertices_;
   std::mutex mutex_;  ///< of spares_
   std::vector<std::shared_ptr<IsoSlab>> spares_;
+  std::atomic<std::uint64_t> triangles_ = 0;
   tbb::task_group tasks_;
 };
 

@@ -141,12 +141,19 @@ void Pipeline::run(const RunContext& run, Stopwatch& watch) {
     watch.time("number", [&] { number_to(top + 1); });
     watch.time("triangulate", [&] { triangulate_to(top); });
     watch.time("cluster and write", [&] { output_.start(); });
+    note_disk();
     retire();
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
     if (run.progress)
       run.progress({"surface", feed_.released(), resolved_.plan.samples, top - first_ + 1, last_ - first_ + 1});
   }
   watch.time("cluster and write", [&] { output_.finish(); });
+  note_disk();
+}
+
+void Pipeline::note_disk() {
+  constexpr std::uint64_t kFaceBytes = 13;  // a count of 1 byte and three indices of 4
+  disk_bytes_ = std::max(disk_bytes_, feed_.disk_bytes() + kFaceBytes * output_.triangles());
 }
 
 void Pipeline::report(SurfaceStats& stats) const {
@@ -163,6 +170,7 @@ void Pipeline::report(SurfaceStats& stats) const {
   stats.crossing_cells = extracted_.crossing_cells;
   stats.leaf_cells = leaf_cells_;
   stats.clusters = output_.counts();
+  stats.disk_bytes = disk_bytes_;
 }
 
 }  // namespace lamina

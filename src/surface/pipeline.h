@@ -32,6 +32,7 @@ class Pipeline {
   void triangulate_to(std::int32_t slab);
   void hand_over();
   void retire();
+  void note_disk();
 
   const SurfaceSettings& settings_;
   const Resolved& resolved_;
@@ -48,6 +49,7 @@ class Pipeline {
   std::int32_t covered_;
   std::deque<std::shared_ptr<IsoSlab>> iso_;  ///< slabs held_ .. numbered_ - 1
   ExtractCounts extracted_;
+  std::uint64_t disk_bytes_ = 0;  ///< temporary, the most at once
   std::uint64_t isovertices_ = 0, isotriangles_ = 0;
   std::vector<std::uint64_t> leaf_cells_;
 };

@@ -42,22 +42,23 @@ Levels choose_levels(const SurfaceSettings& s, double ratio, const RadiusSurvey&
   return {std::ldexp(main, -std::min(finer, count - 1)), count};
 }
 
-/// Counting cells of 16 samples are four spacings, two radii wide: the finest begin at half of that for the finest
-/// cells' radius, and the coarsest serve the radius of the coarsest cells.
+/// Counting cells of 16 samples are four spacings, two radii wide: so are the finest for the finest cells' radius
+/// (finer ones would rarely hold as many, and take most of the time), and the coarsest serve the radius of the coarsest
+/// cells.
 void set_counting_cells(const SurfaceSettings& s, const RadiusSurvey& survey, Resolved& out) {
   constexpr double kHalfWidth = 1.15;
   out.radii.min_samples = s.density;
   double finest_radius = survey.low;
-  out.radii.levels = out.lattice.levels + 1;
+  out.radii.levels = out.lattice.levels;
   if (out.feed.fixed_cell) {
     const double octaves = std::log2(std::max(1.0F, survey.high / survey.low));
-    out.radii.levels = std::clamp(static_cast<int>(std::ceil(octaves)) + 4, 4, kMaxLevels);
+    out.radii.levels = std::clamp(static_cast<int>(std::ceil(octaves)) + 3, 3, kMaxLevels);
   } else {
     const double blend = out.feed.cell_follows_support ? s.blend : 1.0;
     finest_radius = out.lattice.cell / (kMainCell * out.feed.cell_ratio * blend);
   }
-  const double cell = kHalfWidth * std::sqrt(s.density / 16.0) * finest_radius / s.radius_scale;
-  out.radii.finest_cell = static_cast<std::int32_t>(std::clamp(std::lrint(cell), 1L, 1L << 24));
+  const double half = kHalfWidth * std::sqrt(s.density / 16.0) * finest_radius / s.radius_scale;
+  out.radii.finest_cell = static_cast<std::int32_t>(2 * std::clamp(std::lrint(half), 1L, 1L << 24));
 }
 
 /// Faces wait on disk for the vertices. A sample stands for a quarter of its radius squared of surface; a main cell's
@@ -70,6 +71,12 @@ std::uint64_t expected_face_bytes(const SurfaceSettings& s, const Resolved& r, c
   const double cell = r.feed.fixed_cell ? finest : std::max(finest, kMainCell * ratio * survey.median);
   const double cells = static_cast<double>(samples) * 0.25 * survey.median * survey.median / (cell * cell);
   return static_cast<std::uint64_t>(kFaceBytes * cells * (s.cluster == ClusterMode::none ? 3.3 : 1.8));
+}
+
+/// Behind the sweep the store gives its disk back, a file at a time, while the faces grow.
+std::uint64_t expected_disk(const SlabStore& store, std::uint64_t faces) {
+  const std::uint64_t all = store.disk_bytes();
+  return std::min(all + faces, std::max(all, faces) + all / store.files());
 }
 
 std::uint64_t expected_memory(const SurfaceSettings& s, const Resolved& r, const SlabStore& store,
@@ -92,9 +99,9 @@ std::uint64_t expected_memory(const SurfaceSettings& s, const Resolved& r, const
   const double window = per_slab * ((3.0 + s.window) * corner_bytes + (5.0 + s.window) * surface_bytes);
   const double cached = std::min(static_cast<double>(r.feed.cache_bytes),
                                  static_cast<double>(store.total()) * (37 + 4.0 * static_cast<double>(attributes)));
-  constexpr double kProgram = 40e6;
+  constexpr double kProgram = 60e6;
   // What the model leaves out goes with the window, too: counting cells, clustering, bins, and the allocator's gaps.
-  constexpr double kRest = 2.1;
+  constexpr double kRest = 2.0;
   return static_cast<std::uint64_t>(kProgram + cached + kRest * window);
 }
 
@@ -188,9 +195,44 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
   plan.slabs = out.lattice.slab_of(bounds.z_max) - out.lattice.slab_of(bounds.z_min) + 1;
   plan.buckets = store.buckets();
   plan.memory_bytes = expected_memory(s, out, store, attributes);
-  plan.disk_bytes = store.disk_bytes() + expected_face_bytes(s, out, survey, store.total());
+  plan.disk_bytes = expected_disk(store, expected_face_bytes(s, out, survey, store.total()));
   return out;
 }
+
+double expected_cpu_seconds(const SurfaceSettings& s, const Resolved& r, std::size_t attributes) {
+  // Seconds a sample: read and stored, counted, marked, gathered for its tiles; its share of the sums, by projection
+  // steps; and per cell of surface, which a sample gives some: refined, numbered, triangulated, clustered, written.
+  // Coefficients: docs/performance.md.
+  constexpr double kSample = 230e-9;
+  constexpr double kAttribute = 45e-9;
+  constexpr double kSums = 300e-9;
+  constexpr double kCell = 1190e-9;
+  constexpr double kStep = 0.75;         // a further projection step against the first
+  constexpr double kSupport = 1 / 0.63;  // influence radius of a main cell, cells
+  const double influence = s.blend * r.plan.radius_median;
+  const double main_cell =
+      r.feed.fixed_cell
+          ? r.plan.finest_cell
+          : std::max(r.plan.finest_cell, kMainCell * r.feed.cell_ratio * (r.feed.cell_follows_support ? s.blend : 1.0) *
+                                             r.plan.radius_median);
+  const double reach = std::max(1.0, influence / main_cell / kSupport);
+  const double cells = 0.25 * r.plan.radius_median * r.plan.radius_median / (main_cell * main_cell);
+  const double sums = kSums * reach * reach * (1 + kStep * (s.steps - 1)) * (s.diffuse ? 2 : 1);
+  const double per_sample = kSample + kAttribute * static_cast<double>(attributes) + sums + kCell * cells;
+  return static_cast<double>(r.plan.samples) * per_sample;
+}
+
+namespace {
+
+/// No more exact than the model: seconds below a minute and a half, then minutes, then hours.
+std::string about(double seconds) {
+  if (seconds < 10) return fmt::format("{:.1f} s", seconds);
+  if (seconds < 90) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 5400) return fmt::format("{:.0f} min", seconds / 60);
+  return fmt::format("{:.1f} h", seconds / 3600);
+}
+
+}  // namespace
 
 std::string describe(const SurfacePlan& p, const SurfaceSettings& s) {
   const auto mb = [](std::uint64_t bytes) { return static_cast<double>(bytes) / 1e6; };
@@ -201,6 +243,9 @@ std::string describe(const SurfacePlan& p, const SurfaceSettings& s) {
   out += fmt::format("levels {}, cells {:.4g} to {:.4g}, slabs {} of {:.4g}\n", p.levels, p.finest_cell,
                      std::ldexp(p.finest_cell, p.levels - 1), p.slabs, p.slab_height);
   out += fmt::format("expected memory {:.0f} MB, temporary disk {:.0f} MB", mb(p.memory_bytes), mb(p.disk_bytes));
+  if (p.seconds > 0) {
+    out += fmt::format(", about {} on {} thread{}", about(p.seconds), p.threads, p.threads == 1 ? "" : "s");
+  }
   return out;
 }
 

@@ -24,6 +24,11 @@ void check_settings(const SurfaceSettings& settings);
 Resolved resolve_plan(const SurfaceSettings& settings, const Frame& frame, const SlabStore& store, const Extent& bounds,
                       bool given_radii, std::size_t attributes);
 
+/// Processor seconds of a whole run on the machine the model was made on; of which reading the input takes
+/// kReferenceRead a sample.
+double expected_cpu_seconds(const SurfaceSettings& settings, const Resolved& resolved, std::size_t attributes);
+inline constexpr double kReferenceRead = 80e-9;
+
 /// The plan in lines for a reader.
 std::string describe(const SurfacePlan& plan, const SurfaceSettings& settings);
 

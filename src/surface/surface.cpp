@@ -6,6 +6,7 @@
 #include <tbb/task_arena.h>
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -73,10 +74,10 @@ void require_two_files(const SurfaceSettings& settings) {
 
 /// Float positions keep a hundredth of a cell as long as the coordinates are below some ten thousand cells;
 /// georeferenced ones are not. Nor can float hold the very large and the very small.
-bool needs_double(const Survey& survey, double finest_cell) {
+bool needs_double(const Census& census, double finest_cell) {
   constexpr double kLargest = 1e37;
   constexpr double kSmallestCell = 1e-35;
-  const double largest = std::max(survey.low.cwiseAbs().maxCoeff(), survey.high.cwiseAbs().maxCoeff());
+  const double largest = std::max(census.low.cwiseAbs().maxCoeff(), census.high.cwiseAbs().maxCoeff());
   return largest * 0x1p-24 > 0.01 * finest_cell || largest > kLargest || finest_cell < kSmallestCell;
 }
 
@@ -117,7 +118,7 @@ std::uint64_t table_bytes(const Lattice& lattice, const Ingested& in) {
 }
 
 /// Changes that lower the memory a run takes, mildest first. A larger support has larger cells unless these follow r.
-std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceSettings& settings) {
+std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceSettings& settings, int levels_now) {
   std::vector<std::pair<std::string, SurfaceSettings>> runs;
   SurfaceSettings s = settings;
   std::string base;
@@ -127,7 +128,14 @@ std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceS
     runs.emplace_back(base, s);
     base += " ";
   }
-  for (const int factor : {2, 4, 8}) {
+  // A lower slab; what is sparser than the coarsest level serves comes out thinner.
+  constexpr int kFewestLevels = 3;
+  for (int levels = levels_now - 1; levels >= kFewestLevels; --levels) {
+    SurfaceSettings fewer = s;
+    fewer.levels = levels;
+    runs.emplace_back(fmt::format("{}--levels {}", base, levels), fewer);
+  }
+  for (const double factor : {1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0}) {
     SurfaceSettings coarser = s;
     if (s.cell.unit == Length::Unit::influence_radius) {
       coarser.blend = s.blend * factor;
@@ -140,11 +148,12 @@ std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceS
   return runs;
 }
 
-[[noreturn]] void refuse_memory(const SurfaceSettings& settings, std::uint64_t needed, std::uint64_t allowed,
+[[noreturn]] void refuse_memory(const SurfaceSettings& settings, int levels, std::uint64_t needed,
+                                std::uint64_t allowed,
                                 const std::function<std::uint64_t(const SurfaceSettings&)>& memory_of) {
   const auto mb = [](std::uint64_t bytes) { return static_cast<double>(bytes) / 1e6; };
   std::string remedy;
-  for (const auto& [words, changed] : smaller_runs(settings)) {
+  for (const auto& [words, changed] : smaller_runs(settings, levels)) {
     const std::uint64_t bytes = memory_of(changed);
     if (bytes > allowed) continue;
     remedy = fmt::format("; {} would fit ({:.0f} MB)", words, mb(bytes));
@@ -153,6 +162,51 @@ std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceS
   if (remedy.empty()) remedy = "; give it more, or cut the cloud";
   throw Error(ExitCode::budget, fmt::format("{}: needs about {:.0f} MB of memory, --max-memory allows {:.0f} MB{}",
                                             input_name(settings), mb(needed), mb(allowed), remedy));
+}
+
+/// Fills the store. A large input is read once, in a frame chosen by a part of its rows; twice where samples lie
+/// outside what these promised.
+Ingested read_input(PointSource& source, const SurfaceSettings& settings, const std::string& tmp, const RunContext& run,
+                    Stopwatch& watch, Frame& frame) {
+  require_samples(source.info());
+  std::optional<Ingested> ingested;
+  const auto fill = [&](const Survey& survey) {
+    frame = choose_frame(survey, settings.frame);
+    watch.time("store", [&] { ingested.emplace(ingest(source, survey, frame, settings.radius_scale, tmp, run)); });
+  };
+  std::optional<Survey> survey;
+  watch.time("survey", [&] { survey = survey_part(source); });
+  if (survey) {
+    fill(*survey);
+    if (ingested->complete) {
+      judge(ingested->census, source.info(), settings.bad_samples, run);
+      return std::move(*ingested);
+    }
+    ingested.reset();
+  }
+  watch.time("survey", [&] { survey = survey_input(source, settings.bad_samples, run); });
+  fill(*survey);
+  return std::move(*ingested);
+}
+
+/// How long the whole run will take, judging by how fast this machine has read the input.
+void expect_time(const SurfaceSettings& settings, const PointSourceInfo& source, Resolved& resolved,
+                 const Stopwatch& watch, double elapsed) {
+  SurfacePlan& plan = resolved.plan;
+  plan.threads = tbb::this_task_arena::max_concurrency();
+  const double whole = expected_cpu_seconds(settings, resolved, source.attributes.size());
+  const double reading = kReferenceRead * static_cast<double>(plan.samples);
+  double slowness = 1;
+  constexpr std::uint64_t kEnough = 1'000'000;  // fewer are read too fast to tell
+  for (const StageTime& s : watch.stages()) {
+    // Formats that cost more to read say little of the rest.
+    if (s.stage == "store" && source.random_access && plan.samples >= kEnough) {
+      // Half of reading is the system's copying, which other programs disturb more than computing.
+      slowness = std::clamp(std::sqrt(s.cpu / reading), 0.7, 1.5);
+    }
+  }
+  constexpr double kEfficiency = 0.92;  // of each thread beyond the first
+  plan.seconds = elapsed + slowness * (whole - reading) / (1 + kEfficiency * (plan.threads - 1));
 }
 
 SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run) {
@@ -170,11 +224,9 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
 
   const std::unique_ptr<PointSource> source = open_points(settings.input, tmp);
   const PointSourceInfo& info = source->info();
-  Survey survey;
-  watch.time("survey", [&] { survey = survey_input(*source, settings.bad_samples, run); });
-  const Frame frame = choose_frame(survey, settings.frame);
-  std::optional<Ingested> ingested;
-  watch.time("store", [&] { ingested.emplace(ingest(*source, survey, frame, settings.radius_scale, tmp, run)); });
+  Frame frame;
+  std::optional<Ingested> ingested = read_input(*source, settings, tmp, run, watch, frame);
+  const Census& census = ingested->census;
   const auto plan_for = [&](const SurfaceSettings& s) {
     Resolved r = resolve_plan(s, frame, ingested->store, ingested->extent, info.has_radius, info.attributes.size());
     r.plan.memory_bytes += table_bytes(r.lattice, *ingested);
@@ -182,12 +234,13 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
   };
   Resolved resolved;
   watch.time("plan", [&] { resolved = plan_for(settings); });
+  expect_time(settings, info, resolved, watch, Stopwatch::now().wall - began.wall);
   stats.plan = resolved.plan;
   stats.samples_read = info.count;
-  stats.replaced_attributes = survey.unusable_attributes;
+  stats.replaced_attributes = census.unusable_attributes;
   for (int k = 1; k < kDefects; ++k) {
-    if (survey.rejected[k] > 0) {
-      stats.rejected.push_back({describe(static_cast<Defect>(k)), survey.rejected[k], survey.first_row[k]});
+    if (census.rejected[k] > 0) {
+      stats.rejected.push_back({describe(static_cast<Defect>(k)), census.rejected[k], census.first_row[k]});
     }
   }
   run.info(describe(resolved.plan, settings));
@@ -201,14 +254,14 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
                             resolved.plan.radius_median));
   }
   if (run.max_memory > 0 && resolved.plan.memory_bytes > run.max_memory) {
-    refuse_memory(settings, resolved.plan.memory_bytes, run.max_memory,
+    refuse_memory(settings, resolved.plan.levels, resolved.plan.memory_bytes, run.max_memory,
                   [&](const SurfaceSettings& s) { return plan_for(s).plan.memory_bytes; });
   }
 
   stats.disk_bytes = ingested->store.disk_bytes();
   if (!settings.dry_run) {
     out.attributes = info.attributes;
-    out.double_positions = needs_double(survey, resolved.plan.finest_cell);
+    out.double_positions = needs_double(census, resolved.plan.finest_cell);
     MeshSink sink(out);
     SampleFeed feed(ingested->store, resolved.lattice, resolved.feed, resolved.radii, info.has_radius);
     Pipeline pipeline(settings, resolved, frame, ingested->extent, feed, info.attributes.size(), sink);
@@ -229,8 +282,6 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
     watch.time("commit", [&] { sink.commit(); });
     stats.vertices = sink.vertices();
     stats.triangles = sink.triangles();
-    constexpr std::uint64_t kFaceBytes = 13;  // a count of 1 byte and three indices of 4
-    stats.disk_bytes += stats.triangles * kFaceBytes;
   }
   stats.stages = watch.stages();
   const Stopwatch::Moment ended = Stopwatch::now();

@@ -1,6 +1,7 @@
 #include "surface/survey.h"
 
 #include <fmt/format.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Eigenvalues>
@@ -17,75 +18,55 @@ namespace {
 
 constexpr std::size_t kChunk = 1u << 16;  ///< rows a piece; fixed, so sums do not depend on the number of threads
 
-/// Moments of a piece about its own first sample, where they cannot cancel.
+/// A piece's census, and its moments about its own first sample, where they cannot cancel.
 struct Partial {
-  std::uint64_t usable = 0;
-  std::array<std::uint64_t, kDefects> rejected{};
-  std::array<std::uint64_t, kDefects> first_row{};
-  Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
-  Eigen::Vector3d high = -low;
+  Census census;
   Eigen::Vector3d pivot = Eigen::Vector3d::Zero();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
-  float max_quality = 0;
-  std::uint64_t unusable_attributes = 0;
-  std::uint64_t first_unusable_attribute = 0;
 };
-
-void look_at_attributes(const SampleBatch& batch, const AttributeLayout& layout, Partial& p) {
-  for (std::size_t c = 0; c < batch.attributes.size(); ++c) {
-    if (layout[c].type != ScalarType::float32 && layout[c].type != ScalarType::float64) continue;  // always in range
-    const std::vector<float>& values = batch.attributes[c];
-    const auto bad = [](float v) { return !(std::abs(v) <= kLargestAttribute); };
-    const auto count = static_cast<std::uint64_t>(std::count_if(values.begin(), values.end(), bad));
-    if (count == 0) continue;
-    const auto at = std::find_if(values.begin(), values.end(), bad) - values.begin();
-    const std::uint64_t row = batch.first + static_cast<std::uint64_t>(at);
-    p.first_unusable_attribute = p.unusable_attributes == 0 ? row : std::min(row, p.first_unusable_attribute);
-    p.unusable_attributes += count;
-  }
-}
 
 Partial look_at(const SampleBatch& batch, const AttributeLayout& layout) {
   Partial p;
-  look_at_attributes(batch, layout, p);
+  Census& c = p.census;
+  c.count_attributes(batch, layout);
   for (std::size_t i = 0; i < batch.size(); ++i) {
     const Defect defect = defect_of(batch, i);
     if (defect != Defect::none) {
-      const auto k = static_cast<std::size_t>(defect);
-      if (p.rejected[k]++ == 0) p.first_row[k] = batch.first + i;
+      c.reject(defect, batch.first + i);
       continue;
     }
     const Eigen::Vector3d x(batch.x[i], batch.y[i], batch.z[i]);
-    if (p.usable++ == 0) p.pivot = x;
+    if (c.usable++ == 0) p.pivot = x;
     const Eigen::Vector3d d = x - p.pivot;
-    p.low = p.low.cwiseMin(x);
-    p.high = p.high.cwiseMax(x);
+    c.low = c.low.cwiseMin(x);
+    c.high = c.high.cwiseMax(x);
     p.sum += d;
     p.products += d * d.transpose();
-    if (!batch.quality.empty()) p.max_quality = std::max(p.max_quality, batch.quality[i]);
+    if (!batch.quality.empty()) c.max_quality = std::max(c.max_quality, batch.quality[i]);
   }
   return p;
 }
 
 /// Adds piece `b` to `a`, moving its moments to the pivot of `a`.
 void merge(Partial& a, const Partial& b) {
-  for (std::size_t k = 0; k < kDefects; ++k) {
-    if (a.rejected[k] == 0) a.first_row[k] = b.first_row[k];
-    a.rejected[k] += b.rejected[k];
+  if (b.census.usable > 0) {
+    if (a.census.usable == 0) a.pivot = b.pivot;
+    const Eigen::Vector3d s = b.pivot - a.pivot;
+    const auto n = static_cast<double>(b.census.usable);
+    a.products += b.products + s * b.sum.transpose() + b.sum * s.transpose() + n * s * s.transpose();
+    a.sum += b.sum + n * s;
   }
-  if (a.unusable_attributes == 0) a.first_unusable_attribute = b.first_unusable_attribute;
-  a.unusable_attributes += b.unusable_attributes;
-  a.max_quality = std::max(a.max_quality, b.max_quality);
-  if (b.usable == 0) return;
-  if (a.usable == 0) a.pivot = b.pivot;
-  const Eigen::Vector3d s = b.pivot - a.pivot;
-  const auto n = static_cast<double>(b.usable);
-  a.products += b.products + s * b.sum.transpose() + b.sum * s.transpose() + n * s * s.transpose();
-  a.sum += b.sum + n * s;
-  a.usable += b.usable;
-  a.low = a.low.cwiseMin(b.low);
-  a.high = a.high.cwiseMax(b.high);
+  a.census.merge(b.census);
+}
+
+Survey survey_of(const Partial& p) {
+  Survey survey;
+  static_cast<Census&>(survey) = p.census;
+  if (p.census.usable == 0) return survey;
+  const Eigen::Vector3d mean = p.sum / static_cast<double>(p.census.usable);
+  survey.covariance = p.products / static_cast<double>(p.census.usable) - mean * mean.transpose();
+  return survey;
 }
 
 Partial look_at_all(PointSource& source, const RunContext& run) {
@@ -107,15 +88,16 @@ Partial look_at_all(PointSource& source, const RunContext& run) {
     return total;
   }
   constexpr std::size_t kPieces = 16;
-  std::array<SampleBatch, kPieces> batches;
+  tbb::enumerable_thread_specific<SampleBatch> batches;
   std::array<Partial, kPieces> partials;
   while (done < count) {
     tbb::parallel_for(std::size_t{0}, kPieces, [&](std::size_t i) {
       const std::uint64_t first = done + i * kChunk;
       partials[i] = {};
       if (first >= count) return;
-      source.read(first, kChunk, batches[i]);
-      partials[i] = look_at(batches[i], source.info().attributes);
+      SampleBatch& batch = batches.local();
+      source.read(first, kChunk, batch);
+      partials[i] = look_at(batch, source.info().attributes);
     });
     for (const Partial& p : partials) merge(total, p);
     done = std::min<std::uint64_t>(count, done + kPieces * kChunk);
@@ -124,7 +106,49 @@ Partial look_at_all(PointSource& source, const RunContext& run) {
   return total;
 }
 
+/// Squares of lengths, and of these in units of a fixed-point step, must neither vanish nor overflow.
+constexpr double kLeastExtent = 1e-100;
+constexpr double kGreatestExtent = 1e100;
+
+bool makes_a_frame(const Census& c) {
+  if (c.usable == 0) return false;
+  const Eigen::Vector3d extent = c.high - c.low;
+  return extent.squaredNorm() > kLeastExtent * kLeastExtent && extent.maxCoeff() < kGreatestExtent;
+}
+
 }  // namespace
+
+void Census::reject(Defect defect, std::uint64_t row) {
+  const auto k = static_cast<std::size_t>(defect);
+  if (rejected[k]++ == 0) first_row[k] = row;
+}
+
+void Census::count_attributes(const SampleBatch& batch, const AttributeLayout& layout) {
+  for (std::size_t c = 0; c < batch.attributes.size(); ++c) {
+    if (layout[c].type != ScalarType::float32 && layout[c].type != ScalarType::float64) continue;  // always in range
+    const std::vector<float>& values = batch.attributes[c];
+    const auto bad = [](float v) { return !(std::abs(v) <= kLargestAttribute); };
+    const auto count = static_cast<std::uint64_t>(std::count_if(values.begin(), values.end(), bad));
+    if (count == 0) continue;
+    const auto at = std::find_if(values.begin(), values.end(), bad) - values.begin();
+    const std::uint64_t row = batch.first + static_cast<std::uint64_t>(at);
+    first_unusable_attribute = unusable_attributes == 0 ? row : std::min(row, first_unusable_attribute);
+    unusable_attributes += count;
+  }
+}
+
+void Census::merge(const Census& later) {
+  for (std::size_t k = 0; k < kDefects; ++k) {
+    if (rejected[k] == 0) first_row[k] = later.first_row[k];
+    rejected[k] += later.rejected[k];
+  }
+  if (unusable_attributes == 0) first_unusable_attribute = later.first_unusable_attribute;
+  unusable_attributes += later.unusable_attributes;
+  max_quality = std::max(max_quality, later.max_quality);
+  usable += later.usable;
+  low = low.cwiseMin(later.low);
+  high = high.cwiseMax(later.high);
+}
 
 const char* describe(Defect defect) {
   switch (defect) {
@@ -156,74 +180,92 @@ Defect defect_of(const SampleBatch& b, std::size_t i) {
 
 namespace {
 
-/// Squares of lengths, and of these in units of a fixed-point step, must neither vanish nor overflow.
-constexpr double kLeastExtent = 1e-100;
-constexpr double kGreatestExtent = 1e100;
-
-void warn_of_attributes(const std::string& path, const Survey& survey, BadSamples bad, const RunContext& run) {
-  if (survey.unusable_attributes == 0) return;
+void warn_of_attributes(const std::string& path, const Census& census, BadSamples bad, const RunContext& run) {
+  if (census.unusable_attributes == 0) return;
   const std::string what = fmt::format(
       "{}: {} attribute values are NaN or beyond {:g}, the first in row {} "
       "(counted from 0)",
-      path, survey.unusable_attributes, kLargestAttribute, survey.first_unusable_attribute);
+      path, census.unusable_attributes, kLargestAttribute, census.first_unusable_attribute);
   if (bad == BadSamples::refuse) {
     throw Error(ExitCode::unreadable, what + "; clean the file or use --bad-samples drop");
   }
   run.warn(what + "; NaN becomes 0, others the nearest usable value");
 }
 
+std::string name_of(const PointSourceInfo& source) {
+  return source.path == "-" ? "standard input" : source.path;
+}
+
 }  // namespace
 
-Survey survey_input(PointSource& source, BadSamples bad, const RunContext& run) {
-  PointSourceInfo info = source.info();
-  if (info.path == "-") info.path = "standard input";
-  if (!info.has_normals) {
+void require_samples(const PointSourceInfo& source) {
+  if (!source.has_normals) {
     throw Error(ExitCode::unreadable,
                 fmt::format("{}: no normals (properties nx ny nz); estimate and orient them first, for example with "
                             "CloudCompare or MeshLab, and save them with the points",
-                            info.path));
+                            name_of(source)));
   }
-  if (info.count == 0) throw Error(ExitCode::empty, fmt::format("{}: the file holds no points", info.path));
-  const Partial p = look_at_all(source, run);
-  Survey survey{p.usable,
-                p.rejected,
-                p.first_row,
-                p.low,
-                p.high,
-                {},
-                p.max_quality,
-                p.unusable_attributes,
-                p.first_unusable_attribute};
+  if (source.count == 0) throw Error(ExitCode::empty, fmt::format("{}: the file holds no points", name_of(source)));
+}
+
+void judge(const Census& c, const PointSourceInfo& source, BadSamples bad, const RunContext& run) {
+  const std::string path = name_of(source);
   for (int k = 1; k < kDefects; ++k) {
-    if (p.rejected[k] == 0) continue;
-    const std::string what =
-        fmt::format("{}: {} of {} samples have a {}, the first is row {} (counted from 0)", info.path, p.rejected[k],
-                    info.count, describe(static_cast<Defect>(k)), p.first_row[k]);
+    if (c.rejected[k] == 0) continue;
+    const std::string what = fmt::format("{}: {} of {} samples have a {}, the first is row {} (counted from 0)", path,
+                                         c.rejected[k], source.count, describe(static_cast<Defect>(k)), c.first_row[k]);
     if (bad == BadSamples::refuse)
       throw Error(ExitCode::unreadable, what + "; clean the file or use --bad-samples drop");
     run.warn(what + "; dropped");
   }
-  warn_of_attributes(info.path, survey, bad, run);
-  if (p.usable == 0)
-    throw Error(ExitCode::empty, fmt::format("{}: none of its {} samples is usable", info.path, info.count));
-  if (info.has_quality && !(p.max_quality > 0)) {
+  warn_of_attributes(path, c, bad, run);
+  if (c.usable == 0)
+    throw Error(ExitCode::empty, fmt::format("{}: none of its {} samples is usable", path, source.count));
+  if (source.has_quality && !(c.max_quality > 0)) {
     throw Error(ExitCode::empty, fmt::format("{}: the quality of every sample is 0, so none has a weight; leave the "
                                              "property out or give it values above 0",
-                                             info.path));
+                                             path));
   }
-  const Eigen::Vector3d extent = p.high - p.low;
+  if (makes_a_frame(c)) return;
+  const Eigen::Vector3d extent = c.high - c.low;
   if (!(extent.squaredNorm() > kLeastExtent * kLeastExtent)) {
     throw Error(ExitCode::empty,
-                fmt::format("{}: {}; a surface needs samples at different places", info.path,
-                            p.usable == 1 ? "only one usable sample"
-                                          : fmt::format("all {} usable samples lie at one place", p.usable)));
+                fmt::format("{}: {}; a surface needs samples at different places", path,
+                            c.usable == 1 ? "only one usable sample"
+                                          : fmt::format("all {} usable samples lie at one place", c.usable)));
   }
-  if (!(extent.maxCoeff() < kGreatestExtent)) {
-    throw Error(ExitCode::unreadable, fmt::format("{}: coordinates span {:.3g}, more than can be computed with",
-                                                  info.path, extent.maxCoeff()));
-  }
-  const Eigen::Vector3d mean = p.sum / static_cast<double>(p.usable);
-  survey.covariance = p.products / static_cast<double>(p.usable) - mean * mean.transpose();
+  throw Error(ExitCode::unreadable,
+              fmt::format("{}: coordinates span {:.3g}, more than can be computed with", path, extent.maxCoeff()));
+}
+
+Survey survey_input(PointSource& source, BadSamples bad, const RunContext& run) {
+  require_samples(source.info());
+  const Survey survey = survey_of(look_at_all(source, run));
+  judge(survey, source.info(), bad, run);
+  return survey;
+}
+
+std::optional<Survey> survey_part(PointSource& source) {
+  // Runs of rows from all over the file: whatever order the rows are in, all of the cloud is looked at.
+  constexpr std::uint64_t kRuns = 256;
+  constexpr std::uint64_t kRows = 1024;
+  const std::uint64_t count = source.info().count;
+  if (!source.info().random_access || count < 2 * kRuns * kRows) return std::nullopt;
+  std::array<Partial, kRuns> partials;
+  tbb::parallel_for(std::size_t{0}, std::size_t{kRuns}, [&](std::size_t i) {
+    SampleBatch batch;
+    // The first run begins with the first row, the last one ends with the last.
+    const auto share = static_cast<double>(i) / static_cast<double>(kRuns - 1);
+    const auto first = static_cast<std::uint64_t>(share * static_cast<double>(count - kRows));
+    source.read(first, kRows, batch);
+    partials[i] = look_at(batch, source.info().attributes);
+  });
+  Partial total;
+  for (const Partial& p : partials) merge(total, p);
+  if (!makes_a_frame(total.census)) return std::nullopt;
+  const double share = static_cast<double>(total.census.usable) / static_cast<double>(kRuns * kRows);
+  Survey survey = survey_of(total);
+  survey.usable = static_cast<std::uint64_t>(share * static_cast<double>(count));
   return survey;
 }
 

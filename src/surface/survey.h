@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
+#include <optional>
 
 #include "lamina/frame.h"
 #include "lamina/points.h"
@@ -25,22 +27,43 @@ inline float usable_attribute(float value) {
   return value == value ? std::clamp(value, -kLargestAttribute, kLargestAttribute) : 0.0F;
 }
 
-struct Survey {
+/// What a pass over the input finds besides the samples themselves.
+struct Census {
   std::uint64_t usable = 0;
   std::array<std::uint64_t, kDefects> rejected{};
   std::array<std::uint64_t, kDefects> first_row{};
-  Eigen::Vector3d low, high;  ///< bounding box, input coordinates
-  Eigen::Matrix3d covariance;
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());  ///< bounding box, input
+  Eigen::Vector3d high = -low;                                                               ///< coordinates
   float max_quality = 0;                       ///< where the input gives quality
   std::uint64_t unusable_attributes = 0;       ///< values that usable_attribute() changes
   std::uint64_t first_unusable_attribute = 0;  ///< row of the first
+
+  void reject(Defect defect, std::uint64_t row);
+  void count_attributes(const SampleBatch& batch, const AttributeLayout& layout);
+  void merge(const Census& later);  ///< of the rows after those of this one
 };
 
-/// Reads the whole input once. Throws Error(empty) when nothing usable is there or all samples lie at one place,
-/// Error(unreadable) for a defect or an unusable attribute when `bad` is refuse.
+struct Survey : Census {
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+};
+
+/// Reads the whole input once. Throws as judge() does.
 Survey survey_input(PointSource& source, BadSamples bad, const RunContext& run);
 
-/// Frame with the sweep axis last; fixed-point coordinates of the cloud stay within +-2^29.
+/// A survey of some 2^18 rows from all over a large input whose rows can be read in any order: enough to choose a frame
+/// by, though samples may lie outside its box; `usable` is an estimate for all rows. Nothing for other inputs, and
+/// where the rows looked at make no frame.
+std::optional<Survey> survey_part(PointSource& source);
+
+/// Warns of rows left out and attributes replaced. Throws Error(empty) when nothing usable is there or all samples lie
+/// at one place, Error(unreadable) for a defect or an unusable attribute when `bad` is refuse, and for coordinates that
+/// span too much.
+void judge(const Census& census, const PointSourceInfo& source, BadSamples bad, const RunContext& run);
+
+/// Throws Error(unreadable) when the source has no normals, Error(empty) when it promises no rows.
+void require_samples(const PointSourceInfo& source);
+
+/// Frame with the sweep axis last; fixed-point coordinates of the box surveyed stay within +-2^29.
 Frame choose_frame(const Survey& survey, FrameMode mode);
 
 }  // namespace lamina

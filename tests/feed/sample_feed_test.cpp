@@ -17,14 +17,19 @@ namespace {
 
 constexpr std::int64_t kEverything = std::numeric_limits<std::int32_t>::max();
 
-/// A store and the samples of each of its buckets.
+/// A store and the samples of each of its buckets in the feed's order.
 struct Stored {
   SlabStore store;
   std::vector<LocalSamples> buckets;
 
-  explicit Stored(const LocalSamples& cloud, std::int32_t bucket_height) : store(make_store(cloud, bucket_height)) {
+  Stored(const LocalSamples& cloud, const Lattice& lattice, std::int32_t bucket_height)
+      : store(make_store(cloud, bucket_height)) {
     buckets.resize(store.buckets());
-    for (std::size_t b = 0; b < store.buckets(); ++b) store.read(b, buckets[b]);
+    BlockOrderScratch scratch;
+    for (std::size_t b = 0; b < store.buckets(); ++b) {
+      store.read(b, buckets[b]);
+      sort_by_block(buckets[b], lattice, scratch);
+    }
   }
 };
 
@@ -112,7 +117,7 @@ TEST(SampleFeed, GivenRadiiBecomeSupportsLevelsAndWeights) {
   std::uint64_t clamped = 0;
   EXPECT_TRUE(rc::check("annotations", [&] {
     const Case c = random_case(*rc::gen::arbitrary<std::uint64_t>());
-    const Stored stored(c.cloud, c.bucket_height);
+    Stored stored(c.cloud, c.lattice, c.bucket_height);
     SampleFeed feed(stored.store, c.lattice, c.settings, {}, true);
     FeedCounts expected;
     std::vector<std::size_t> order;  // non-empty buckets
@@ -156,7 +161,7 @@ TEST(SampleFeed, EstimatedRadiiAreTheEstimatorsScaled) {
     c.settings.radius_scale = 0.5F + 0.25F * static_cast<float>(seed);
     c.settings.max_radius = seed % 2 == 0 ? 0.0F : 120.0F;
     const RadiiSettings radii{60, 4};
-    const Stored stored(cloud, c.bucket_height);
+    Stored stored(cloud, c.lattice, c.bucket_height);
     RadiusEstimator estimator(radii);
     for (const LocalSamples& b : stored.buckets) estimator.push(b);
     estimator.finish();
@@ -227,7 +232,7 @@ TEST(SampleFeed, BatchesHoldEverySampleInReachOnceWhateverTheCache) {
   EXPECT_TRUE(rc::check("batches", [] {
     const std::uint64_t seed = *rc::gen::arbitrary<std::uint64_t>();
     const Case c = random_case(seed);
-    const Stored stored(c.cloud, c.bucket_height);
+    Stored stored(c.cloud, c.lattice, c.bucket_height);
     SampleFeed feed(stored.store, c.lattice, c.settings, {}, true);
     feed.prepare(kEverything, [](const ActiveBucket&) {});
     std::mt19937_64 random(seed);
@@ -244,7 +249,7 @@ TEST(SampleFeed, ReleaseForgetsOnlyWhatEndsBelow) {
   EXPECT_TRUE(rc::check("release", [] {
     const std::uint64_t seed = *rc::gen::arbitrary<std::uint64_t>();
     const Case c = random_case(seed);
-    const Stored stored(c.cloud, c.bucket_height);
+    Stored stored(c.cloud, c.lattice, c.bucket_height);
     SampleFeed feed(stored.store, c.lattice, c.settings, {}, true);
     SampleFeed whole(stored.store, c.lattice, c.settings, {}, true);
     whole.prepare(kEverything, [](const ActiveBucket&) {});
@@ -272,7 +277,7 @@ TEST(SampleFeed, ReleaseForgetsOnlyWhatEndsBelow) {
 
 TEST(SampleFeed, CacheHoldsWhatItsBudgetAllows) {
   const LocalSamples cloud = random_cloud({Shape::sphere, 2000, {0, 0, 0}, 1000}, 3);
-  const Stored stored(cloud, 200);
+  Stored stored(cloud, {64, 4}, 200);
   const std::uint64_t n = stored.buckets.size();
   const auto reads_of = [&](std::size_t cache_bytes) {
     FeedSettings settings;
@@ -291,7 +296,7 @@ TEST(SampleFeed, CacheHoldsWhatItsBudgetAllows) {
 
 TEST(SampleFeed, LoadedSamplesOutliveTheCache) {
   const LocalSamples cloud = random_cloud({Shape::sphere, 500, {0, 0, 0}, 1000}, 4);
-  const Stored stored(cloud, 150);
+  Stored stored(cloud, {64, 4}, 150);
   FeedSettings settings;
   settings.cache_bytes = 1;
   SampleFeed feed(stored.store, {64, 4}, settings, {}, true);

@@ -49,6 +49,14 @@ TEST(Descriptor, CopiesToFileAppendedFileAndPipe) {
   EXPECT_EQ(copy_all(from.get(), text.size(), to.get()), 0);
   EXPECT_EQ(contents(to.get(), text.size() + 4), "head" + text);
 
+  const Descriptor moved = open_unlinked(folder.path());
+  const Descriptor source = open_unlinked(folder.path());
+  ASSERT_EQ(write_all(source.get(), text.data(), text.size()), 0);
+  ASSERT_EQ(write_all(moved.get(), "head", 4), 0);
+  EXPECT_EQ(move_all(source.get(), text.size(), moved.get()), 0);
+  EXPECT_EQ(contents(moved.get(), text.size() + 4), "head" + text);
+  EXPECT_EQ(move_all(source.get(), text.size() + 1, moved.get()), EIO);
+
   // copy_file_range and sendfile refuse files opened for appending.
   const std::string name = test::write_file(folder / "log", "head");
   const Descriptor appended(::open(name.c_str(), O_WRONLY | O_APPEND));

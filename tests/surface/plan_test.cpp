@@ -111,6 +111,29 @@ TEST(SurfacePlan, MemoryGrowsWithTheWindowAndShrinksWithTheCells) {
   EXPECT_GT(memory(1, 1), memory(1, 4));
 }
 
+TEST(SurfacePlan, TimeGrowsWithSamplesStepsAndCells) {
+  const auto seconds = [](std::size_t samples, const std::function<void(SurfaceSettings&)>& change) {
+    SurfaceSettings s;
+    s.cell.value = 0.9;
+    change(s);
+    Resolved r;
+    r.feed.cell_ratio = 0.9;
+    r.plan.samples = samples;
+    r.plan.radius_median = 1;
+    r.plan.finest_cell = 0.63 * s.blend;
+    return expected_cpu_seconds(s, r, 0);
+  };
+  const auto as_it_is = [](auto&) {};
+  const double once = seconds(1'000'000, as_it_is);
+  EXPECT_GT(once, 0);
+  EXPECT_NEAR(seconds(3'000'000, as_it_is), 3 * once, 1e-9 * once);
+  EXPECT_GT(seconds(1'000'000, [](auto& s) { s.steps = 4; }), 1.3 * once);
+  // Larger cells are fewer, and what a sample costs whatever the cells remains.
+  const double coarse = seconds(1'000'000, [](auto& s) { s.blend = 4; });
+  EXPECT_LT(coarse, 0.8 * once);
+  EXPECT_LT(std::abs(coarse - seconds(1'000'000, [](auto& s) { s.blend = 8; })), 0.1 * coarse);
+}
+
 TEST(SurfacePlan, IsDescribedInWords) {
   SurfacePlan plan;
   plan.samples = 1234;
