@@ -214,12 +214,18 @@ void mark_sample(Window& window, const Mark& mark) {
   };
   CornerBlock& block = window.touch_shared(mark.level, block_of(c));
   set(block, &CornerBlock::home, offset_in_block(c));
+  const auto mark_corner = [&](const Cell& corner) {
+    const Block b = block_of(corner);
+    set(b == block_of(c) ? block : window.touch_shared(mark.level, b), &CornerBlock::nearest, offset_in_block(corner));
+  };
+  if (mark.sparse) {
+    for (int i = 0; i < 8; ++i) mark_corner(c + Cell{i & 1, (i >> 1) & 1, i >> 2});
+    return;
+  }
   const auto upper = [a](std::int32_t v, std::int32_t cell) {
     return std::int64_t{2} * (std::int64_t{v} - std::int64_t{cell} * a) >= a ? 1 : 0;
   };
-  const Cell corner = c + Cell{upper(mark.x, c.x), upper(mark.y, c.y), upper(mark.z, c.z)};
-  const bool same = block_of(corner) == block_of(c);
-  set(same ? block : window.touch_shared(mark.level, block_of(corner)), &CornerBlock::nearest, offset_in_block(corner));
+  mark_corner(c + Cell{upper(mark.x, c.x), upper(mark.y, c.y), upper(mark.z, c.z)});
 }
 
 void refine_slab(Window& window, std::int32_t slab) {

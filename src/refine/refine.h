@@ -10,9 +10,10 @@ namespace lamina {
 struct Mark {
   std::int32_t x, y, z;  ///< fixed-point position
   std::uint8_t level;    ///< coarsest level whose cells are small enough for the sample
+  bool sparse = false;   ///< the level's cells are so small that gaps between such samples span several
 };
 
-/// Notes the sample's home cell and nearest corner. Any order, several threads at once, slabs at will ahead of
+/// Notes the sample's home cell and nearest corner; all corners of the home cell where samples are sparse. Any order, several threads at once, slabs at will ahead of
 /// refine().
 void mark_sample(Window& window, const Mark& mark);
 

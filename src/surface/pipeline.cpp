@@ -15,6 +15,9 @@ namespace {
 /// Slabs a cell can be touched from: three cells of the coarsest level, each a slab high.
 constexpr std::int32_t kReachSlabs = 3;
 
+/// Samples whose support is more than so many of their cells leave gaps of several cells between them.
+constexpr float kSparse = 1.6F;
+
 ProjectSettings project_settings(const SurfaceSettings& s) {
   ProjectSettings p;
   p.fit = s.fit == FitMode::sphere ? Fit::sphere : Fit::plane;
@@ -57,7 +60,9 @@ void Pipeline::mark(const ActiveBucket& bucket) {
   tbb::parallel_for(std::size_t{0}, (n + kPiece - 1) / kPiece, [&](std::size_t piece) {
     for (std::size_t i = piece * kPiece; i < std::min(n, (piece + 1) * kPiece); ++i) {
       if (bucket.support[i] <= 0) continue;
-      mark_sample(window_, {bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i]});
+      const auto cell = static_cast<float>(resolved_.lattice.cell_size(bucket.level[i]));
+      mark_sample(window_, {bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i],
+                            bucket.support[i] > kSparse * cell});
     }
   });
 }

@@ -28,7 +28,8 @@ class OctreeTruth {
       };
       samples_.push_back({m.level,
                           {floor_div(m.x, a), floor_div(m.y, a), floor_div(m.z, a)},
-                          {nearest(m.x), nearest(m.y), nearest(m.z)}});
+                          {nearest(m.x), nearest(m.y), nearest(m.z)},
+                          m.sparse});
     }
     const int top = lattice.levels - 1;
     for (const Sample& s : samples_) {
@@ -47,6 +48,7 @@ class OctreeTruth {
     int level;
     Cell home;     ///< the cell of its level it lies in
     Cell nearest;  ///< the corner of its level it lies nearest to
+    bool sparse;
   };
   template <typename F>
   static void for_around(const Cell& c, int lo, int hi, const F& f) {
@@ -89,8 +91,11 @@ class OctreeTruth {
         continue;
       }
       bool near = std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {
-        return s.level == level && std::abs(s.nearest.x - corner.x) <= 1 && std::abs(s.nearest.y - corner.y) <= 1 &&
-               std::abs(s.nearest.z - corner.z) <= 1;
+        const auto axis = [&](std::int32_t home, std::int32_t nearest, std::int32_t at) {
+          return s.sparse ? at >= home - 1 && at <= home + 2 : std::abs(nearest - at) <= 1;
+        };
+        return s.level == level && axis(s.home.x, s.nearest.x, corner.x) && axis(s.home.y, s.nearest.y, corner.y) &&
+               axis(s.home.z, s.nearest.z, corner.z);
       });
       for_around(corner, -1, 0, [&](const Cell& c) {
         near = near || (here.nodes.contains(c) && std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {

@@ -50,7 +50,8 @@ Marked random_marks(std::uint64_t seed, int levels) {
     const int n = between(1, 8);
     for (int i = 0; i < n; ++i) {
       out.marks.push_back({at[0] + between(-width, width), at[1] + between(-width, width),
-                           at[2] + between(-width, width), static_cast<std::uint8_t>(between(0, levels - 1))});
+                           at[2] + between(-width, width), static_cast<std::uint8_t>(between(0, levels - 1)),
+                           between(0, 3) == 0});
     }
   }
   out.bound();
