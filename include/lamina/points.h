@@ -15,6 +15,8 @@ struct PointSourceInfo {
   bool has_normals = false;       ///< nx ny nz all present
   bool has_radius = false;        ///< radius, else pscale
   bool has_quality = false;       ///< quality, else confidence
+  std::string radius_name;        ///< as the file calls it; empty: none
+  std::string quality_name;       ///< as the file calls it; empty: none
   bool random_access = false;     ///< read() may be called for any row, from several threads
   bool double_precision = false;  ///< positions are declared float64
   AttributeLayout attributes;     ///< every other scalar property of the points, file order (colours keep their type)
@@ -42,7 +44,7 @@ class PointSource {
 /// are first spooled to an unlinked file in `tmp_dir` (empty: the system's temporary folder).
 ///
 /// Properties of element `vertex`: x y z; nx ny nz; radius (else pscale); quality (else confidence); every other one is
-/// an attribute, carried as float: integers beyond 2^24 and doubles are rounded to it. Positions in an ascii file keep
+/// an attribute, carried as float, integers of 32 bits and doubles in SampleBatch::exact as well. Positions in an ascii file keep
 /// all their digits even where the header says float, as georeferenced ones need them. Binary files are random_access
 /// and never mapped: resident memory does not grow with the file.
 ///

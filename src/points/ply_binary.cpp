@@ -44,6 +44,7 @@ class BinaryPly final : public PointSource {
       }
       convert(buffer.get(), done, n, targets);
     }
+    round_exact_attributes(out);
   }
 
  private:

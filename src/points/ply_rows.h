@@ -42,6 +42,9 @@ struct ColumnTarget {
 std::vector<ColumnTarget> prepare_batch(const PlyRows& rows, std::uint64_t first, std::size_t count,
                                         SampleBatch& batch);
 
+/// Once the rows are read: the floats of the attributes that were read as doubles.
+void round_exact_attributes(SampleBatch& batch);
+
 /// "N rows are promised, M are there", worded the same for all formats.
 [[noreturn]] void report_short_file(const std::string& name, const std::string& element, std::uint64_t promised,
                                     const std::string& held);
