@@ -18,6 +18,8 @@ struct PointSourceInfo {
   bool has_normals = false;       ///< nx ny nz all present
   bool has_radius = false;        ///< radius, else pscale
   bool has_quality = false;       ///< quality, else confidence
+  std::string radius_name;        ///< as the file calls it; empty: none
+  std::string quality_name;       ///< as the file calls it; empty: none
   bool random_access = false;     ///< read() may be called for any row, from several threads
   bool double_precision = false;  ///< positions need more than float32
   bool geographic = false;        ///< x and y are degrees of longitude and latitude: no job can measure in them
@@ -56,8 +58,8 @@ struct PointSettings {
 /// the formats: PLY (also with a range grid), OBJ, XYZ and its kin, PTX, PCD, LAS.
 ///
 /// PLY, properties of element `vertex`: x y z; nx ny nz; radius (else pscale); quality (else confidence); every other
-/// one is an attribute, carried as float: integers beyond 2^24 and doubles are rounded to it. Positions in an ascii file
-/// keep all their digits even where the header says float, as georeferenced ones need them. Binary files and those of
+/// one is an attribute, carried as float, integers of 32 bits and doubles in SampleBatch::exact as well. Positions in an
+/// ascii file keep all their digits even where the header says float, as georeferenced ones need them. Binary files and those of
 /// lines are random_access (ascii PLY is not) and never mapped: resident memory does not grow with the file.
 ///
 /// Throws Error(unreadable) naming the file and the place: missing file, directory, empty file, unknown format,

@@ -50,8 +50,14 @@ class JoinedPoints final : public PointSource {
     info_.remarks.clear();
     for (auto& source : sources) add(std::move(source));
     if (sources.size() > 1) info_.path = fmt::format("{} and {} more", info_.path, sources.size() - 1);
+    for (const Part& part : parts_) {
+      const PointSourceInfo& from = part.source->info();
+      if (info_.radius_name.empty()) info_.radius_name = from.radius_name;
+      if (info_.quality_name.empty()) info_.quality_name = from.quality_name;
+    }
     settle("normals", info_.has_normals, &PointSourceInfo::has_normals);
     settle("radii", info_.has_radius, &PointSourceInfo::has_radius);
+    if (!info_.has_radius) info_.radius_name.clear();
     for (Part& part : parts_) map_attributes(part);
   }
 
@@ -136,6 +142,10 @@ class JoinedPoints final : public PointSource {
     out.quality.assign(info_.has_quality ? count : 0, 1.0F);
     out.attributes.resize(info_.attributes.size());
     for (auto& attribute : out.attributes) attribute.assign(count, 0.0F);
+    out.exact.resize(info_.attributes.size());
+    for (std::size_t a = 0; a < info_.attributes.size(); ++a) {
+      out.exact[a].assign(fits_float(info_.attributes[a].type) ? 0 : count, 0.0);
+    }
   }
 
   static void copy(const Part& part, const SampleBatch& piece, std::size_t at, SampleBatch& out) {
@@ -153,6 +163,13 @@ class JoinedPoints final : public PointSource {
     put(piece.quality, out.quality);
     for (std::size_t a = 0; a < part.attributes.size(); ++a) {
       const Mapped& mapped = part.attributes[a];
+      if (!out.exact[mapped.to].empty()) {
+        double* exact = out.exact[mapped.to].data() + at;
+        const bool has_exact = a < piece.exact.size() && !piece.exact[a].empty();
+        for (std::size_t i = 0; i < piece.size(); ++i) {
+          *exact++ = mapped.scale * (has_exact ? piece.exact[a][i] : double{piece.attributes[a][i]});
+        }
+      }
       float* to = out.attributes[mapped.to].data() + at;
       for (const float value : piece.attributes[a])
         *to++ = mapped.scale == 1 ? value : static_cast<float>(value * mapped.scale);

@@ -87,10 +87,15 @@ class LasPoints final : public PointSource {
       ++axis;
     }
     for (const Scaled& s : scaled_) {
-      for (float* v = targets[s.column].narrow; v != targets[s.column].narrow + count; ++v) {
-        *v = static_cast<float>(double{*v} * s.scale + s.shift);
+      const ColumnTarget& target = targets[s.column];
+      for (std::size_t i = 0; i < count && target.narrow != nullptr; ++i) {
+        target.narrow[i] = static_cast<float>(double{target.narrow[i]} * s.scale + s.shift);
+      }
+      for (std::size_t i = 0; i < count && target.wide != nullptr; ++i) {
+        target.wide[i] = target.wide[i] * s.scale + s.shift;
       }
     }
+    round_exact_attributes(out);
   }
 
  private:
@@ -135,7 +140,8 @@ class LasPoints final : public PointSource {
     }
     for (const Scaled& s : scaled_) {
       const PointColumn& column = columns_[s.column];
-      if (column.role == Role::attribute) info_.attributes[column.attribute].type = ScalarType::float32;
+      if (column.role != Role::attribute) continue;
+      info_.attributes[column.attribute].type = fits_float(column.type) ? ScalarType::float32 : ScalarType::float64;
     }
   }
 

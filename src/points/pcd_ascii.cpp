@@ -70,6 +70,7 @@ class AsciiPcd final : public PointSource {
         [&](std::string_view line, std::uint64_t number, std::size_t i) {
           parser_->parse(file_, line, number, i, targets);
         });
+    round_exact_attributes(out);
     for (std::size_t i = 0; i < colours.size(); ++i) {
       const std::uint32_t colour = unpack_colour(colours[i], packed_->field);
       for (std::size_t k = 0; k < channels.size(); ++k) {

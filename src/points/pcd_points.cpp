@@ -88,6 +88,7 @@ class BinaryPcd final : public PointSource {
     first = std::min(first, info_.count);
     count = static_cast<std::size_t>(std::min<std::uint64_t>(count, info_.count - first));
     read_binary_rows(file_, layout_, columns_, first, count, prepare_batch(info_, columns_, first, count, out));
+    round_exact_attributes(out);
   }
 
  private:
@@ -119,6 +120,7 @@ class CompressedPcd final : public PointSource {
     for (std::size_t c = 0; c < columns_.size(); ++c) {
       read_binary_rows(file_, layouts_[c], {columns_[c]}, first, count, {targets[c]});
     }
+    round_exact_attributes(out);
   }
 
  private:

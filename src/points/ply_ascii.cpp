@@ -74,6 +74,7 @@ class AsciiPly final : public PointSource {
       parse_row(line, i, targets);
       ++next_;
     }
+    round_exact_attributes(out);
     if (next_ == info_.count) require_rest();
   }
 

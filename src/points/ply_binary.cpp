@@ -23,6 +23,7 @@ class BinaryPly final : public PointSource {
     count = static_cast<std::size_t>(std::min<std::uint64_t>(count, info_.count - first));
     const std::vector<ColumnTarget> targets = prepare_batch(info_, columns_, first, count, out);
     read_binary_rows(file_, layout_, columns_, first, count, targets);
+    round_exact_attributes(out);
   }
 
  private:

@@ -76,15 +76,16 @@ void give_roles(std::vector<PointColumn>& columns, PointSourceInfo& info, const 
   info.has_normals = normals == 3;
   info.has_radius = has("radius") || has("pscale");
   info.has_quality = has("quality") || has("confidence");
-  const std::array<std::pair<std::string_view, Role>, 8> roles{
-      {{"x", Role::x},
-       {"y", Role::y},
-       {"z", Role::z},
-       {"nx", Role::nx},
-       {"ny", Role::ny},
-       {"nz", Role::nz},
-       {has("radius") ? "radius" : "pscale", Role::radius},
-       {has("quality") ? "quality" : "confidence", Role::quality}}};
+  if (info.has_radius) info.radius_name = has("radius") ? "radius" : "pscale";
+  if (info.has_quality) info.quality_name = has("quality") ? "quality" : "confidence";
+  const std::array<std::pair<std::string_view, Role>, 8> roles{{{"x", Role::x},
+                                                                {"y", Role::y},
+                                                                {"z", Role::z},
+                                                                {"nx", Role::nx},
+                                                                {"ny", Role::ny},
+                                                                {"nz", Role::nz},
+                                                                {info.radius_name, Role::radius},
+                                                                {info.quality_name, Role::quality}}};
   for (PointColumn& column : columns) {
     if (column.role == Role::skipped) continue;
     const auto known =
@@ -109,6 +110,10 @@ std::vector<ColumnTarget> prepare_batch(const PointSourceInfo& info, const std::
   batch.quality.resize(info.has_quality ? count : 0);
   batch.attributes.resize(info.attributes.size());
   for (auto& attribute : batch.attributes) attribute.resize(count);
+  batch.exact.resize(info.attributes.size());
+  for (std::size_t a = 0; a < info.attributes.size(); ++a) {
+    batch.exact[a].resize(fits_float(info.attributes[a].type) ? 0 : count);
+  }
 
   std::vector<ColumnTarget> targets;
   targets.reserve(columns.size());
@@ -139,7 +144,11 @@ std::vector<ColumnTarget> prepare_batch(const PointSourceInfo& info, const std::
         targets.push_back({.narrow = batch.quality.data()});
         break;
       case Role::attribute:
-        targets.push_back({.narrow = batch.attributes[column.attribute].data()});
+        if (fits_float(info.attributes[column.attribute].type)) {
+          targets.push_back({.narrow = batch.attributes[column.attribute].data()});
+        } else {
+          targets.push_back({.wide = batch.exact[column.attribute].data()});
+        }
         break;
       case Role::skipped:
         targets.push_back({});
@@ -147,6 +156,13 @@ std::vector<ColumnTarget> prepare_batch(const PointSourceInfo& info, const std::
     }
   }
   return targets;
+}
+
+void round_exact_attributes(SampleBatch& batch) {
+  for (std::size_t a = 0; a < batch.exact.size(); ++a) {
+    std::transform(batch.exact[a].begin(), batch.exact[a].end(), batch.attributes[a].begin(),
+                   [](double value) { return static_cast<float>(value); });
+  }
 }
 
 }  // namespace lamina

@@ -43,4 +43,7 @@ struct ColumnTarget {
 std::vector<ColumnTarget> prepare_batch(const PointSourceInfo& info, const std::vector<PointColumn>& columns,
                                         std::uint64_t first, std::size_t count, SampleBatch& batch);
 
+/// Once the rows are read: the floats of the attributes that were read as doubles.
+void round_exact_attributes(SampleBatch& batch);
+
 }  // namespace lamina

@@ -96,14 +96,14 @@ void RowParser::parse(const InputFile& file, std::string_view line, std::uint64_
         fail(fmt::format("{} is no number ({} expected)", word(p, end_of_word(p, end, separator_)),
                          quoted(columns_[c].name)));
       }
+      const ValueRange& range = ranges_[c];
+      if (value < range.low || value > range.high || (range.whole && std::isnan(value))) {
+        fail(fmt::format("{} is {}, outside {:g} to {:g}{}", quoted(columns_[c].name), word(p, stop), range.low,
+                         range.high, remedy_));
+      }
       if (targets[c].wide != nullptr) {
         targets[c].wide[at] = value;
       } else {
-        const ValueRange& range = ranges_[c];
-        if (value < range.low || value > range.high || (range.whole && std::isnan(value))) {
-          fail(fmt::format("{} is {}, not from {:g} to {:g} like those looked at before{}", quoted(columns_[c].name),
-                           word(p, stop), range.low, range.high, remedy_));
-        }
         targets[c].narrow[at] = static_cast<float>(value);
       }
       p = stop;

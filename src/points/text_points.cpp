@@ -24,7 +24,9 @@ class TextPoints final : public PointSource {
       : file_(std::move(file)), line_end_(line_end_of(file_)) {
     info_.path = path;
     const TextLayout layout = understand_text(file_, line_end_, columns, info_);
-    parser_.emplace(layout.columns, layout.separator, "; name the columns and their types with --columns");
+    parser_.emplace(
+        layout.columns, layout.separator,
+        ", as in the rows looked at before; say what it is with --columns (red:uchar, red:ushort, red:float)");
     count_rows(layout);
     info_.random_access = true;
   }
@@ -45,6 +47,7 @@ class TextPoints final : public PointSource {
                });
       done += rows;
     }
+    round_exact_attributes(out);
   }
 
  private:
