@@ -44,9 +44,9 @@ class PointSource {
 /// are first spooled to an unlinked file in `tmp_dir` (empty: the system's temporary folder).
 ///
 /// Properties of element `vertex`: x y z; nx ny nz; radius (else pscale); quality (else confidence); every other one is
-/// an attribute, carried as float, integers of 32 bits and doubles in SampleBatch::exact as well. Positions in an ascii file keep
-/// all their digits even where the header says float, as georeferenced ones need them. Binary files are random_access
-/// and never mapped: resident memory does not grow with the file.
+/// an attribute, carried as float, integers of 32 bits and doubles in SampleBatch::exact as well. Positions in an ascii
+/// file keep all their digits even where the header says float, as georeferenced ones need them. Binary files are
+/// random_access and never mapped: resident memory does not grow with the file.
 ///
 /// Throws Error(unreadable) naming the file and the place: missing file, directory, empty file, not a PLY, malformed
 /// header, no vertex element, no x y z, an incomplete normal, a property named twice, a list among the vertex's
