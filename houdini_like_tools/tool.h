@@ -12,5 +12,14 @@ void add_compare(CLI::App& app);
 void add_check(CLI::App& app);
 void add_render(CLI::App& app);
 void add_volume(CLI::App& app);
+void add_info(CLI::App& app);
+void add_measure(CLI::App& app);
+void add_convert(CLI::App& app);
+void add_merge(CLI::App& app);
+void add_clip(CLI::App& app);
+void add_transform(CLI::App& app);
+void add_sort(CLI::App& app);
+void add_radius(CLI::App& app);
+void add_attribtransfer(CLI::App& app);
 
 }  // namespace lamina::tools
