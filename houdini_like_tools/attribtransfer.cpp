@@ -24,8 +24,7 @@ void run_transfer(const TransferOptions& o) {
   if (o.mesh == "-" && o.points == "-")
     throw Error(ExitCode::usage, "MESH and POINTS both name standard input; give one of them a file");
   const RunContext context = make_context(o.run);
-  if (o.mesh == "-") content_of(o.mesh, o.run.tmp_dir);
-  TriangleMesh mesh = read_mesh(o.mesh);
+  TriangleMesh mesh = read_mesh_input(o.mesh, o.run.tmp_dir);
   const auto points = open_points(o.points, o.run.tmp_dir);
   const TransferReport report = transfer_attributes(*points, mesh, o.settings, context);
   write_mesh(mesh, o.output);

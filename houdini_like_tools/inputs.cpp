@@ -48,6 +48,12 @@ std::string shown_name(const std::string& path) {
   return path == "-" ? "standard input" : path;
 }
 
+TriangleMesh read_mesh_input(const std::string& path, const std::string& tmp_dir, NonFinite non_finite) {
+  const std::string name = pipe_name(path);
+  if (name == "-") content_of(name, tmp_dir);
+  return read_mesh(name, non_finite);
+}
+
 void add_examples(CLI::App& tool, const std::string& lines) {
   tool.footer("Examples:\n" + lines);
 }

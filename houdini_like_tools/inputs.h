@@ -5,6 +5,7 @@
 
 #include "console.h"
 #include "lamina/info.h"
+#include "lamina/mesh.h"
 #include "lamina/points.h"
 #include "lamina/points_writer.h"
 #include "lamina/surface.h"
@@ -27,6 +28,10 @@ PointColumns with_precision(PointColumns columns, Precision precision);
 
 /// "standard input" for "-".
 std::string shown_name(const std::string& path);
+
+/// read_mesh(), also from standard input.
+TriangleMesh read_mesh_input(const std::string& path, const std::string& tmp_dir = {},
+                             NonFinite non_finite = NonFinite::refuse);
 
 /// What a tool's help ends with: command lines that work as they stand (the tests run them).
 void add_examples(CLI::App& tool, const std::string& lines);

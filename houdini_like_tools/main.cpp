@@ -22,6 +22,8 @@ int main(int argc, char** argv) {
       add_sort,
       add_radius,
       add_attribtransfer,
+      add_completion,
+      add_man,
       // clang-format on
   };
   return run_program(argc, argv, tools);

@@ -174,6 +174,9 @@ void add_render(CLI::App& app) {
   add_camera_options(*tool, o->settings);
   add_look_options(*tool, o->settings);
   add_run_options(*tool, o->run);
+  add_examples(*tool,
+               "  lamina render mesh.ply --size 200x200 -o mesh.png\n"
+               "  lamina render scan.ply --size 200x200 --up z -o scan.png");
   tool->callback([o] { run_render(*o); });
 }
 

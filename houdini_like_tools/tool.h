@@ -21,5 +21,8 @@ void add_transform(CLI::App& app);
 void add_sort(CLI::App& app);
 void add_radius(CLI::App& app);
 void add_attribtransfer(CLI::App& app);
+/// Not in the help: made for packagers.
+void add_completion(CLI::App& app);
+void add_man(CLI::App& app);
 
 }  // namespace lamina::tools
