@@ -18,6 +18,7 @@ namespace lamina::tools {
 namespace {
 
 struct SurfaceOptions {
+  std::vector<std::string> inputs;
   SurfaceSettings settings;
   RunOptions run;
   std::string stats;
@@ -26,6 +27,7 @@ struct SurfaceOptions {
 nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& settings) {
   nlohmann::ordered_json j;
   j["input"] = settings.input;
+  if (!settings.more_inputs.empty()) j["more_inputs"] = settings.more_inputs;
   j["output"] = settings.output;
   j["dry_run"] = settings.dry_run;
   j["samples"] = s.samples_read;
@@ -70,7 +72,9 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
 
 void run_surface(const SurfaceOptions& o) {
   SurfaceSettings settings = o.settings;
-  settings.input = pipe_name(settings.input);
+  settings.input = pipe_name(o.inputs.front());
+  for (auto name = o.inputs.begin() + 1; name != o.inputs.end(); ++name)
+    settings.more_inputs.push_back(pipe_name(*name));
   settings.output = pipe_name(settings.output);
   if (o.stats == "-" && settings.output == "-") {
     throw Error(ExitCode::usage, "--stats and --output both name standard output; give one of them a file");
@@ -105,12 +109,20 @@ void add_surface(CLI::App& app) {
   auto* tool = app.add_subcommand("surface", "Reconstruct a triangle mesh from oriented points, streaming");
   auto o = std::make_shared<SurfaceOptions>();
   SurfaceSettings& s = o->settings;
-  tool->add_option("INPUT", s.input, "point file: PLY with positions and normals; - or stdin.ply for standard input")
+  tool->add_option(
+          "INPUT", o->inputs,
+          "points with normals: PLY, OBJ, XYZ and other text, PTX, PCD, LAS, also gzipped; several files, "
+          "folders, patterns or scan lists (.conf) are one cloud; FILE@POSE.txt moves a file by the 4x4 matrix "
+          "in POSE.txt; - or stdin.ply for standard input")
       ->required();
   auto* output =
       tool->add_option("-o,--output", s.output, "mesh to write: binary PLY; - or stdout.ply for standard output");
 
   const std::string samples = "Samples";
+  tool->add_option("--columns", s.columns,
+                   "what the columns of text files hold: names as in x,y,z,nx,ny,nz,red:uchar,-, - for those to skip")
+      ->type_name("NAMES")
+      ->group(samples);
   tool->add_option("--frame", s.frame, "pca: sweep along the dominant axis; axis: along the longest input axis")
       ->transform(words<FrameMode>({{"pca", FrameMode::pca}, {"axis", FrameMode::axis}}))
       ->option_text("pca|axis [pca]")

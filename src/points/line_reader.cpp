@@ -37,6 +37,7 @@ bool LineReader::next_of_any_kind(std::string_view& line) {
     if (found != nullptr) {
       const auto length = static_cast<std::size_t>(static_cast<const char*>(found) - start);
       line = {start, length};
+      line_offset_ = offset_ - size;
       begin_ += length + 1;
       ++line_;
       return true;
@@ -45,6 +46,7 @@ bool LineReader::next_of_any_kind(std::string_view& line) {
     if (refill()) continue;
     if (size == 0) return false;
     line = {buffer_.data() + begin_, size};  // the last line, unended
+    line_offset_ = offset_ - size;
     begin_ = end_;
     ++line_;
     return true;
