@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "console.h"
+#include "inputs.h"
 #include "lamina/error.h"
 #include "result_file.h"
 #include "tool.h"
@@ -179,6 +180,9 @@ void add_surface(CLI::App& app) {
       ->type_name("FILE.json")
       ->group("Run");
   add_run_options(*tool, o->run);
+  add_examples(*tool,
+               "  lamina surface scan.ply -o mesh_of_scan.ply\n"
+               "  lamina surface scan.ply --dry-run");
   tool->callback([o, output, dry] {
     if (output->count() == 0 && dry->count() == 0) throw CLI::RequiredError("--output");
     run_surface(*o);
