@@ -70,6 +70,7 @@ class HeaderParser {
   void take(std::string_view keyword) {
     if (keyword == "FIELDS" || keyword == "COLUMNS") {
       if (words_.size() > kMostFields) fail(fmt::format("more than {} fields", kMostFields));
+      if (!header_.fields.empty()) fail("a second list of fields");
       for (const std::string_view word : words_)
         header_.fields.push_back({usual_name(word), ScalarType::float32, 4, 1});
     } else if (keyword == "SIZE" || keyword == "TYPE" || keyword == "COUNT") {

@@ -226,6 +226,8 @@ TEST_F(PcdPoints, HeadersThatLieAndDataThatAreCut) {
       }
     }
   }
+  EXPECT_THAT(with(ascii(points), "WIDTH 20\n", "FIELDS more\nWIDTH 20\n"),
+              HasSubstr("line 7: a second list of fields"));
   EXPECT_THAT(with(ascii(points), "SIZE 4 4", "SIZE 3 4"), HasSubstr("field 'x' has TYPE 'F' and SIZE '3'"));
   EXPECT_THAT(with(binary(points), "FIELDS x ", "FIELDS q "), HasSubstr("no field 'x'"));
   EXPECT_THAT(with(binary(points), "DATA binary\n", "DATA base64\n"), HasSubstr("data 'base64' are not known"));
