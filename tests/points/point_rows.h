@@ -3,11 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <random>
 #include <string>
 #include <vector>
 
 #include "lamina/error.h"
 #include "lamina/points.h"
+#include "lamina/points_writer.h"
 
 namespace lamina::test {
 
@@ -54,6 +57,51 @@ inline std::string refusal(const std::string& path, const PointSettings& setting
     return e.what();
   }
   return "";
+}
+
+/// `n` rows of the columns: colours and other integers over their type's range, normals of unit length.
+inline SampleBatch random_rows(const PointColumns& columns, std::size_t n, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<> normal(0, 20);
+  SampleBatch rows;
+  rows.attributes.resize(columns.attributes.size());
+  rows.exact.resize(columns.attributes.size());
+  for (std::size_t i = 0; i < n; ++i) {
+    for (auto* axis : {&rows.x, &rows.y, &rows.z}) {
+      const double value = 400'000 + normal(random);
+      axis->push_back(columns.double_positions ? value : static_cast<float>(value));
+    }
+    const double v[3] = {normal(random), normal(random), normal(random)};
+    const double length = std::hypot(v[0], v[1], v[2]);
+    if (columns.normals) {
+      rows.nx.push_back(static_cast<float>(v[0] / length));
+      rows.ny.push_back(static_cast<float>(v[1] / length));
+      rows.nz.push_back(static_cast<float>(v[2] / length));
+    }
+    if (!columns.radius.empty()) rows.radius.push_back(static_cast<float>(std::abs(v[0])));
+    if (!columns.quality.empty()) rows.quality.push_back(static_cast<float>(std::abs(v[1])));
+    for (std::size_t a = 0; a < columns.attributes.size(); ++a) {
+      const ScalarType type = columns.attributes[a].type;
+      const bool floating = type == ScalarType::float32 || type == ScalarType::float64;
+      const bool is_signed = type == ScalarType::int8 || type == ScalarType::int16 || type == ScalarType::int32;
+      const double span = std::exp2(8 * byte_size(type));
+      const double whole =
+          std::floor(std::uniform_real_distribution<>(0, 1)(random) * span) - (is_signed ? span / 2 : 0);
+      const double value = type == ScalarType::float64 ? v[2] : floating ? static_cast<float>(v[2]) : whole;
+      rows.attributes[a].push_back(static_cast<float>(value));
+      if (!fits_float(type)) rows.exact[a].push_back(value);
+    }
+  }
+  return rows;
+}
+
+/// Writes the rows in one piece or, with `count` known, after an empty one.
+inline void write_rows(const std::string& path, const PointColumns& columns, const SampleBatch& rows,
+                       const PointsWriterSettings& settings = {}) {
+  const auto writer = open_points_writer(path, columns, settings);
+  if (settings.count) writer->append(random_rows(columns, 0, 1));
+  writer->append(rows);
+  writer->commit();
 }
 
 inline std::vector<std::string> attribute_names(const PointSourceInfo& info) {
