@@ -97,6 +97,27 @@ TEST_F(Inputs, AScanListGivesItsScansTheirPoses) {
   EXPECT_EQ(all_rows(*open_points(std::vector{list + "@" + pose}, PointSettings{})).z[0], 6);
 }
 
+TEST_F(Inputs, RangeGridsAreTheirVertices) {
+  std::string grid =
+      "ply\nformat binary_big_endian 1.0\nobj_info num_cols 2\nobj_info num_rows 2\nelement vertex 2\nproperty float "
+      "x\n"
+      "property float y\nproperty float z\nelement range_grid 4\nproperty list uchar int vertex_indices\nend_header\n";
+  grid += std::string("\x3f\x80\0\0\x40\0\0\0\x40\x40\0\0", 12);    // 1 2 3
+  grid += std::string("\x40\x80\0\0\x40\xa0\0\0\x40\xc0\0\0", 12);  // 4 5 6
+  grid += std::string(
+      "\1\0\0\0\0"
+      "\0"
+      "\0"
+      "\1\0\0\0\1",
+      12);
+  write("scan.ply", grid);
+  const auto source =
+      open_points(std::vector{write("scan.conf", "bmesh scan.ply 10 20 30 0 0 0 1\n")}, PointSettings{});
+  const SampleBatch rows = all_rows(*source);
+  EXPECT_THAT(rows.x, ElementsAre(11, 14));
+  EXPECT_THAT(rows.z, ElementsAre(33, 36));
+}
+
 TEST_F(Inputs, JoinedSourcesAreRowsBehindEachOther) {
   std::mt19937 random(3);
   std::vector<std::string> names;
