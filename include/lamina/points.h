@@ -55,7 +55,7 @@ struct PointSettings {
 
 /// Opens a point file by its content, and by its ending where the content leaves open what it is. "-" is standard
 /// input; pipes are first spooled to an unlinked file in `tmp_dir`, and gzip is unpacked to one. docs/formats.md lists
-/// the formats: PLY (also with a range grid), OBJ, XYZ and its kin, PTX, PCD, LAS.
+/// the formats: PLY (also with a range grid), OBJ, XYZ and its kin, PTX, PCD, LAS, OpenVDB points (whole in memory).
 ///
 /// PLY, properties of element `vertex`: x y z; nx ny nz; radius (else pscale); quality (else confidence); every other
 /// one is an attribute, carried as float, integers of 32 bits and doubles in SampleBatch::exact as well. Positions in an

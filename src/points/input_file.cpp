@@ -62,7 +62,9 @@ InputFile open_input(const std::string& path, const std::string& tmp_dir) {
   Descriptor file = standard ? Descriptor(::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0)) : open_to_read(path);
   struct stat status {};
   if (!file || ::fstat(file.get(), &status) != 0) {
-    throw Error(ExitCode::unreadable, fmt::format("{}: cannot be opened: {}", name, system_message(errno)));
+    const int error = errno;
+    throw Error(ExitCode::unreadable, fmt::format("{}: cannot be opened: {}{}", name, system_message(error),
+                                                  error == EMFILE ? "; allow more with ulimit -n" : ""));
   }
   if (S_ISDIR(status.st_mode)) {
     throw Error(ExitCode::unreadable, fmt::format("{}: is a directory; name a point file", name));

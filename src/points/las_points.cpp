@@ -40,9 +40,11 @@ bool is_colour(const Candidate& c) {
 void look_for_values(const InputFile& file, const BinaryRows& rows, std::uint64_t count, std::vector<Candidate>& list) {
   constexpr std::size_t kBlock = 1 << 14;
   std::vector<PointColumn> columns;
+  columns.reserve(list.size());
   for (const Candidate& c : list) columns.push_back(c.column);
   std::vector<std::vector<float>> values(list.size(), std::vector<float>(kBlock));
   std::vector<ColumnTarget> targets;
+  targets.reserve(list.size());
   for (auto& v : values) targets.push_back({.narrow = v.data()});
   const auto undecided = [&] {
     const bool wide_colour =

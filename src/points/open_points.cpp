@@ -10,6 +10,7 @@
 #include "points/sniff.h"
 #include "points/text_layout.h"
 #include "points/text_points.h"
+#include "points/vdb_points.h"
 
 namespace lamina {
 std::unique_ptr<PointSource> open_points(const std::string& path, const PointSettings& settings) {
@@ -28,6 +29,8 @@ std::unique_ptr<PointSource> open_points(const std::string& path, const PointSet
       return open_las(std::move(file), path);
     case PointFormat::ptx:
       return open_ptx(std::move(file), path);
+    case PointFormat::vdb:
+      return open_vdb(path);
     case PointFormat::text:
       return open_text(std::move(file), path, settings.columns);
   }

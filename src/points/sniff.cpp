@@ -26,7 +26,6 @@ constexpr std::array kSignatures{
               "pdal translate FILE.e57 FILE.las"},
     Signature{"PK\x03\x04"sv, "is a zip archive; unpack it"},
     Signature{"\x28\xb5\x2f\xfd"sv, "is compressed with zstd; unpack it, or pipe it in: zstdcat FILE | lamina ... -"},
-    Signature{"\x20\x42\x44\x56"sv, "looks like an OpenVDB file, which holds no points read here; give a PLY"},
     Signature{"OFF", "looks like an OFF mesh; give a point cloud, for example as PLY"},
     Signature{"COFF", "looks like an OFF mesh; give a point cloud, for example as PLY"},
     Signature{"NOFF", "looks like an OFF mesh; give a point cloud, for example as PLY"},
@@ -36,7 +35,7 @@ constexpr std::array kSignatures{
     Signature{"<html", "is a web page (a download that went wrong?)"},
 };
 
-constexpr std::string_view kKnown = "PLY, OBJ, XYZ, PTS, ASC, CSV, PWN, PTX, PCD and LAS are read";
+constexpr std::string_view kKnown = "PLY, OBJ, XYZ, PTS, ASC, CSV, PWN, PTX, PCD, LAS and OpenVDB points are read";
 
 constexpr std::array kTextEndings{".xyz"sv, ".pts"sv,  ".asc"sv,    ".csv"sv, ".pwn"sv, ".txt"sv,
                                   ".neu"sv, ".xyzn"sv, ".xyzrgb"sv, ".3d"sv,  ".dat"sv};
@@ -172,6 +171,7 @@ bool has_point_ending(std::string_view name) {
 
 PointFormat detect_format(std::string_view start, const std::string& name) {
   if (is_ply(start)) return PointFormat::ply;
+  if (start.starts_with("\x20\x42\x44\x56"sv)) return PointFormat::vdb;
   if (start.starts_with("LASF")) {
     if (is_laz(start)) {
       throw Error(ExitCode::unreadable,

@@ -41,6 +41,7 @@ std::vector<std::string> names_on(std::string_view line) {
   std::vector<std::string_view> words;
   split_line(without_mark(line), separator, words);
   std::vector<std::string> names;
+  names.reserve(words.size());
   for (const std::string_view word : words) names.push_back(usual_name(word));
   const auto has = [&](const char* name) { return std::find(names.begin(), names.end(), name) != names.end(); };
   if (!has("x") || !has("y") || !has("z")) names.clear();

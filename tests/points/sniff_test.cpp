@@ -32,6 +32,7 @@ TEST(Sniff, KnowsPlyByItsFirstLine) {
 TEST(Sniff, KnowsFormatsByTheirContentWhateverTheEnding) {
   const std::string las = "LASF" + std::string(200, '\0');
   EXPECT_EQ(detect_format(las, "a.xyz"), PointFormat::las);
+  EXPECT_EQ(detect_format("\x20\x42\x44\x56\0\0\0\0"sv, "a.ply"), PointFormat::vdb);
   EXPECT_EQ(detect_format("# .PCD v0.7 - Point Cloud\n\0\0"sv, "a.ply"), PointFormat::pcd);
   EXPECT_EQ(detect_format("VERSION 0.7\nFIELDS x y z\n", "a"), PointFormat::pcd);
   EXPECT_EQ(detect_format("# Blender\n\nmtllib a.mtl\n", "a"), PointFormat::obj);
