@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "inputs.h"
 #include "lamina/check.h"
 #include "lamina/error.h"
 #include "tool.h"
@@ -92,7 +93,7 @@ std::string objections(const CheckReport& r, bool closed) {
 }
 
 void run_check(const CheckOptions& o) {
-  const TriangleMesh mesh = read_mesh(o.mesh, NonFinite::keep);
+  const TriangleMesh mesh = read_mesh_input(o.mesh, {}, NonFinite::keep);
   if (mesh.triangles.empty())
     throw Error(ExitCode::unreadable, fmt::format("{}: has no faces: a point cloud, not a mesh", o.mesh));
   const CheckReport report = check_mesh(mesh, o.run);
@@ -117,6 +118,7 @@ void add_check(CLI::App& app) {
       ->check(CLI::IsMember({"manifold", "closed"}));
   tool->add_option("--threads", o->run.threads, "0: all")->capture_default_str();
   tool->add_flag("--json", o->json, "print JSON");
+  add_examples(*tool, "  lamina check mesh.ply --expect manifold");
   tool->callback([o] { run_check(*o); });
 }
 

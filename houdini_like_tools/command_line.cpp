@@ -10,6 +10,7 @@
 #include "console.h"
 #include "lamina/error.h"
 #include "lamina/version.h"
+#include "option_table.h"
 #include "text.h"
 
 namespace lamina::tools {
@@ -39,7 +40,7 @@ std::string suggestion(std::string_view word, const std::vector<std::string>& ca
 
 std::vector<std::string> tool_names(const CLI::App& app) {
   std::vector<std::string> names;
-  for (const CLI::App* tool : app.get_subcommands({})) names.push_back(tool->get_name());
+  for (const CLI::App* tool : shown_tools(app)) names.push_back(tool->get_name());
   return names;
 }
 
@@ -81,7 +82,8 @@ int run_program(int argc, const char* const* argv, const std::vector<AddTool>& t
   app.get_formatter()->label("SUBCOMMAND", "TOOL");
   try {
     for (const AddTool add : tools) add(app);
-    for (CLI::App* tool : app.get_subcommands({})) tool->group("Tools");
+    for (CLI::App* tool : app.get_subcommands({}))
+      if (!tool->get_group().empty()) tool->group("Tools");
     cancel_on_signals();
     app.parse(argc, argv);
     return exit_code(ExitCode::ok);

@@ -4,7 +4,9 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "inputs.h"
 #include "lamina/compare.h"
+#include "lamina/error.h"
 #include "tool.h"
 
 namespace lamina::tools {
@@ -45,7 +47,9 @@ void print_table(const CompareResult& r) {
 }
 
 void run_compare(const CompareOptions& o) {
-  const TriangleMesh a = read_mesh(o.a), b = read_mesh(o.b);
+  if (o.a == "-" && o.b == "-")
+    throw Error(ExitCode::usage, "A and B both name standard input; give one of them a file");
+  const TriangleMesh a = read_mesh_input(o.a), b = read_mesh_input(o.b);
   const CompareResult r = compare(a, b, o.settings, o.run);
   if (!o.json) {
     print_table(r);
@@ -71,6 +75,7 @@ void add_compare(CLI::App& app) {
   tool->add_option("--seed", o->settings.seed)->capture_default_str();
   tool->add_option("--threads", o->run.threads, "0: all")->capture_default_str();
   tool->add_flag("--json", o->json, "print JSON");
+  add_examples(*tool, "  lamina compare mesh.ply other.obj --count 2000");
   tool->callback([o] { run_compare(*o); });
 }
 

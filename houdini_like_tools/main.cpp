@@ -13,6 +13,17 @@ int main(int argc, char** argv) {
       add_check,
       add_render,
       add_volume,
+      add_info,
+      add_measure,
+      add_convert,
+      add_merge,
+      add_clip,
+      add_transform,
+      add_sort,
+      add_radius,
+      add_attribtransfer,
+      add_completion,
+      add_man,
       // clang-format on
   };
   return run_program(argc, argv, tools);

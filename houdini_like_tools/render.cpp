@@ -4,14 +4,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
-#include <fstream>
 #include <memory>
 
 #include "console.h"
+#include "inputs.h"
 #include "lamina/error.h"
+#include "lamina/info.h"
 #include "lamina/points.h"
+#include "numbers.h"
 #include "text.h"
 #include "tool.h"
 
@@ -25,49 +26,6 @@ struct RenderOptions {
   RenderSettings settings;
   RunOptions run;
 };
-
-/// Exactly `count` numbers between separators; false when the text is anything else.
-bool read_numbers(std::string_view text, char separator, std::size_t count, double* values) {
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  for (std::size_t i = 0; i < count; ++i) {
-    if (i > 0 && (at == end || *at++ != separator)) return false;
-    const auto [rest, error] = std::from_chars(at, end, values[i]);
-    if (error != std::errc{} || !std::isfinite(values[i])) return false;
-    at = rest;
-  }
-  return at == end;
-}
-
-/// An option whose value is numbers between separators.
-CLI::Option* add_numbers(CLI::App& app, const std::string& name, char separator, std::size_t count,
-                         const std::string& form, const std::string& description,
-                         const std::function<void(const std::vector<double>&)>& take) {
-  return app
-      .add_option_function<std::string>(
-          name,
-          [=](const std::string& text) {
-            std::vector<double> values(count);
-            if (!read_numbers(text, separator, count, values.data())) {
-              throw CLI::ValidationError(name, fmt::format("'{}' is not of the form {}", text, form));
-            }
-            take(values);
-          },
-          description)
-      ->type_name(form);
-}
-
-/// A PLY that names no faces: it can be as large as the disk, so it is drawn in batches.
-bool is_point_file(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::string line;
-  if (!std::getline(file, line) || !line.starts_with("ply")) return false;
-  for (int lines = 0; lines < 10000 && std::getline(file, line) && !line.starts_with("end_header"); ++lines) {
-    if (line.starts_with("element tristrips ")) return false;
-    if (line.starts_with("element face ") && line.find_first_of("123456789") != std::string::npos) return false;
-  }
-  return true;
-}
 
 /// Every batch of the file, with progress.
 template <class Take>
@@ -126,7 +84,7 @@ void draw_mesh(Renderer& renderer, const RenderOptions& o, const RunContext& con
 void run_render(const RenderOptions& o) {
   const RunContext context = make_context(o.run);
   Renderer renderer(o.settings, context);
-  if (o.input == "-" || is_point_file(o.input)) {
+  if (content_of(o.input, o.run.tmp_dir) == FileContent::points) {
     draw_points(renderer, o, context);
   } else {
     draw_mesh(renderer, o, context);
@@ -216,6 +174,9 @@ void add_render(CLI::App& app) {
   add_camera_options(*tool, o->settings);
   add_look_options(*tool, o->settings);
   add_run_options(*tool, o->run);
+  add_examples(*tool,
+               "  lamina render mesh.ply --size 200x200 -o mesh.png\n"
+               "  lamina render scan.ply --size 200x200 --up z -o scan.png");
   tool->callback([o] { run_render(*o); });
 }
 

@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "inputs.h"
 #include "lamina/error.h"
 #include "lamina/scan.h"
 #include "lamina/scatter.h"
@@ -52,7 +53,7 @@ void run_scatter(const ScatterOptions& o, bool scanning) {
     scatter_over(o, *shape_surface(o.shape, o.colour));
     return;
   }
-  const TriangleMesh mesh = amphora ? amphora_mesh() : read_mesh(o.mesh);
+  const TriangleMesh mesh = amphora ? amphora_mesh() : read_mesh_input(o.mesh);
   if (scanning)
     scan_mesh(o, mesh);
   else
@@ -92,6 +93,9 @@ void add_scatter(CLI::App& app) {
       ->needs(scanning);
   tool->add_option("--threads", o->run.threads, "0: all")->capture_default_str();
   tool->add_flag("--quiet", o->quiet, "no summary");
+  add_examples(*tool,
+               "  lamina scatter mesh.ply --count 5000 -o points.ply\n"
+               "  lamina scatter --shape torus --count 5000 --noise 1 -o noisy.ply");
   tool->callback([o, scanning] {
     if (o->mesh.empty() && o->shape.empty()) throw CLI::RequiredError("MESH or --shape");
     run_scatter(*o, scanning->count() > 0);

@@ -10,6 +10,7 @@
 #include <optional>
 
 #include "console.h"
+#include "inputs.h"
 #include "lamina/error.h"
 #include "result_file.h"
 #include "tool.h"
@@ -18,6 +19,7 @@ namespace lamina::tools {
 namespace {
 
 struct SurfaceOptions {
+  std::vector<std::string> inputs;
   SurfaceSettings settings;
   RunOptions run;
   std::string stats;
@@ -26,6 +28,7 @@ struct SurfaceOptions {
 nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& settings) {
   nlohmann::ordered_json j;
   j["input"] = settings.input;
+  if (!settings.more_inputs.empty()) j["more_inputs"] = settings.more_inputs;
   j["output"] = settings.output;
   j["dry_run"] = settings.dry_run;
   j["samples"] = s.samples_read;
@@ -82,7 +85,9 @@ void return_large_arrays() {
 void run_surface(const SurfaceOptions& o) {
   return_large_arrays();
   SurfaceSettings settings = o.settings;
-  settings.input = pipe_name(settings.input);
+  settings.input = pipe_name(o.inputs.front());
+  for (auto name = o.inputs.begin() + 1; name != o.inputs.end(); ++name)
+    settings.more_inputs.push_back(pipe_name(*name));
   settings.output = pipe_name(settings.output);
   if (o.stats == "-" && settings.output == "-") {
     throw Error(ExitCode::usage, "--stats and --output both name standard output; give one of them a file");
@@ -117,12 +122,20 @@ void add_surface(CLI::App& app) {
   auto* tool = app.add_subcommand("surface", "Reconstruct a triangle mesh from oriented points, streaming");
   auto o = std::make_shared<SurfaceOptions>();
   SurfaceSettings& s = o->settings;
-  tool->add_option("INPUT", s.input, "point file: PLY with positions and normals; - or stdin.ply for standard input")
+  tool->add_option(
+          "INPUT", o->inputs,
+          "points with normals: PLY, OBJ, XYZ and other text, PTX, PCD, LAS, also gzipped; several files, "
+          "folders, patterns or scan lists (.conf) are one cloud; FILE@POSE.txt moves a file by the 4x4 matrix "
+          "in POSE.txt; - or stdin.ply for standard input")
       ->required();
   auto* output =
       tool->add_option("-o,--output", s.output, "mesh to write: binary PLY; - or stdout.ply for standard output");
 
   const std::string samples = "Samples";
+  tool->add_option("--columns", s.columns,
+                   "what the columns of text files hold: names as in x,y,z,nx,ny,nz,red:uchar,-, - for those to skip")
+      ->type_name("NAMES")
+      ->group(samples);
   tool->add_option("--frame", s.frame, "pca: sweep along the dominant axis; axis: along the longest input axis")
       ->transform(words<FrameMode>({{"pca", FrameMode::pca}, {"axis", FrameMode::axis}}))
       ->option_text("pca|axis [pca]")
@@ -181,6 +194,9 @@ void add_surface(CLI::App& app) {
       ->type_name("FILE.json")
       ->group("Run");
   add_run_options(*tool, o->run);
+  add_examples(*tool,
+               "  lamina surface scan.ply -o mesh_of_scan.ply\n"
+               "  lamina surface scan.ply --dry-run");
   tool->callback([o, output, dry] {
     if (output->count() == 0 && dry->count() == 0) throw CLI::RequiredError("--output");
     run_surface(*o);

@@ -12,5 +12,17 @@ void add_compare(CLI::App& app);
 void add_check(CLI::App& app);
 void add_render(CLI::App& app);
 void add_volume(CLI::App& app);
+void add_info(CLI::App& app);
+void add_measure(CLI::App& app);
+void add_convert(CLI::App& app);
+void add_merge(CLI::App& app);
+void add_clip(CLI::App& app);
+void add_transform(CLI::App& app);
+void add_sort(CLI::App& app);
+void add_radius(CLI::App& app);
+void add_attribtransfer(CLI::App& app);
+/// Not in the help: made for packagers.
+void add_completion(CLI::App& app);
+void add_man(CLI::App& app);
 
 }  // namespace lamina::tools

@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "console.h"
+#include "inputs.h"
 #include "lamina/error.h"
 #include "text.h"
 #include "tool.h"
@@ -22,7 +23,7 @@ struct VolumeOptions {
 
 void run_volume(const VolumeOptions& o) {
   const RunContext context = make_context(o.run);
-  const TriangleMesh mesh = read_mesh(o.mesh);
+  const TriangleMesh mesh = read_mesh_input(o.mesh, o.run.tmp_dir);
   VolumeStats stats;
   try {
     stats = write_volume(mesh, o.settings, o.output, context);
@@ -74,6 +75,7 @@ void add_volume(CLI::App& app) {
       ->group(grid);
   tool->add_flag("--half", s.half, "Store 16-bit floats")->group(grid);
   add_run_options(*tool, o->run);
+  add_examples(*tool, "  lamina volume mesh.ply --voxel 0.05 -o mesh.vdb");
   tool->callback([o] { run_volume(*o); });
 }
 

@@ -26,6 +26,11 @@ constexpr int byte_size(ScalarType t) {
   return 0;
 }
 
+/// True when a float holds every value of the type.
+constexpr bool fits_float(ScalarType t) {
+  return t == ScalarType::float32 || byte_size(t) < 4;
+}
+
 /// One attribute. Colours are the attributes `red green blue [alpha]` in the type they came in; they are interpolated
 /// as floats in that type's own range (0-255, 0-65535 or 0-1) and rounded and clamped to it when written.
 struct AttributeSpec {

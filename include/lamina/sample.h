@@ -14,6 +14,9 @@ struct SampleBatch {
   std::vector<float> radius;                   ///< influence radius, input units; empty when the source has none
   std::vector<float> quality;                  ///< quality or confidence; empty when the source has none
   std::vector<std::vector<float>> attributes;  ///< one array per attribute of the source's layout
+  /// One array per attribute: the values of those whose type a float cannot hold (ids, times), empty for the others.
+  /// Sources fill it; who makes batches may leave it empty.
+  std::vector<std::vector<double>> exact;
 
   [[nodiscard]] std::size_t size() const { return x.size(); }
 };

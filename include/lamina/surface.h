@@ -21,8 +21,10 @@ enum class BadSamples { drop, refuse };
 
 /// Lengths are in the input's units, or multiples of the radius (length.h).
 struct SurfaceSettings {
-  std::string input;   ///< point file; "-" is standard input
-  std::string output;  ///< mesh file (PLY); "-" is standard output
+  std::string input;  ///< point file, folder, pattern or scan list (expand_inputs()); "-" is standard input
+  std::vector<std::string> more_inputs;  ///< taken together with `input`, as one cloud
+  std::string columns;                   ///< of text files (PointSettings::columns)
+  std::string output;                    ///< mesh file (PLY); "-" is standard output
 
   FrameMode frame = FrameMode::pca;
   BadSamples bad_samples = BadSamples::drop;  ///< non-finite, without a normal, with a radius <= 0

@@ -9,10 +9,10 @@
 
 #include "files/background_writer.h"
 #include "files/descriptor.h"
+#include "files/output_file.h"
+#include "files/record_writer.h"
 #include "lamina/error.h"
 #include "mesh_sink/mesh_header.h"
-#include "mesh_sink/output_file.h"
-#include "mesh_sink/record_writer.h"
 #include "mesh_sink/records.h"
 
 namespace lamina {

@@ -17,12 +17,13 @@ FileBuffer::FileBuffer(const std::string& path) : path_(path), buffer_(kBufferBy
   std::error_code ec;
   if (std::filesystem::is_directory(path, ec))
     throw Error(ExitCode::unreadable, fmt::format("{}: is a directory, not a mesh file", path));
-  file_ = gzopen(path.c_str(), "rb");
+  const std::string opened = path == "-" ? "/dev/stdin" : path;
+  file_ = gzopen(opened.c_str(), "rb");
   if (file_ == nullptr)
     throw Error(ExitCode::unreadable, fmt::format("{}: cannot be opened: {}", path, std::strerror(errno)));
   gzbuffer(file_, kBufferBytes);
   compressed_ = gzdirect(file_) == 0;
-  const auto size = std::filesystem::file_size(path, ec);
+  const auto size = std::filesystem::file_size(opened, ec);
   disk_bytes_ = ec ? 0 : size;
 }
 

@@ -12,6 +12,7 @@ namespace lamina::meshes {
 /// zlib passes plain files through unchanged, so a reader never asks which kind it has.
 class FileBuffer : public std::streambuf {
  public:
+  /// "-" is standard input, which must be a file read from its beginning: a pipe cannot be read twice.
   /// Throws Error(unreadable) when `path` is missing, a directory or not permitted.
   explicit FileBuffer(const std::string& path);
   ~FileBuffer() override;

@@ -19,7 +19,8 @@ void write_mesh(const TriangleMesh& mesh, const std::string& path) {
                                                                            {".off", meshes::write_off},
                                                                            {".stl", meshes::write_stl}}};
   for (const auto& [format, write] : kWriters) {
-    if (path.ends_with(".gz") || meshes::format_name(path) != format) continue;
+    const bool standard = path == "-" && format == kWriters.front().first;
+    if (path.ends_with(".gz") || (meshes::format_name(path) != format && !standard)) continue;
     meshes::OutputFile out(path);
     write(mesh, out);
     out.commit();

@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "lamina/error.h"
+#include "points/gunzip.h"
 #include "points/sniff.h"
 
 namespace lamina {
@@ -32,21 +33,15 @@ std::size_t receive(int fd, const std::string& name, std::byte* data, std::size_
   return have;
 }
 
-InputFile spool(int fd, std::string name, const std::string& tmp_dir) {
-  const std::string directory = tmp_dir.empty() ? system_tmp_dir() : tmp_dir;
-  InputFile input{open_unlinked(directory), 0, std::move(name)};
+/// Keeps a pipe's bytes. A compressed stream is unpacked afterwards, and judged then.
+InputFile spool(int fd, const std::string& name, const std::string& tmp_dir) {
   const auto buffer = std::make_unique_for_overwrite<std::byte[]>(kSpoolBytes);
-  for (;;) {
-    const std::size_t n = receive(fd, input.name, buffer.get(), kSpoolBytes);
-    if (input.bytes == 0) require_ply({reinterpret_cast<const char*>(buffer.get()), n}, input.name);
-    if (n == 0) return input;
-    if (const int error = write_all(input.file.get(), buffer.get(), n); error != 0) {
-      throw Error(ExitCode::budget,
-                  fmt::format("{}: no room to keep {} ({} bytes so far): {}; choose another folder for temporary files",
-                              directory, input.name, input.bytes, system_message(error)));
-    }
-    input.bytes += n;
-  }
+  std::size_t n = receive(fd, name, buffer.get(), kSpoolBytes);
+  const std::string_view start{reinterpret_cast<const char*>(buffer.get()), n};
+  if (!is_gzip(start)) detect_format(start.substr(0, kSniffBytes), name);
+  Spool out(name, tmp_dir);
+  for (; n > 0; n = receive(fd, name, buffer.get(), kSpoolBytes)) out.write(buffer.get(), n);
+  return out.finish();
 }
 
 }  // namespace
@@ -57,25 +52,45 @@ std::size_t InputFile::read(std::uint64_t offset, void* data, std::size_t size) 
   return result.bytes;
 }
 
+Descriptor open_to_read(const std::string& path) {
+  return Descriptor(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+}
+
 InputFile open_input(const std::string& path, const std::string& tmp_dir) {
   const bool standard = path == "-";
   const std::string name = standard ? "standard input" : path;
-  Descriptor file(standard ? ::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0) : ::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  Descriptor file = standard ? Descriptor(::fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0)) : open_to_read(path);
   struct stat status {};
   if (!file || ::fstat(file.get(), &status) != 0) {
-    throw Error(ExitCode::unreadable, fmt::format("{}: cannot be opened: {}", name, system_message(errno)));
+    const int error = errno;
+    throw Error(ExitCode::unreadable, fmt::format("{}: cannot be opened: {}{}", name, system_message(error),
+                                                  error == EMFILE ? "; allow more with ulimit -n" : ""));
   }
   if (S_ISDIR(status.st_mode)) {
     throw Error(ExitCode::unreadable, fmt::format("{}: is a directory; name a point file", name));
   }
   // Standard input may be a file, too; one that another program has read the beginning of counts as a pipe.
   const bool whole_file = S_ISREG(status.st_mode) && ::lseek(file.get(), 0, SEEK_CUR) == 0;
-  if (!whole_file) return spool(file.get(), name, tmp_dir);
-  ::posix_fadvise(file.get(), 0, 0, POSIX_FADV_SEQUENTIAL);
-  InputFile input{std::move(file), static_cast<std::uint64_t>(status.st_size), name};
-  char start[512];
-  require_ply({start, input.read(0, start, sizeof start)}, name);
+  InputFile input = whole_file ? InputFile{} : spool(file.get(), name, tmp_dir);
+  if (whole_file) {
+    ::posix_fadvise(file.get(), 0, 0, POSIX_FADV_SEQUENTIAL);
+    input = {std::move(file), static_cast<std::uint64_t>(status.st_size), name};
+  }
+  char start[2];
+  if (is_gzip({start, input.read(0, start, sizeof start)})) return unpack_gzip(input, tmp_dir);
   return input;
+}
+
+Spool::Spool(std::string name, const std::string& tmp_dir)
+    : directory_(tmp_dir.empty() ? system_tmp_dir() : tmp_dir), file_{open_unlinked(directory_), 0, std::move(name)} {}
+
+void Spool::write(const void* data, std::size_t bytes) {
+  if (const int error = write_all(file_.file.get(), data, bytes); error != 0) {
+    throw Error(ExitCode::budget,
+                fmt::format("{}: no room to keep {} ({} bytes so far): {}; choose another folder for temporary files",
+                            directory_, file_.name, file_.bytes, system_message(error)));
+  }
+  file_.bytes += bytes;
 }
 
 std::string quoted(std::string_view word) {

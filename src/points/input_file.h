@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "files/descriptor.h"
 
@@ -18,10 +19,31 @@ struct InputFile {
   std::size_t read(std::uint64_t offset, void* data, std::size_t size) const;
 };
 
+/// Holds nothing when the file cannot be opened; errno says why.
+Descriptor open_to_read(const std::string& path);
+
+/// The beginning of a file, enough to tell its format.
+inline constexpr std::size_t kSniffBytes = 64 << 10;
+
 /// Opens a file, or "-" for standard input; what is not a regular file read from its beginning (a pipe, a device) is
-/// spooled to an unlinked file in `tmp_dir`.
-/// What does not begin like a PLY is refused before it is spooled.
+/// spooled to an unlinked file in `tmp_dir`, and gzip is unpacked to one.
+/// What is no point file known here is refused before it is spooled.
 InputFile open_input(const std::string& path, const std::string& tmp_dir);
+
+/// Bytes written to an unnamed temporary file, which then is the input.
+class Spool {
+ public:
+  /// `name` for messages. Throws Error(budget) when there is no folder to write to.
+  Spool(std::string name, const std::string& tmp_dir);
+  /// Throws Error(budget) when the disk is full.
+  void write(const void* data, std::size_t bytes);
+  [[nodiscard]] std::uint64_t bytes() const { return file_.bytes; }
+  InputFile finish() { return std::move(file_); }
+
+ private:
+  std::string directory_;
+  InputFile file_;
+};
 
 /// A file name or a word of a file made fit for a one-line message: unprintable characters replaced, long ones cut.
 std::string quoted(std::string_view word);

@@ -19,6 +19,8 @@ class LineReader {
 
   /// Number of the last line given, the file's first being 1; at the end of the file that of its last line.
   [[nodiscard]] std::uint64_t line() const { return line_; }
+  /// Where in the file the last line given begins.
+  [[nodiscard]] std::uint64_t line_offset() const { return line_offset_; }
 
  private:
   bool next_of_any_kind(std::string_view& line);
@@ -27,6 +29,7 @@ class LineReader {
   const InputFile* file_;
   std::uint64_t offset_;  ///< of the bytes after the buffered ones
   std::uint64_t line_;
+  std::uint64_t line_offset_ = 0;
   char line_end_;
   std::vector<char> buffer_;
   std::size_t begin_ = 0, end_ = 0;  ///< unread part of the buffer

@@ -3,38 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <limits>
 
 #include "attributes/ply_type.h"
 #include "lamina/error.h"
 #include "points/line_reader.h"
+#include "points/number.h"
 
 namespace lamina {
 namespace {
-
-bool is_space(char c) {
-  return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
-}
-
-/// Parses a number at the beginning of [p, end) as double; returns where it ends, null when there is none.
-/// Too large becomes infinite, too small zero, as a wider type shows.
-const char* parse_number(const char* p, const char* end, double& value) {
-  if (p != end && *p == '+' && p + 1 != end && p[1] != '-') ++p;
-  const auto [stop, error] = std::from_chars(p, end, value);
-  if (error == std::errc{}) return stop;
-  if (error != std::errc::result_out_of_range) return nullptr;
-  long double wider = 0;
-  const bool huge = std::from_chars(p, end, wider).ec != std::errc{};
-  if (huge) {  // beyond even that: the exponent's sign decides
-    const std::string_view word(p, static_cast<std::size_t>(stop - p));
-    const bool small = word.find("e-") != word.npos || word.find("E-") != word.npos;
-    wider = small ? 0.0L : std::numeric_limits<long double>::infinity();
-    if (*p == '-') wider = -wider;
-  }
-  value = static_cast<double>(wider);
-  return stop;
-}
 
 /// Values an integer type can hold.
 struct Limits {
@@ -88,7 +65,7 @@ class AsciiPly final : public PointSource {
                                                   file_.name, first, next_));
     }
     count = static_cast<std::size_t>(std::min<std::uint64_t>(count, info_.count - first));
-    const std::vector<ColumnTarget> targets = prepare_batch(rows_, first, count, out);
+    const std::vector<ColumnTarget> targets = prepare_batch(info_, rows_.columns, first, count, out);
     for (std::size_t i = 0; i < count; ++i) {
       std::string_view line;
       if (!lines_.next(line)) {
@@ -97,6 +74,7 @@ class AsciiPly final : public PointSource {
       parse_row(line, i, targets);
       ++next_;
     }
+    round_exact_attributes(out);
     if (next_ == info_.count) require_rest();
   }
 
@@ -187,7 +165,7 @@ class AsciiPly final : public PointSource {
 
   /// Floats under an integer type are a wrong header (colours 0-1 called uchar): read on, they would all round to
   /// nothing.
-  void require_type(double value, const char* p, const char* stop, const PlyColumn& column) const {
+  void require_type(double value, const char* p, const char* stop, const PointColumn& column) const {
     const Limits limits = limits_of(column.type);
     if (value >= limits.low && value <= limits.high && value == static_cast<double>(static_cast<long long>(value)))
       return;

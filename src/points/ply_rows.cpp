@@ -2,11 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
-#include <set>
-#include <string_view>
-
 #include "lamina/error.h"
 
 namespace lamina {
@@ -34,15 +29,11 @@ std::size_t vertex_element(const PlyHeader& header, const std::string& name) {
   return found;
 }
 
-void require_scalars_named_once(const PlyElement& vertices, const std::string& name) {
-  std::set<std::string_view> seen;
+void require_scalars(const PlyElement& vertices, const std::string& name) {
   for (const PlyProperty& property : vertices.properties) {
     if (property.list_count) {
       refuse(name, fmt::format("property {} of the vertices is a list; points with lists are not read: remove it",
                                quoted(property.name)));
-    }
-    if (!seen.insert(property.name).second) {
-      refuse(name, fmt::format("property {} of the vertices is there twice", quoted(property.name)));
     }
   }
 }
@@ -53,96 +44,15 @@ PlyRows understand_vertices(const PlyHeader& header, const std::string& path, co
   PlyRows rows;
   rows.element = vertex_element(header, name);
   const PlyElement& vertices = header.elements[rows.element];
-  require_scalars_named_once(vertices, name);
-  const auto has = [&](std::string_view wanted) {
-    return std::any_of(vertices.properties.begin(), vertices.properties.end(),
-                       [&](const PlyProperty& p) { return p.name == wanted; });
-  };
-  for (const char* axis : {"x", "y", "z"}) {
-    if (!has(axis)) refuse(name, fmt::format("the vertices have no property '{}'; points need x y z", axis));
-  }
-  PointSourceInfo& info = rows.info;
-  info.path = path;
-  info.count = vertices.count;
-  const int normals = int{has("nx")} + int{has("ny")} + int{has("nz")};
-  if (normals == 1 || normals == 2) {
-    refuse(name, "the vertices' normals are incomplete: nx ny nz are needed, or none of them");
-  }
-  info.has_normals = normals == 3;
-  info.has_radius = has("radius") || has("pscale");
-  info.has_quality = has("quality") || has("confidence");
-
-  const std::array<std::pair<std::string_view, Role>, 8> roles{
-      {{"x", Role::x},
-       {"y", Role::y},
-       {"z", Role::z},
-       {"nx", Role::nx},
-       {"ny", Role::ny},
-       {"nz", Role::nz},
-       {has("radius") ? "radius" : "pscale", Role::radius},
-       {has("quality") ? "quality" : "confidence", Role::quality}}};
+  require_scalars(vertices, name);
+  rows.info.path = path;
+  rows.info.count = vertices.count;
   for (const PlyProperty& property : vertices.properties) {
-    PlyColumn column{property.name, property.type, rows.stride};
-    const auto known =
-        std::find_if(roles.begin(), roles.end(), [&](const auto& entry) { return entry.first == property.name; });
-    if (known != roles.end()) {
-      column.role = known->second;
-    } else {
-      column.attribute = info.attributes.size();
-      info.attributes.push_back({property.name, property.type});
-    }
-    if (column.role <= Role::z && property.type == ScalarType::float64) info.double_precision = true;
+    rows.columns.push_back({property.name, property.type, rows.stride});
     rows.stride += static_cast<std::size_t>(byte_size(property.type));
-    rows.columns.push_back(std::move(column));
   }
+  give_roles(rows.columns, rows.info, name, "property");
   return rows;
-}
-
-std::vector<ColumnTarget> prepare_batch(const PlyRows& rows, std::uint64_t first, std::size_t count,
-                                        SampleBatch& batch) {
-  const PointSourceInfo& info = rows.info;
-  batch.first = first;
-  for (auto* axis : {&batch.x, &batch.y, &batch.z}) axis->resize(count);
-  for (auto* normal : {&batch.nx, &batch.ny, &batch.nz}) normal->resize(info.has_normals ? count : 0);
-  batch.radius.resize(info.has_radius ? count : 0);
-  batch.quality.resize(info.has_quality ? count : 0);
-  batch.attributes.resize(info.attributes.size());
-  for (auto& attribute : batch.attributes) attribute.resize(count);
-
-  std::vector<ColumnTarget> targets;
-  targets.reserve(rows.columns.size());
-  for (const PlyColumn& column : rows.columns) {
-    switch (column.role) {
-      case Role::x:
-        targets.push_back({.wide = batch.x.data()});
-        break;
-      case Role::y:
-        targets.push_back({.wide = batch.y.data()});
-        break;
-      case Role::z:
-        targets.push_back({.wide = batch.z.data()});
-        break;
-      case Role::nx:
-        targets.push_back({.narrow = batch.nx.data()});
-        break;
-      case Role::ny:
-        targets.push_back({.narrow = batch.ny.data()});
-        break;
-      case Role::nz:
-        targets.push_back({.narrow = batch.nz.data()});
-        break;
-      case Role::radius:
-        targets.push_back({.narrow = batch.radius.data()});
-        break;
-      case Role::quality:
-        targets.push_back({.narrow = batch.quality.data()});
-        break;
-      case Role::attribute:
-        targets.push_back({.narrow = batch.attributes[column.attribute].data()});
-        break;
-    }
-  }
-  return targets;
 }
 
 void report_short_file(const std::string& name, const std::string& element, std::uint64_t promised,

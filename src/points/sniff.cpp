@@ -2,10 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
-#include <charconv>
+#include <vector>
 
 #include "lamina/error.h"
+#include "points/number.h"
+#include "points/point_columns.h"
 
 namespace lamina {
 namespace {
@@ -17,70 +20,183 @@ struct Signature {
   std::string_view what;
 };
 
-constexpr std::string_view kNotYet = "is not read yet; convert it to PLY";
-
 constexpr std::array kSignatures{
-    Signature{"# .PCD", "looks like a PCD file: PCD is not read yet; convert it to PLY"},
-    Signature{"ASTM-E57", "looks like an E57 file: E57 is not read yet; convert it to PLY"},
-    Signature{"\x1f\x8b"sv, "is compressed with gzip; unpack it, or pipe it in: zcat FILE | lamina ... -"},
+    Signature{"ASTM-E57",
+              "is an E57 file, which is not read; convert it: CloudCompare -O FILE -C_EXPORT_FMT PLY -SAVE_CLOUDS, or "
+              "pdal translate FILE.e57 FILE.las"},
     Signature{"PK\x03\x04"sv, "is a zip archive; unpack it"},
     Signature{"\x28\xb5\x2f\xfd"sv, "is compressed with zstd; unpack it, or pipe it in: zstdcat FILE | lamina ... -"},
-    Signature{"\x20\x42\x44\x56"sv, "looks like an OpenVDB file, which holds no points read here; give a PLY"},
-    Signature{"OFF", "looks like an OFF mesh; give a point cloud as PLY"},
-    Signature{"solid ", "looks like an STL mesh; give a point cloud as PLY"},
+    Signature{"OFF", "looks like an OFF mesh; give a point cloud, for example as PLY"},
+    Signature{"COFF", "looks like an OFF mesh; give a point cloud, for example as PLY"},
+    Signature{"NOFF", "looks like an OFF mesh; give a point cloud, for example as PLY"},
+    Signature{"solid ", "looks like an STL mesh; give a point cloud, for example as PLY"},
     Signature{"version https://git-lfs", "is a Git LFS pointer, not the file itself; fetch it with: git lfs pull"},
     Signature{"<!DOCTYPE", "is a web page (a download that went wrong?)"},
     Signature{"<html", "is a web page (a download that went wrong?)"},
 };
 
-/// Numbers on the first line that is not a comment; 0 when something else stands there.
-int numbers_on_first_line(std::string_view text) {
-  while (!text.empty() && (text.front() == '#' || text.starts_with("//"))) {
-    const std::size_t end = text.find('\n');
-    if (end == std::string_view::npos) return 0;
-    text.remove_prefix(end + 1);
-  }
-  text = text.substr(0, text.find_first_of("\r\n"));
-  int numbers = 0;
-  for (;;) {
-    const std::size_t begin = text.find_first_not_of(" \t,;");
-    if (begin == std::string_view::npos) return numbers;
-    text.remove_prefix(begin);
-    double value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (error != std::errc{}) return 0;
-    text.remove_prefix(static_cast<std::size_t>(end - text.data()));
-    if (!text.empty() && " \t,;"sv.find(text.front()) == std::string_view::npos) return 0;
-    ++numbers;
-  }
+constexpr std::string_view kKnown = "PLY, OBJ, XYZ, PTS, ASC, CSV, PWN, PTX, PCD, LAS and OpenVDB points are read";
+
+constexpr std::array kTextEndings{".xyz"sv, ".pts"sv,  ".asc"sv,    ".csv"sv, ".pwn"sv, ".txt"sv,
+                                  ".neu"sv, ".xyzn"sv, ".xyzrgb"sv, ".3d"sv,  ".dat"sv};
+constexpr std::array kOtherEndings{".ply"sv, ".obj"sv, ".ptx"sv, ".pcd"sv, ".las"sv};
+
+std::string ending_of(std::string_view name) {
+  std::string lower;
+  for (const char c : name) lower += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  if (lower.ends_with(".gz")) lower.resize(lower.size() - 3);
+  const std::size_t dot = lower.find_last_of("./");
+  return dot == std::string::npos || lower[dot] == '/' ? "" : lower.substr(dot);
+}
+
+template <class Endings>
+bool is_one_of(const Endings& endings, const std::string& ending) {
+  return std::find(endings.begin(), endings.end(), ending) != endings.end();
 }
 
 /// LAZ shares LAS's signature and marks itself in the point format.
 bool is_laz(std::string_view start) {
   constexpr std::size_t kPointFormat = 104;
-  return start.size() > kPointFormat && (static_cast<unsigned char>(start[kPointFormat]) & 0x80U) != 0;
+  return start.size() > kPointFormat && (static_cast<unsigned char>(start[kPointFormat]) & 0xC0U) != 0;
+}
+
+/// The next line with something on it, words apart; comments are skipped where `comments` says so.
+class Lines {
+ public:
+  explicit Lines(std::string_view text) : text_(text) {}
+
+  bool next(std::vector<std::string_view>& words, bool comments = true) {
+    while (!text_.empty()) {
+      const std::size_t end = std::min(text_.find_first_of("\r\n"), text_.size());
+      const std::string_view line = text_.substr(0, end);
+      text_.remove_prefix(std::min(end + 1, text_.size()));
+      split(line, words);
+      if (!words.empty() && (!comments || !(words[0].starts_with('#') || words[0].starts_with("//")))) return true;
+    }
+    return false;
+  }
+
+ private:
+  static void split(std::string_view line, std::vector<std::string_view>& words) {
+    constexpr std::string_view kBetween = " \t\v\f,;";
+    words.clear();
+    for (std::size_t at = 0; words.size() < 256;) {
+      at = line.find_first_not_of(kBetween, at);
+      if (at == std::string_view::npos) return;
+      const std::size_t end = std::min(line.find_first_of(kBetween, at), line.size());
+      words.push_back(line.substr(at, end - at));
+      at = end;
+    }
+  }
+
+  std::string_view text_;
+};
+
+bool is_number(std::string_view word) {
+  double value = 0;
+  return parse_number(word.data(), word.data() + word.size(), value) == word.data() + word.size();
+}
+
+std::size_t numbers_in_front(const std::vector<std::string_view>& words) {
+  return static_cast<std::size_t>(std::find_if_not(words.begin(), words.end(), is_number) - words.begin());
+}
+
+bool names_positions(const std::vector<std::string_view>& words) {
+  const auto names = [&](std::string_view wanted) {
+    return std::any_of(words.begin(), words.end(), [&](std::string_view w) {
+      while (w.starts_with('#') || w.starts_with('/')) w.remove_prefix(1);
+      return usual_name(w) == wanted;
+    });
+  };
+  return names("x") && names("y") && names("z");
+}
+
+/// Two counts, the scanner's place and axes, and a matrix.
+bool is_ptx(std::string_view start) {
+  constexpr std::array<std::size_t, 10> kNumbers{1, 1, 3, 3, 3, 3, 4, 4, 4, 4};
+  Lines lines(start);
+  std::vector<std::string_view> words;
+  return std::all_of(kNumbers.begin(), kNumbers.end(), [&](std::size_t n) {
+    return lines.next(words) && words.size() == n && numbers_in_front(words) == n;
+  });
+}
+
+bool is_obj_keyword(std::string_view word) {
+  constexpr std::array kWords{"v"sv, "vn"sv, "vt"sv,     "vp"sv,     "f"sv, "o"sv,
+                              "g"sv, "s"sv,  "mtllib"sv, "usemtl"sv, "l"sv, "p"sv};
+  return is_one_of(kWords, std::string(word));
+}
+
+/// Columns of numbers, after the count some formats begin with or a line of names.
+bool is_columns(std::string_view start) {
+  Lines lines(start);
+  std::vector<std::string_view> words;
+  if (!lines.next(words)) return false;
+  if (words.size() == 1 && is_number(words[0]) && !lines.next(words)) return true;  // an empty cloud's count
+  return numbers_in_front(words) >= 3 || names_positions(words);
 }
 
 std::string describe(std::string_view start) {
-  if (start.empty()) return "is empty; give a PLY point cloud";
-  if (start.starts_with("LASF")) {
-    const std::string_view format = is_laz(start) ? "LAZ" : "LAS";
-    return fmt::format("looks like a {0} file: {0} {1}", format, kNotYet);
-  }
+  if (start.empty()) return "is empty; give a point cloud";
   for (const Signature& signature : kSignatures) {
     if (start.starts_with(signature.start)) return std::string(signature.what);
   }
-  if (const int numbers = numbers_on_first_line(start); numbers >= 3) {
-    return fmt::format("looks like a plain text cloud ({} numbers on a line): XYZ {}", numbers, kNotYet);
-  }
-  return "is not a PLY file (it does not begin with 'ply')";
+  if (is_scan_list(start)) return "is a list of scans; give it as a file of its own, not through a pipe or in gzip";
+  return fmt::format("is no point file known here; {}", kKnown);
+}
+
+bool is_ply(std::string_view start) {
+  return start.starts_with("ply") && (start.size() == 3 || "\r\n \t"sv.find(start[3]) != std::string_view::npos);
+}
+
+bool is_pcd(std::string_view start) {
+  if (start.starts_with("# .PCD")) return true;
+  Lines lines(start);
+  std::vector<std::string_view> words;
+  return lines.next(words) && (words[0] == "VERSION" || words[0] == "FIELDS") && words.size() >= 2;
 }
 
 }  // namespace
 
-void require_ply(std::string_view start, const std::string& name) {
-  if (start.size() > 3 && start.starts_with("ply") && "\r\n \t"sv.find(start[3]) != std::string_view::npos) return;
-  if (start == "ply") throw Error(ExitCode::unreadable, name + ": the PLY header ends after its first line");
+bool is_scan_list(std::string_view start) {
+  Lines lines(start);
+  std::vector<std::string_view> words;
+  return lines.next(words) && (words[0] == "bmesh" || words[0] == "mesh" || words[0] == "camera") && words.size() >= 8;
+}
+
+bool has_point_ending(std::string_view name) {
+  const std::string ending = ending_of(name);
+  return is_one_of(kTextEndings, ending) || is_one_of(kOtherEndings, ending);
+}
+
+PointFormat detect_format(std::string_view start, const std::string& name) {
+  if (is_ply(start)) return PointFormat::ply;
+  if (start.starts_with("\x20\x42\x44\x56"sv)) return PointFormat::vdb;
+  if (start.starts_with("LASF")) {
+    if (is_laz(start)) {
+      throw Error(ExitCode::unreadable,
+                  fmt::format("{}: is a LAZ file (compressed LAS), which is not read; unpack it: laszip -i FILE.laz -o "
+                              "FILE.las, or pdal translate FILE.laz FILE.las",
+                              name));
+    }
+    return PointFormat::las;
+  }
+  const bool refused = std::any_of(kSignatures.begin(), kSignatures.end(),
+                                   [&](const Signature& s) { return start.starts_with(s.start); });
+  if (!refused && !start.empty() && start.find('\0') == std::string_view::npos) {
+    if (is_pcd(start)) return PointFormat::pcd;
+    if (is_ptx(start)) return PointFormat::ptx;
+    Lines lines(start);
+    std::vector<std::string_view> words;
+    const bool something = lines.next(words);
+    if (something && is_obj_keyword(words[0])) return PointFormat::obj;
+    if (is_columns(start)) return PointFormat::text;
+    const std::string ending = ending_of(name);
+    if (ending == ".obj") return PointFormat::obj;
+    if (is_one_of(kTextEndings, ending) && !is_scan_list(start)) return PointFormat::text;
+  } else if (!refused && is_pcd(start.substr(0, std::min(start.find('\0'), start.size())))) {
+    return PointFormat::pcd;
+  }
   throw Error(ExitCode::unreadable, fmt::format("{}: {}", name, describe(start)));
 }
 

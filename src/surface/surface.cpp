@@ -61,15 +61,39 @@ std::string temporary_directory(const SurfaceSettings& settings, const RunContex
   return parent.empty() ? "." : parent;
 }
 
+std::vector<std::string> input_names(const SurfaceSettings& settings) {
+  std::vector<std::string> names{settings.input};
+  names.insert(names.end(), settings.more_inputs.begin(), settings.more_inputs.end());
+  return names;
+}
+
 /// A mesh in the place of its points would cost the user the scan.
 void require_two_files(const SurfaceSettings& settings) {
   std::error_code ignored;
-  if (settings.input == "-" || settings.output == "-" || settings.output.empty()) return;
-  if (std::filesystem::is_regular_file(settings.output, ignored) &&
-      std::filesystem::equivalent(settings.input, settings.output, ignored)) {
-    throw Error(ExitCode::usage,
-                fmt::format("{}: is input and output; give the mesh another name with --output", settings.output));
+  if (settings.output == "-" || settings.output.empty()) return;
+  if (!std::filesystem::is_regular_file(settings.output, ignored)) return;
+  for (const PointInput& input : expand_inputs(input_names(settings))) {
+    if (std::filesystem::equivalent(input.path, settings.output, ignored)) {
+      throw Error(ExitCode::usage,
+                  fmt::format("{}: is input and output; give the mesh another name with --output", settings.output));
+    }
   }
+}
+
+/// Everything named, as one stream; says what the readers found worth saying.
+std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const std::string& tmp_dir,
+                                         const RunContext& run) {
+  std::unique_ptr<PointSource> source = open_points(input_names(settings), {tmp_dir, settings.columns});
+  const PointSourceInfo& info = source->info();
+  for (const std::string& remark : info.remarks) run.info(remark);
+  if (info.geographic) {
+    throw Error(ExitCode::unreadable,
+                fmt::format("{}: x and y are degrees of longitude and latitude, in which no distance can be measured; "
+                            "project them to metres first, for example to the UTM zone: pdal translate IN.las OUT.las "
+                            "reprojection --filters.reprojection.out_srs=EPSG:326ZONE",
+                            info.path));
+  }
+  return source;
 }
 
 /// Float positions keep a hundredth of a cell as long as the coordinates are below some ten thousand cells;
@@ -222,7 +246,7 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
     const MeshSink trial(out);
   }
 
-  const std::unique_ptr<PointSource> source = open_points(settings.input, tmp);
+  const std::unique_ptr<PointSource> source = open_inputs(settings, tmp, run);
   const PointSourceInfo& info = source->info();
   Frame frame;
   std::optional<Ingested> ingested = read_input(*source, settings, tmp, run, watch, frame);

@@ -6,13 +6,13 @@
 #include <cmath>
 
 #include "lamina/error.h"
-#include "lamina/version.h"
 #include "measure/edge_table.h"
 #include "meshes/output_file.h"
 #include "meshes/vec3.h"
 #include "meshes/with_threads.h"
 #include "volume/level_set.h"
 #include "volume/vdb_bytes.h"
+#include "volume/vdb_file.h"
 
 namespace lamina {
 namespace {
@@ -73,6 +73,12 @@ openvdb::math::Transform::Ptr choose_transform(const TriangleMesh& mesh, double 
   if (0.5 * extent / voxel + band > kLargest || reach / voxel > kLargest * kFromOrigin)
     usage(fmt::format("--voxel {:g}: too small for a mesh of this size ({:g}, coordinates up to {:g})", voxel, extent,
                       reach));
+  // OpenVDB takes a smaller voxel for a singular transform.
+  constexpr double kSmallest = 1.5e-5;
+  if (voxel < kSmallest) {
+    usage(fmt::format("--voxel {:g}: OpenVDB holds none below {:g}; scale the mesh up, or use a larger one", voxel,
+                      kSmallest));
+  }
   auto transform = openvdb::math::Transform::createLinearTransform(voxel);
   if (reach / voxel <= kFromOrigin) return transform;
   openvdb::Vec3d middle;
@@ -106,12 +112,6 @@ void check_half(double voxel, double band, const RunContext& run) {
     run.warn(fmt::format("16-bit distances are coarse for voxels of {:g}; leave out --half", voxel));
 }
 
-void describe(openvdb::GridBase& grid, const std::string& name, bool half) {
-  grid.setName(name);
-  grid.setCreator(fmt::format("lamina {}", version()));
-  grid.setSaveFloatAsHalf(half);
-}
-
 bool decide_sign(const VolumeSettings& s, std::uint64_t boundary_edges, const RunContext& run) {
   if (s.sign == VolumeSign::none) return false;
   if (boundary_edges == 0) return true;
@@ -141,12 +141,12 @@ VolumeStats convert(const TriangleMesh& mesh, const VolumeSettings& s, const std
   const auto distances = volume::distance_grid(mesh, triangles, *transform, s.band, stats.has_sign, run);
   stats.voxels = distances->activeVoxelCount();
   distances->setGridClass(stats.has_sign ? openvdb::GRID_LEVEL_SET : openvdb::GRID_UNKNOWN);
-  describe(*distances, s.name, s.half);
+  volume::label(*distances, s.name, s.half);
   openvdb::GridCPtrVec grids{distances};
   if (const auto colours = s.colours ? volume::colour_grid(mesh, triangles, *distances) : nullptr) {
     stats.has_colours = true;
     colours->setVectorType(openvdb::VEC_INVARIANT);
-    describe(*colours, "Cd", s.half);
+    volume::label(*colours, "Cd", s.half);
     grids.push_back(colours);
   }
   if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");

@@ -244,7 +244,7 @@ TEST(OpenPoints, StandardInputFromAFileNeedsNoCopy) {
   const int file = ::open(test::write_file(folder / "a.ply", "skip" + text).c_str(), O_RDONLY);
   {
     const test::Redirected standard_input(STDIN_FILENO, file);
-    EXPECT_THAT(refusal("-", folder / "none"), HasSubstr("standard input: is not a PLY file"));
+    EXPECT_THAT(refusal("-", folder / "none"), HasSubstr("standard input: is no point file"));
     ::lseek(file, 4, SEEK_SET);  // begun: taken like a pipe
     EXPECT_EQ(open_points("-", folder.path())->info().count, 1);
   }
@@ -269,13 +269,13 @@ TEST(OpenPoints, StandardInputErrorsNameIt) {
     return refusal("-", tmp_dir);
   };
   EXPECT_THAT(from_pipe("", folder.path()), HasSubstr("standard input: is empty"));
-  EXPECT_THAT(from_pipe("LASF....", folder.path()), HasSubstr("standard input: looks like a LAS file"));
+  EXPECT_THAT(from_pipe("LASF....", folder.path()), HasSubstr("standard input: the LAS header is cut short"));
   EXPECT_THAT(from_pipe("ply\nformat ascii 1.0\n", folder / "none"), HasSubstr("cannot make a temporary file here"));
 }
 
 TEST(OpenPoints, NamedPipesAndEndlessDevices) {
   const test::TemporaryFolder folder;
-  EXPECT_THAT(refusal("/dev/zero", folder.path()), HasSubstr("/dev/zero: is not a PLY file"));
+  EXPECT_THAT(refusal("/dev/zero", folder.path()), HasSubstr("/dev/zero: is no point file"));
   const std::string fifo = folder / "pipe.ply";
   ASSERT_EQ(::mkfifo(fifo.c_str(), 0600), 0);
   std::thread writer([&] {

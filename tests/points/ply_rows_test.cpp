@@ -66,7 +66,7 @@ TEST(PlyRows, RefusesWhatMakesNoPoints) {
   EXPECT_THAT(refusal(header_with(kXyz + "property list uchar int ids\n")),
               HasSubstr("property 'ids' of the vertices is a list"));
   EXPECT_THAT(refusal(header_with(kXyz + "property float y\n")),
-              HasSubstr("property 'y' of the vertices is there twice"));
+              HasSubstr("property 'y' of the points is there twice"));
   EXPECT_THAT(refusal(header_with(kXyz + "element vertex 3\n")), HasSubstr("two elements 'vertex'"));
   const auto without = parse_ply_header("ply\nformat ascii 1.0\nelement face 1\nelement edge 0\nend_header\n", "a.ply");
   EXPECT_THAT(refusal(without), HasSubstr("no element 'vertex'; its elements are: 'face', 'edge'"));
@@ -78,7 +78,7 @@ TEST(PlyRows, BatchKeepsOnlyWhatTheSourceHas) {
   batch.nx.resize(9);
   batch.radius.resize(9);
   batch.attributes.resize(4);
-  const auto targets = prepare_batch(rows, 3, 2, batch);
+  const auto targets = prepare_batch(rows.info, rows.columns, 3, 2, batch);
   EXPECT_EQ(batch.first, 3);
   EXPECT_EQ(batch.size(), 2);
   EXPECT_TRUE(batch.nx.empty() && batch.radius.empty());

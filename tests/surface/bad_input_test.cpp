@@ -58,9 +58,12 @@ class SurfaceBadInput : public ::testing::Test {
 
 TEST_F(SurfaceBadInput, FilesThatAreNoClouds) {
   expect_failure(ExitCode::unreadable, {"none.ply", "No such file"}, folder_ / "none.ply");
-  expect_failure(ExitCode::unreadable, {folder_.path(), "directory"}, folder_.path());
+  expect_failure(ExitCode::unreadable, {"none", "no point files"}, [&] {
+    std::filesystem::create_directory(folder_ / "none");
+    return folder_ / "none";
+  }());
   expect_failure(ExitCode::unreadable, {"empty.ply", "empty"}, test::write_file(folder_ / "empty.ply", ""));
-  expect_failure(ExitCode::unreadable, {"text.ply", "not a PLY"}, test::write_file(folder_ / "text.ply", "hello"));
+  expect_failure(ExitCode::unreadable, {"text.ply", "no point file"}, test::write_file(folder_ / "text.ply", "hello"));
 }
 
 TEST_F(SurfaceBadInput, FilesCutShortAnywhere) {

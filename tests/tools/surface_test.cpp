@@ -4,10 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "lamina/mesh.h"
+#include "lamina/points.h"
 #include "support/program.h"
 #include "surface/clouds.h"
 
@@ -199,13 +201,39 @@ TEST_F(SurfaceTool, WordsAndNumbersThatCannotBeMeant) {
       {{"--density", "1"}, "--density"},
       {{"--tmp-dir", folder_ / "none"}, "--tmp-dir"},
       {{"--blnd", "2"}, "did you mean '--blend'"},
-      {{"more.ply"}, "more.ply"}};
+      {{"--columns", "x,y"}, "--columns"}};
   for (const auto& [options, word] : wrong) expect_failure(run(options), 2, {word});
+}
+
+TEST_F(SurfaceTool, SeveralInputsAreOneCloud) {
+  // Two halves of the sphere, one as text and turned, give the mesh of the whole.
+  ASSERT_EQ(run({"--quiet"}).code, 0);
+  const std::string whole = test::read_file(mesh_);
+  const auto source = open_points(cloud_);
+  SampleBatch batch;
+  source->read(0, 4000, batch);
+  std::string first;
+  std::string second;
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    // x y z becomes y -x z: a quarter turn, undone by the pose.
+    const bool turned = i >= 1234;
+    (turned ? second : first) +=
+        fmt::format("{} {} {} {} {} {}\n", turned ? batch.y[i] : batch.x[i], turned ? -batch.x[i] : batch.y[i],
+                    batch.z[i], turned ? batch.ny[i] : batch.nx[i], turned ? -batch.nx[i] : batch.ny[i], batch.nz[i]);
+  }
+  test::write_file(tmp_ + "/a.xyz", first);
+  test::write_file(tmp_ + "/b.xyz", second);
+  test::write_file(tmp_ + "/b.txt", "0 -1 0 0\n1 0 0 0\n0 0 1 0\n0 0 0 1\n");
+  const auto outcome = run_lamina({"surface", tmp_ + "/a.xyz", tmp_ + "/b.xyz@" + tmp_ + "/b.txt", "-o", mesh_});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.err, HasSubstr("columns taken as x,y,z,nx,ny,nz"));
+  EXPECT_TRUE(test::read_file(mesh_) == whole);
+  EXPECT_EQ(run_lamina({"surface", tmp_ + "/a.xyz", "-q", "-o", tmp_ + "/a.xyz"}).code, 2);
 }
 
 TEST_F(SurfaceTool, BadInputExitsAsDocumented) {
   expect_failure(run_lamina({"surface", folder_ / "none.ply", "-o", mesh_}), 3, {"none.ply"});
-  expect_failure(run_lamina({"surface", folder_.path(), "-o", mesh_}), 3, {folder_.path(), "directory"});
+  expect_failure(run_lamina({"surface", tmp_, "-o", mesh_}), 3, {tmp_, "no point files"});
   expect_failure(run_lamina({"surface", "-", "-o", mesh_}), 3, {"standard input", "empty"});
   expect_failure(run_lamina({"surface", cloud_, "-o", folder_ / "no/mesh.ply"}), 4, {"no/mesh.ply", "does not exist"});
   expect_failure(run_lamina({"surface", cloud_, "-o", tmp_}), 4, {tmp_, "directory"});

@@ -218,6 +218,9 @@ TEST_F(Volume, RefusesWhatCannotBeMeant) {
   };
   EXPECT_EQ(code(mesh, {.voxel = -1}, path_), ExitCode::usage);
   EXPECT_EQ(code(mesh, {.voxel = 1e-12}, path_), ExitCode::usage);
+  EXPECT_EQ(code(test::sphere(1e-4, 8), {.voxel = 1e-5}, path_), ExitCode::usage);
+  EXPECT_EQ(code(test::sphere(1e-4, 8), {.voxel = 1.6e-5}, path_), ExitCode::ok);
+  std::filesystem::remove(path_);
   EXPECT_EQ(code(mesh, {.band = 0.5}, path_), ExitCode::usage);
   EXPECT_EQ(code(mesh, {.name = "Cd"}, path_), ExitCode::usage);
   EXPECT_EQ(code(mesh, {.voxel = 1e5, .half = true}, path_), ExitCode::usage);

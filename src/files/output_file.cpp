@@ -1,4 +1,4 @@
-#include "mesh_sink/output_file.h"
+#include "files/output_file.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -55,7 +55,7 @@ OutputFile::OutputFile(const std::string& path, const std::string& tmp_dir) : na
   if (path == "-") {
     name_ = "standard output";
     if (::isatty(STDOUT_FILENO) == 1) {
-      throw Error(ExitCode::usage, "standard output is a terminal; name an output file or pipe the mesh on");
+      throw Error(ExitCode::usage, "standard output is a terminal; name an output file or pipe it on");
     }
   }
   if (streams_) {

@@ -1,0 +1,86 @@
+// lamina attribtransfer: attributes from points to a mesh.
+#include <fmt/format.h>
+
+#include <map>
+#include <memory>
+
+#include "console.h"
+#include "inputs.h"
+#include "lamina/attribute_transfer.h"
+#include "lamina/error.h"
+#include "text.h"
+#include "tool.h"
+
+namespace lamina::tools {
+namespace {
+
+struct TransferOptions {
+  std::string mesh, points, output;
+  TransferSettings settings;
+  RunOptions run;
+};
+
+void run_transfer(const TransferOptions& o) {
+  if (o.mesh == "-" && o.points == "-")
+    throw Error(ExitCode::usage, "MESH and POINTS both name standard input; give one of them a file");
+  const RunContext context = make_context(o.run);
+  TriangleMesh mesh = read_mesh_input(o.mesh, o.run.tmp_dir);
+  const auto points = open_points(o.points, o.run.tmp_dir);
+  const TransferReport report = transfer_attributes(*points, mesh, o.settings, context);
+  write_mesh(mesh, o.output);
+  if (report.unreachable > 0) {
+    context.warn(fmt::format("{} of {} vertices have no point near enough; they keep the mesh's values, or get 0",
+                             report.unreachable, mesh.positions.size()));
+  }
+  context.info(fmt::format("{} points gave {} vertices their attributes", count_text(report.points),
+                           count_text(mesh.positions.size() - report.unreachable)));
+}
+
+}  // namespace
+
+void add_attribtransfer(CLI::App& app) {
+  auto* tool = app.add_subcommand("attribtransfer", "Give a mesh's vertices the attributes of the points around them");
+  auto o = std::make_shared<TransferOptions>();
+  tool->add_option_function<std::string>(
+          "MESH", [o](const std::string& name) { o->mesh = pipe_name(name); },
+          "Mesh to give them to; - for PLY on standard input")
+      ->required()
+      ->type_name("");
+  tool->add_option_function<std::string>(
+          "POINTS", [o](const std::string& name) { o->points = pipe_name(name); },
+          "Points to take them from (streamed)")
+      ->required()
+      ->type_name("");
+  tool->add_option_function<std::string>(
+          "-o,--output", [o](const std::string& name) { o->output = pipe_name(name); },
+          "Mesh to write; - for PLY on standard output")
+      ->required()
+      ->type_name("FILE")
+      ->group("Output");
+  const std::string group = "Transfer";
+  tool->add_option("--attributes", o->settings.attributes, "Names, separated by commas; without it all")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->type_name("NAME,...")
+      ->group(group);
+  const std::map<std::string, TransferMode> words{{"nearest", TransferMode::nearest},
+                                                  {"weighted", TransferMode::weighted}};
+  tool->add_option_function<std::string>(
+          "--mode", [o, words](const std::string& word) { o->settings.mode = words.at(word); },
+          "The nearest point's value, or the weighted mean of the points in reach [nearest]")
+      ->check(CLI::IsMember({"nearest", "weighted"}).description(""))
+      ->type_name("nearest|weighted")
+      ->group(group);
+  tool->add_option("--distance", o->settings.distance,
+                   "Reach; 0: nearest: no limit, weighted: twice the points' own radii")
+      ->type_name("LENGTH")
+      ->capture_default_str()
+      ->group(group);
+  add_run_options(*tool, o->run);
+  add_examples(*tool,
+               "  lamina attribtransfer mesh.ply scan.ply --attributes red,green,blue -o coloured.ply\n"
+               "  lamina attribtransfer mesh.ply scan.ply --mode weighted --distance 0.2 -o smooth.ply");
+  tool->callback([o] { run_transfer(*o); });
+}
+
+}  // namespace lamina::tools

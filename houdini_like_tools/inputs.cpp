@@ -1,0 +1,61 @@
+#include "inputs.h"
+
+#include <map>
+
+namespace lamina::tools {
+void add_precision(CLI::App& app, Precision& precision) {
+  const std::map<std::string, Precision> words{
+      {"auto", Precision::automatic}, {"float", Precision::single_precision}, {"double", Precision::double_precision}};
+  app.add_option_function<std::string>(
+         "--precision", [&precision, words](const std::string& word) { precision = words.at(word); },
+         "Positions as float or double; auto: as in the input, double where float would lose detail [auto]")
+      ->check(CLI::IsMember({"auto", "float", "double"}).description(""))
+      ->type_name("auto|float|double")
+      ->group("Output");
+}
+
+void add_bad_samples(CLI::App& app, BadSamples& bad) {
+  const std::map<std::string, BadSamples> words{{"drop", BadSamples::drop}, {"refuse", BadSamples::refuse}};
+  app.add_option_function<std::string>(
+         "--bad-samples", [&bad, words](const std::string& word) { bad = words.at(word); },
+         "Points that are not finite: leave out, or refuse the file [drop]")
+      ->check(CLI::IsMember({"drop", "refuse"}).description(""))
+      ->type_name("drop|refuse")
+      ->group("Input");
+}
+
+void add_files(CLI::App& app, std::string& input, const std::string& input_formats, std::string& output,
+               const std::string& output_formats) {
+  app.add_option_function<std::string>(
+         "INPUT", [&input](const std::string& name) { input = pipe_name(name); },
+         input_formats + "; - for PLY on standard input")
+      ->required()
+      ->type_name("");
+  app.add_option_function<std::string>(
+         "-o,--output", [&output](const std::string& name) { output = pipe_name(name); },
+         output_formats + "; - for PLY on standard output")
+      ->required()
+      ->type_name("FILE")
+      ->group("Output");
+}
+
+PointColumns with_precision(PointColumns columns, Precision precision) {
+  if (precision != Precision::automatic) columns.double_positions = precision == Precision::double_precision;
+  return columns;
+}
+
+std::string shown_name(const std::string& path) {
+  return path == "-" ? "standard input" : path;
+}
+
+TriangleMesh read_mesh_input(const std::string& path, const std::string& tmp_dir, NonFinite non_finite) {
+  const std::string name = pipe_name(path);
+  if (name == "-") content_of(name, tmp_dir);
+  return read_mesh(name, non_finite);
+}
+
+void add_examples(CLI::App& tool, const std::string& lines) {
+  tool.footer("Examples:\n" + lines);
+}
+
+}  // namespace lamina::tools

@@ -1,0 +1,39 @@
+// What the tools share about the files they read and write.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <string>
+
+#include "console.h"
+#include "lamina/info.h"
+#include "lamina/mesh.h"
+#include "lamina/points.h"
+#include "lamina/points_writer.h"
+#include "lamina/surface.h"
+
+namespace lamina::tools {
+
+/// How positions are written.
+enum class Precision { automatic, single_precision, double_precision };
+
+/// --precision auto|float|double, in the group "Output".
+void add_precision(CLI::App& app, Precision& precision);
+/// --bad-samples drop|refuse, in the group "Input".
+void add_bad_samples(CLI::App& app, BadSamples& bad);
+/// INPUT and -o, --output, both required; `formats` says what they can be.
+void add_files(CLI::App& app, std::string& input, const std::string& input_formats, std::string& output,
+               const std::string& output_formats);
+
+/// The columns with their positions in the precision asked for.
+PointColumns with_precision(PointColumns columns, Precision precision);
+
+/// "standard input" for "-".
+std::string shown_name(const std::string& path);
+
+/// read_mesh(), also from standard input.
+TriangleMesh read_mesh_input(const std::string& path, const std::string& tmp_dir = {},
+                             NonFinite non_finite = NonFinite::refuse);
+
+/// What a tool's help ends with: command lines that work as they stand (the tests run them).
+void add_examples(CLI::App& tool, const std::string& lines);
+
+}  // namespace lamina::tools

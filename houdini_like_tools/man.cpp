@@ -1,0 +1,165 @@
+// lamina man: manual pages, made from the tools' own options.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "lamina/error.h"
+#include "lamina/version.h"
+#include "option_table.h"
+#include "result_file.h"
+#include "tool.h"
+
+namespace lamina::tools {
+namespace {
+
+/// Text as roff shows it literally.
+std::string literal(std::string_view text) {
+  std::string out;
+  bool line_start = true;
+  for (const char c : text) {
+    if (line_start && (c == '.' || c == '\'')) out += "\\&";
+    line_start = c == '\n';
+    if (c == '\\') {
+      out += "\\e";
+    } else if (c == '-') {
+      out += "\\-";
+    } else {
+      out += c;
+    }
+  }
+  return out;
+}
+
+std::string title(const std::string& page) {
+  return fmt::format(".TH {} 1 \"\" \"lamina {}\" \"Lamina\"\n", page, version());
+}
+
+std::string synopsis(const CLI::App& tool) {
+  std::string text = fmt::format(".SH SYNOPSIS\n.B lamina {}\n", tool.get_name());
+  for (const OptionEntry& entry : option_table(tool)) {
+    if (!entry.positional) continue;
+    const std::string name = literal(entry.names.front());
+    text += entry.required ? fmt::format(".I {}\n", name) : fmt::format("[\\fI{}\\fR]\n", name);
+  }
+  for (const OptionEntry& entry : option_table(tool)) {
+    if (!entry.positional && entry.required)
+      text += fmt::format("\\fB{}\\fR \\fI{}\\fR\n", literal(entry.names.back()), literal(entry.value));
+  }
+  return text + "[\\fIOPTIONS\\fR]\n";
+}
+
+std::string entry_text(const OptionEntry& entry) {
+  std::string names;
+  for (const std::string& name : entry.names) {
+    names += (names.empty() ? "" : ", ") + fmt::format("\\fB{}\\fR", literal(name));
+  }
+  if (!entry.value.empty()) names += fmt::format(" \\fI{}\\fR", literal(entry.value));
+  std::string text = fmt::format(".TP\n{}\n{}", names, literal(entry.description));
+  if (!entry.fallback.empty()) text += literal(fmt::format(" [{}]", entry.fallback));
+  return text + ".\n";
+}
+
+std::string options(const CLI::App& tool) {
+  const std::vector<OptionEntry> table = option_table(tool);
+  std::vector<std::string> groups;
+  for (const OptionEntry& entry : table) {
+    if (std::find(groups.begin(), groups.end(), entry.group) == groups.end()) groups.push_back(entry.group);
+  }
+  std::string text = ".SH OPTIONS\n";
+  for (const std::string& group : groups) {
+    text += fmt::format(".SS {}\n", literal(group));
+    for (const OptionEntry& entry : table)
+      if (entry.group == group) text += entry_text(entry);
+  }
+  return text;
+}
+
+/// The footer's lines that are indented.
+std::string examples(const CLI::App& tool) {
+  const std::string footer = tool.get_footer();
+  if (footer.empty()) return {};
+  std::string text = ".SH EXAMPLES\n.nf\n";
+  for (std::size_t at = 0; at < footer.size();) {
+    const std::size_t end = std::min(footer.find('\n', at), footer.size());
+    const std::string_view line = std::string_view(footer).substr(at, end - at);
+    if (line.starts_with("  ")) text += literal(line.substr(2)) + "\n";
+    at = end + 1;
+  }
+  return text + ".fi\n";
+}
+
+std::string exit_status() {
+  constexpr std::array<const char*, 7> kMeanings{"done",
+                                                 "a defect of the program, or cancelled",
+                                                 "options that cannot be meant",
+                                                 "input missing, truncated, of another format, or without what the job "
+                                                 "needs",
+                                                 "memory or disk: does not fit, ran out, or the output cannot be "
+                                                 "written",
+                                                 "nothing came out",
+                                                 "lamina check \\-\\-expect: the mesh is not what was promised"};
+  std::string text = ".SH EXIT STATUS\n";
+  for (std::size_t code = 0; code < kMeanings.size(); ++code)
+    text += fmt::format(".TP\n.B {}\n{}.\n", code, kMeanings.at(code));
+  return text;
+}
+
+std::string tool_page(const CLI::App& tool) {
+  const std::string page = "lamina-" + tool.get_name();
+  return title(page) + fmt::format(".SH NAME\n{} \\- {}\n", literal(page), literal(tool.get_description())) +
+         synopsis(tool) + options(tool) + examples(tool) + exit_status() + ".SH SEE ALSO\n.BR lamina (1)\n";
+}
+
+std::string main_page(const CLI::App& app) {
+  std::string text = title("lamina") + ".SH NAME\nlamina \\- streaming surface reconstruction from oriented points\n" +
+                     ".SH SYNOPSIS\n.B lamina\n.I TOOL\n[\\fIARGUMENTS\\fR]\n.SH TOOLS\n";
+  std::string pages;
+  for (const CLI::App* tool : shown_tools(app)) {
+    text += fmt::format(".TP\n.B {}\n{}.\n", literal(tool->get_name()), literal(tool->get_description()));
+    pages += fmt::format("{}.BR lamina\\-{} (1)", pages.empty() ? "" : ",\n", literal(tool->get_name()));
+  }
+  return text + exit_status() + ".SH SEE ALSO\n" + pages + "\n";
+}
+
+struct ManOptions {
+  std::string tool, folder;
+};
+
+void run_man(const CLI::App& app, const ManOptions& o) {
+  if (!o.folder.empty()) {
+    const std::filesystem::path folder = o.folder;
+    ResultFile((folder / "lamina.1").string()).write(main_page(app));
+    for (const CLI::App* tool : shown_tools(app))
+      ResultFile((folder / ("lamina-" + tool->get_name() + ".1")).string()).write(tool_page(*tool));
+    return;
+  }
+  if (o.tool.empty()) {
+    fmt::print("{}", main_page(app));
+    return;
+  }
+  for (const CLI::App* tool : shown_tools(app)) {
+    if (tool->get_name() != o.tool) continue;
+    fmt::print("{}", tool_page(*tool));
+    return;
+  }
+  throw Error(ExitCode::usage, fmt::format("man: there is no tool '{}'", o.tool));
+}
+
+}  // namespace
+
+void add_man(CLI::App& app) {
+  auto* tool = app.add_subcommand("man", "Print a manual page, for man -l -")->group("");
+  auto o = std::make_shared<ManOptions>();
+  tool->add_option("TOOL", o->tool, "The tool's page; without it the program's");
+  tool->add_option("--all", o->folder, "Write all pages into this folder instead")
+      ->check(CLI::ExistingDirectory)
+      ->type_name("DIR");
+  tool->callback([&app, o] { run_man(app, *o); });
+}
+
+}  // namespace lamina::tools

@@ -1,0 +1,105 @@
+// lamina merge: several clouds or meshes in one file.
+#include "lamina/merge.h"
+
+#include <fmt/format.h>
+
+#include <map>
+#include <memory>
+
+#include "console.h"
+#include "inputs.h"
+#include "lamina/error.h"
+#include "text.h"
+#include "tool.h"
+
+namespace lamina::tools {
+namespace {
+
+struct MergeOptions {
+  std::vector<std::string> inputs;
+  std::string output;
+  MixedAttributes mixed = MixedAttributes::refuse;
+  BadSamples bad = BadSamples::drop;
+  Precision precision = Precision::automatic;
+  RunOptions run;
+};
+
+void merge_points(const MergeOptions& o, const RunContext& context) {
+  std::vector<std::unique_ptr<PointSource>> sources;
+  std::vector<const PointSourceInfo*> infos;
+  for (const std::string& input : o.inputs) {
+    sources.push_back(open_points(input, o.run.tmp_dir));
+    infos.push_back(&sources.back()->info());
+  }
+  const auto writer = open_points_writer(o.output, with_precision(merged_columns(infos, o.mixed), o.precision),
+                                         {.count = {}, .tmp_dir = o.run.tmp_dir});
+  for (const auto& source : sources)
+    warn_of_bad_rows(append_points(*source, *writer, o.bad, context), shown_name(source->info().path), context);
+  writer->commit();
+  context.info(fmt::format("{} points of {} files", count_text(writer->rows()), sources.size()));
+}
+
+void merge_triangles(const MergeOptions& o, const RunContext& context) {
+  std::vector<TriangleMesh> meshes;
+  for (const std::string& input : o.inputs) meshes.push_back(read_mesh(input));
+  const TriangleMesh merged = merge_meshes(std::move(meshes), o.inputs, o.mixed);
+  write_mesh(merged, o.output);
+  context.info(fmt::format("{} vertices, {} triangles of {} files", count_text(merged.positions.size()),
+                           count_text(merged.triangles.size()), o.inputs.size()));
+}
+
+void run_merge(const MergeOptions& o) {
+  const RunContext context = make_context(o.run);
+  const auto word = [](FileContent content) {
+    return content == FileContent::points ? "points" : content == FileContent::mesh ? "a mesh" : "a volume";
+  };
+  const FileContent first = content_of(o.inputs.front(), o.run.tmp_dir);
+  for (const std::string& input : o.inputs) {
+    const FileContent content = input == o.inputs.front() ? first : content_of(input, o.run.tmp_dir);
+    if (content != first)
+      throw Error(ExitCode::usage,
+                  fmt::format("{} holds {}, {} holds {}: only files of a kind can be merged",
+                              shown_name(o.inputs.front()), word(first), shown_name(input), word(content)));
+  }
+  if (first == FileContent::volume) throw Error(ExitCode::usage, o.inputs.front() + ": volumes cannot be merged");
+  first == FileContent::points ? merge_points(o, context) : merge_triangles(o, context);
+}
+
+}  // namespace
+
+void add_merge(CLI::App& app) {
+  auto* tool = app.add_subcommand("merge", "Put several clouds, or several meshes, into one file");
+  auto o = std::make_shared<MergeOptions>();
+  tool->add_option_function<std::vector<std::string>>(
+          "INPUT",
+          [o](const std::vector<std::string>& names) {
+            for (const std::string& name : names) o->inputs.push_back(pipe_name(name));
+          },
+          "Points (streamed) or meshes, in the order in which they are to stand; - for PLY on standard input")
+      ->required()
+      ->expected(1, 1000000)
+      ->type_name("");
+  tool->add_option_function<std::string>(
+          "-o,--output", [o](const std::string& name) { o->output = pipe_name(name); },
+          "File of the same kind; - for PLY on standard output")
+      ->required()
+      ->type_name("FILE")
+      ->group("Output");
+  const std::map<std::string, MixedAttributes> words{
+      {"refuse", MixedAttributes::refuse}, {"fill", MixedAttributes::fill}, {"intersect", MixedAttributes::intersect}};
+  tool->add_option_function<std::string>(
+          "--mixed", [o, words](const std::string& word) { o->mixed = words.at(word); },
+          "Attributes that not all have: refuse; fill with 0; intersect: leave out [refuse]")
+      ->check(CLI::IsMember({"refuse", "fill", "intersect"}).description(""))
+      ->type_name("refuse|fill|intersect")
+      ->group("Input");
+  add_bad_samples(*tool, o->bad);
+  add_precision(*tool, o->precision);
+  add_run_options(*tool, o->run);
+  add_examples(*tool,
+               "  lamina merge scan.ply more.ply -o both.ply\n"
+               "  lamina merge scan.ply plain.ply --mixed intersect -o common.ply");
+  tool->callback([o] { run_merge(*o); });
+}
+
+}  // namespace lamina::tools

@@ -1,0 +1,58 @@
+#include "numbers.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <cmath>
+
+namespace lamina::tools {
+namespace {
+
+std::vector<double> numbers_or_usage(const std::string& name, const std::string& text, char separator,
+                                     std::size_t count, const std::string& form) {
+  auto values = read_numbers(text, separator, count);
+  if (!values) throw CLI::ValidationError(name, fmt::format("'{}' is not of the form {}", text, form));
+  return *values;
+}
+
+}  // namespace
+
+std::optional<std::vector<double>> read_numbers(std::string_view text, char separator, std::size_t count) {
+  std::vector<double> values(count);
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    if (i > 0 && (at == end || *at++ != separator)) return std::nullopt;
+    const auto [rest, error] = std::from_chars(at, end, values[i]);
+    if (error != std::errc{} || !std::isfinite(values[i])) return std::nullopt;
+    at = rest;
+  }
+  if (at != end) return std::nullopt;
+  return values;
+}
+
+CLI::Option* add_numbers(CLI::App& app, const std::string& name, char separator, std::size_t count,
+                         const std::string& form, const std::string& description,
+                         const std::function<void(const std::vector<double>&)>& take) {
+  return app
+      .add_option_function<std::string>(
+          name, [=](const std::string& text) { take(numbers_or_usage(name, text, separator, count, form)); },
+          description)
+      ->type_name(form);
+}
+
+CLI::Option* add_repeated_numbers(CLI::App& app, const std::string& name, std::size_t count, const std::string& form,
+                                  const std::string& description,
+                                  const std::function<void(const std::vector<double>&)>& take) {
+  return app
+      .add_option_function<std::vector<std::string>>(
+          name,
+          [=](const std::vector<std::string>& texts) {
+            for (const std::string& text : texts) take(numbers_or_usage(name, text, ',', count, form));
+          },
+          description)
+      ->type_name(form)
+      ->allow_extra_args(false);
+}
+
+}  // namespace lamina::tools

@@ -1,0 +1,26 @@
+// Options whose value is several numbers in one word, such as 1024x768 or 0.5,1,2.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace lamina::tools {
+
+/// Exactly `count` finite numbers between separators; nothing when the text is anything else.
+std::optional<std::vector<double>> read_numbers(std::string_view text, char separator, std::size_t count);
+
+/// Adds an option of that form. It may be given again only when `take` is meant to be called for each.
+CLI::Option* add_numbers(CLI::App& app, const std::string& name, char separator, std::size_t count,
+                         const std::string& form, const std::string& description,
+                         const std::function<void(const std::vector<double>&)>& take);
+
+/// An option that can be repeated, `take` being called once for each.
+CLI::Option* add_repeated_numbers(CLI::App& app, const std::string& name, std::size_t count, const std::string& form,
+                                  const std::string& description,
+                                  const std::function<void(const std::vector<double>&)>& take);
+
+}  // namespace lamina::tools

@@ -1,0 +1,133 @@
+// lamina transform: move, turn and scale points or a mesh.
+#include "lamina/transform.h"
+
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "console.h"
+#include "inputs.h"
+#include "lamina/edit_points.h"
+#include "lamina/error.h"
+#include "numbers.h"
+#include "text.h"
+#include "tool.h"
+
+namespace lamina::tools {
+namespace {
+
+struct TransformOptions {
+  std::string input, output;
+  TransformSettings settings;
+  Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
+  bool has_matrix = false, invert = false;
+  BadSamples bad = BadSamples::drop;
+  Precision precision = Precision::automatic;
+  RunOptions run;
+};
+
+Eigen::Affine3d affine(const TransformOptions& o) {
+  Eigen::Affine3d t = make_transform(o.settings);
+  if (o.has_matrix) {
+    require_invertible(o.matrix);
+    t = Eigen::Affine3d(o.matrix);
+  }
+  return o.invert ? t.inverse() : t;
+}
+
+/// The box of the moved points' box: enough to know whether floats will do.
+bool needs_double(PointSource& source, const Eigen::Affine3d& transform, const RunContext& context) {
+  const PointsInfo info = describe_points(source, context);
+  Eigen::AlignedBox3d box;
+  for (int corner = 0; corner < 8; ++corner) {
+    const auto at = [&](int k) { return (corner >> k & 1) != 0 ? info.high.at(k) : info.low.at(k); };
+    box.extend(transform * Eigen::Vector3d(at(0), at(1), at(2)));
+  }
+  return wants_double(box.min(), box.max());
+}
+
+void transform_points(const TransformOptions& o, const Eigen::Affine3d& transform, const RunContext& context) {
+  const auto source = open_points(o.input, o.run.tmp_dir);
+  PointColumns columns = with_precision(columns_of(source->info()), o.precision);
+  if (o.precision == Precision::automatic && !columns.double_positions)
+    columns.double_positions = needs_double(*source, transform, context);
+  const auto writer = open_points_writer(o.output, columns, {.count = {}, .tmp_dir = o.run.tmp_dir});
+  const EditReport report = edit_points(
+      *source, *writer, [&](SampleBatch& batch) { transform_rows(batch, transform); }, o.bad, context);
+  warn_of_bad_rows(report, shown_name(o.input), context);
+  writer->commit();
+  context.info(fmt::format("moved {} points", count_text(report.written)));
+}
+
+void transform_triangles(const TransformOptions& o, const Eigen::Affine3d& transform, const RunContext& context) {
+  TriangleMesh mesh = read_mesh(o.input);
+  transform_mesh(mesh, transform);
+  write_mesh(mesh, o.output);
+  context.info(fmt::format("moved {} vertices", count_text(mesh.positions.size())));
+}
+
+void run_transform(const TransformOptions& o) {
+  const Eigen::Affine3d transform = affine(o);
+  const RunContext context = make_context(o.run);
+  switch (content_of(o.input, o.run.tmp_dir)) {
+    case FileContent::points:
+      return transform_points(o, transform, context);
+    case FileContent::mesh:
+      return transform_triangles(o, transform, context);
+    case FileContent::volume:
+      throw Error(ExitCode::usage, o.input + ": volumes cannot be transformed; convert it to a mesh first");
+  }
+}
+
+Eigen::Vector3d vector(const std::vector<double>& v) {
+  return {v[0], v[1], v[2]};
+}
+
+}  // namespace
+
+void add_transform(CLI::App& app) {
+  auto* tool = app.add_subcommand("transform", "Move, turn and scale points or a mesh, normals with them");
+  auto o = std::make_shared<TransformOptions>();
+  add_files(*tool, o->input, "Points (streamed) or mesh", o->output, "File of the same kind");
+  const std::string group = "Transform";
+  tool->add_option_function<std::string>(
+          "--scale",
+          [o](const std::string& text) {
+            auto v = read_numbers(text, ',', 3);
+            if (!v) {
+              if (const auto one = read_numbers(text, ',', 1)) v = {(*one)[0], (*one)[0], (*one)[0]};
+            }
+            if (!v) throw CLI::ValidationError("--scale", fmt::format("'{}' is not of the form S or X,Y,Z", text));
+            o->settings.scale = vector(*v);
+          },
+          "First: multiply by this, one number or one for each axis")
+      ->type_name("S|X,Y,Z")
+      ->group(group);
+  add_numbers(*tool, "--rotate", ',', 3, "X,Y,Z", "Then turn about the x, then the y, then the z axis, degrees",
+              [o](const auto& v) { o->settings.rotate = vector(v); })
+      ->group(group);
+  add_numbers(*tool, "--translate", ',', 3, "X,Y,Z", "Last: move by this", [o](const auto& v) {
+    o->settings.translate = vector(v);
+  })->group(group);
+  add_numbers(*tool, "--pivot", ',', 3, "X,Y,Z", "Turn and scale about this point [0,0,0]", [o](const auto& v) {
+    o->settings.pivot = vector(v);
+  })->group(group);
+  auto* matrix =
+      add_numbers(*tool, "--matrix", ',', 16, "M11,M12,...,M44",
+                  "Instead: a 4x4 matrix row by row, the translation in the last column", [o](const auto& v) {
+                    o->has_matrix = true;
+                    for (int i = 0; i < 16; ++i) o->matrix(i / 4, i % 4) = v[static_cast<std::size_t>(i)];
+                  });
+  matrix->group(group);
+  for (const char* other : {"--scale", "--rotate", "--translate", "--pivot"}) matrix->excludes(tool->get_option(other));
+  tool->add_flag("--invert", o->invert, "Undo the transform instead")->group(group);
+  add_bad_samples(*tool, o->bad);
+  add_precision(*tool, o->precision);
+  add_run_options(*tool, o->run);
+  add_examples(*tool,
+               "  lamina transform scan.ply --scale 0.001 --rotate -90,0,0 -o metres_y_up.ply\n"
+               "  lamina transform mesh.ply --translate -10,0,2.5 -o moved.obj");
+  tool->callback([o] { run_transform(*o); });
+}
+
+}  // namespace lamina::tools

@@ -1,0 +1,50 @@
+// Point clouds as OpenVDB points grids, and back.
+#pragma once
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "lamina/attributes.h"
+#include "lamina/run.h"
+#include "lamina/sample.h"
+
+namespace lamina {
+
+/// A whole cloud in memory: plain arrays and the names and types of `samples.attributes`.
+struct PointArrays {
+  SampleBatch samples;
+  AttributeLayout layout;
+};
+
+struct PointVolumeSettings {
+  std::string name = "points";
+  double voxel =
+      0;  ///< edge of a voxel, world units, rounded down to a power of two, 2^-16 at least; 0: some eight points
+};
+
+struct PointVolumeStats {
+  std::uint64_t points = 0, voxels = 0, bytes = 0;
+  double voxel = 0;  ///< as written
+};
+
+/// Writes one points grid: `P`, `N`, `pscale` (radius), `quality`, `Cd` (red green blue, in 0..1), `Alpha`, and every
+/// other attribute by its name as float or int32; the types they came in are kept as metadata. Positions that are
+/// floats come back as the same bits, doubles to 2^-25 of a voxel: the voxel is a power of two and georeferenced
+/// coordinates are offset in the transform. Points are ordered by voxel, then as they came. The bytes are the same for
+/// any number of threads. "-" is standard output.
+/// Throws Error: usage (settings; arrays of unequal length; an attribute's name twice), empty (no points), unreadable
+/// (a coordinate that is not finite, naming the row), budget (cannot be written).
+PointVolumeStats write_point_volume(const PointArrays& points, const PointVolumeSettings& settings,
+                                    const std::string& path, const RunContext& run = {});
+
+struct PointVolume {
+  PointArrays points;
+  std::vector<std::string> skipped;  ///< attributes of other types: text, matrices, groups, arrays
+};
+
+/// Reads the points grid called `grid`, or the file's first. `P` in any precision or compression; `N`; `pscale` or
+/// `radius`; `quality` or `confidence`; `Cd` becomes red, green, blue (in the type it was written from, else float
+/// 0..1); other vectors V become V_x, V_y, V_z. Throws Error(unreadable) naming the file and what is wrong.
+PointVolume read_point_volume(const std::string& path, const std::string& grid = {});
+
+}  // namespace lamina

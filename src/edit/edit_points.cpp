@@ -1,0 +1,111 @@
+#include "lamina/edit_points.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+
+#include "edit/batch_pipe.h"
+#include "lamina/error.h"
+
+namespace lamina {
+namespace {
+
+bool is_finite_row(const SampleBatch& b, std::size_t i) {
+  bool good = std::isfinite(b.x[i]) && std::isfinite(b.y[i]) && std::isfinite(b.z[i]);
+  if (!b.nx.empty()) good = good && std::isfinite(b.nx[i]) && std::isfinite(b.ny[i]) && std::isfinite(b.nz[i]);
+  if (!b.radius.empty()) good = good && std::isfinite(b.radius[i]);
+  if (!b.quality.empty()) good = good && std::isfinite(b.quality[i]);
+  return good;
+}
+
+template <class T>
+std::uint64_t replace_non_finite(std::vector<T>& values) {
+  std::uint64_t replaced = 0;
+  for (T& value : values) {
+    if (std::isfinite(value)) continue;
+    value = 0;
+    ++replaced;
+  }
+  return replaced;
+}
+
+template <class T>
+void keep_values(std::vector<T>& values, const std::vector<std::uint8_t>& keep) {
+  if (values.empty()) return;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < keep.size(); ++i) {
+    if (keep[i] != 0) values[kept++] = values[i];
+  }
+  values.resize(kept);
+}
+
+}  // namespace
+
+EditReport clean_rows(SampleBatch& batch) {
+  EditReport report;
+  report.read = batch.size();
+  std::vector<std::uint8_t> keep(batch.size());
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    keep[i] = is_finite_row(batch, i) ? 1 : 0;
+    if (keep[i] != 0) continue;
+    if (report.bad_rows++ == 0) report.first_bad_row = batch.first + i;
+  }
+  if (report.bad_rows > 0) keep_rows(batch, keep);
+  for (std::size_t a = 0; a < batch.attributes.size(); ++a) {
+    // A double may be finite where the float beside it is not.
+    const bool exact = a < batch.exact.size() && !batch.exact[a].empty();
+    const std::uint64_t floats = replace_non_finite(batch.attributes[a]);
+    report.replaced_values += exact ? replace_non_finite(batch.exact[a]) : floats;
+  }
+  return report;
+}
+
+void add(EditReport& total, const EditReport& batch) {
+  total.read += batch.read;
+  total.bad_rows += batch.bad_rows;
+  total.replaced_values += batch.replaced_values;
+  if (batch.first_bad_row) total.first_bad_row = std::min(*batch.first_bad_row, total.first_bad_row.value_or(~0ULL));
+}
+
+void refuse_bad_row(const EditReport& report, const std::string& path) {
+  throw Error(ExitCode::unreadable, fmt::format("{}: row {} (counted from 0) is not finite; clean the file or use "
+                                                "--bad-samples drop",
+                                                path, report.first_bad_row.value_or(0)));
+}
+
+void keep_rows(SampleBatch& batch, const std::vector<std::uint8_t>& keep) {
+  for (auto* axis : {&batch.x, &batch.y, &batch.z}) keep_values(*axis, keep);
+  for (auto* column : {&batch.nx, &batch.ny, &batch.nz, &batch.radius, &batch.quality}) keep_values(*column, keep);
+  for (auto& values : batch.attributes) keep_values(values, keep);
+  for (auto& values : batch.exact) keep_values(values, keep);
+}
+
+EditReport edit_points(PointSource& source, PointsWriter& writer, const EditBatch& edit, BadSamples bad,
+                       const RunContext& run) {
+  EditReport total;
+  std::mutex mutex;
+  const auto work = [&](SampleBatch& batch) {
+    const EditReport part = clean_rows(batch);
+    if (part.bad_rows > 0 && bad == BadSamples::refuse) refuse_bad_row(part, source.info().path);
+    if (edit) edit(batch);
+    const std::lock_guard lock(mutex);
+    add(total, part);
+  };
+  edit::for_each_batch(source, "write", run, work, [&](SampleBatch& batch) { writer.append(batch); });
+  total.written = writer.rows();
+  return total;
+}
+
+void warn_of_bad_rows(const EditReport& report, const std::string& path, const RunContext& run) {
+  if (report.bad_rows > 0) {
+    run.warn(fmt::format("{}: {} of {} rows are not finite, the first is row {} (counted from 0); dropped", path,
+                         report.bad_rows, report.read, *report.first_bad_row));
+  }
+  if (report.replaced_values > 0) {
+    run.warn(fmt::format("{}: {} attribute values are not finite; they become 0", path, report.replaced_values));
+  }
+}
+
+}  // namespace lamina

@@ -1,0 +1,129 @@
+#include "edit/record_sorter.h"
+
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <cstring>
+#include <numeric>
+#include <queue>
+#include <utility>
+
+namespace lamina::edit {
+namespace {
+
+constexpr std::size_t kKeyBytes = sizeof(std::uint64_t);
+constexpr std::size_t kLeastRecords = 64;
+constexpr std::size_t kMostRecords = std::size_t{1} << 30;
+
+}  // namespace
+
+/// Part of the file, sorted, and the piece of it that is in memory.
+struct RecordSorter::Run {
+  std::uint64_t next = 0, end = 0;  ///< bytes in the file not yet in memory
+  std::vector<std::byte> piece;
+  std::size_t at = 0;  ///< of the first record in `piece` not given back
+
+  /// False when the run has ended.
+  bool load(const TempFile& file, std::size_t bytes) {
+    if (at < piece.size()) return true;
+    piece.resize(static_cast<std::size_t>(std::min<std::uint64_t>(bytes, end - next)));
+    at = 0;
+    if (piece.empty()) return false;
+    file.read(next, piece);
+    next += piece.size();
+    return true;
+  }
+  [[nodiscard]] std::uint64_t key() const {
+    std::uint64_t key = 0;
+    std::memcpy(&key, piece.data() + at, kKeyBytes);
+    return key;
+  }
+};
+
+RecordSorter::RecordSorter(std::size_t record_bytes, std::size_t memory_bytes, std::string directory)
+    : record_bytes_(record_bytes),
+      // A record waits with its key and its place in the order.
+      capacity_(
+          std::clamp(memory_bytes / (record_bytes + kKeyBytes + sizeof(std::uint32_t)), kLeastRecords, kMostRecords)),
+      records_(std::make_unique_for_overwrite<std::byte[]>(capacity_ * record_bytes)),
+      file_(std::move(directory)) {}
+
+RecordSorter::~RecordSorter() = default;
+
+void RecordSorter::add(std::span<const std::uint64_t> keys, const std::byte* records) {
+  size_ += keys.size();
+  while (!keys.empty()) {
+    const std::size_t n = std::min(keys.size(), capacity_ - held_);
+    keys_.insert(keys_.end(), keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(n));
+    std::memcpy(records_.get() + held_ * record_bytes_, records, n * record_bytes_);
+    held_ += n;
+    records += n * record_bytes_;
+    keys = keys.subspan(n);
+    if (held_ == capacity_) spill();
+  }
+}
+
+void RecordSorter::sort_held() {
+  order_.resize(held_);
+  std::iota(order_.begin(), order_.end(), 0u);
+  // By key, then by place: the order is total, so the sort need not be stable.
+  tbb::parallel_sort(order_.begin(), order_.end(),
+                     [&](std::uint32_t a, std::uint32_t b) { return std::pair(keys_[a], a) < std::pair(keys_[b], b); });
+}
+
+void RecordSorter::spill() {
+  sort_held();
+  Run run;
+  run.next = file_.size();
+  std::vector<std::byte> record(kKeyBytes + record_bytes_);
+  for (const std::uint32_t i : order_) {
+    std::memcpy(record.data(), &keys_[i], kKeyBytes);
+    std::memcpy(record.data() + kKeyBytes, records_.get() + std::size_t{i} * record_bytes_, record_bytes_);
+    file_.append(record);
+  }
+  run.end = file_.size();
+  runs_.push_back(std::move(run));
+  held_ = 0;
+  keys_.clear();
+}
+
+void RecordSorter::drain(std::size_t batch, const Take& take) {
+  std::vector<std::uint64_t> keys;
+  std::vector<std::byte> records;
+  const auto give = [&](std::uint64_t key, const std::byte* record) {
+    keys.push_back(key);
+    records.insert(records.end(), record, record + record_bytes_);
+    if (keys.size() < batch) return;
+    take(keys, records.data());
+    keys.clear();
+    records.clear();
+  };
+  if (runs_.empty()) {
+    // All of it fitted: nothing went to the file.
+    sort_held();
+    for (const std::uint32_t i : order_) give(keys_[i], records_.get() + std::size_t{i} * record_bytes_);
+  } else {
+    if (held_ > 0) spill();
+    file_.flush();
+    const std::size_t whole = kKeyBytes + record_bytes_;
+    const std::size_t piece =
+        std::max<std::size_t>(kLeastRecords, capacity_ * record_bytes_ / runs_.size() / whole) * whole;
+    records_.reset();
+    using Front = std::pair<std::uint64_t, std::size_t>;  // key and run: equal keys by run, as they came
+    std::priority_queue<Front, std::vector<Front>, std::greater<>> fronts;
+    for (std::size_t r = 0; r < runs_.size(); ++r) {
+      if (runs_[r].load(file_, piece)) fronts.emplace(runs_[r].key(), r);
+    }
+    while (!fronts.empty()) {
+      const auto [key, r] = fronts.top();
+      fronts.pop();
+      Run& run = runs_[r];
+      give(key, run.piece.data() + run.at + kKeyBytes);
+      run.at += whole;
+      if (run.load(file_, piece)) fronts.emplace(run.key(), r);
+    }
+  }
+  if (!keys.empty()) take(keys, records.data());
+}
+
+}  // namespace lamina::edit

@@ -1,0 +1,47 @@
+// Sorting more records than fit into memory: sorted runs in an unnamed file, merged when they are read.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "slab_store/temp_file.h"
+
+namespace lamina::edit {
+
+/// Records of fixed size with a key each. Equal keys keep the order in which they came. Memory is bounded by
+/// `memory_bytes`, whatever the number of records and however their keys are spread; the file takes 8 bytes and the
+/// record for each. The result does not depend on the number of threads.
+class RecordSorter {
+ public:
+  RecordSorter(std::size_t record_bytes, std::size_t memory_bytes, std::string directory);
+  ~RecordSorter();
+  RecordSorter(const RecordSorter&) = delete;
+  RecordSorter& operator=(const RecordSorter&) = delete;
+
+  /// Adds a record for each key. Throws Error(budget) when the directory cannot take them.
+  void add(std::span<const std::uint64_t> keys, const std::byte* records);
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+
+  /// Gives all records back by ascending key in batches of at most `batch`, once: take(keys, records).
+  using Take = std::function<void(std::span<const std::uint64_t>, const std::byte*)>;
+  void drain(std::size_t batch, const Take& take);
+
+ private:
+  struct Run;
+  void sort_held();
+  void spill();
+
+  std::size_t record_bytes_, capacity_, held_ = 0;
+  std::uint64_t size_ = 0;
+  std::unique_ptr<std::byte[]> records_;
+  std::vector<std::uint64_t> keys_;
+  std::vector<std::uint32_t> order_;  ///< of the held records, once sorted
+  TempFile file_;
+  std::vector<Run> runs_;
+};
+
+}  // namespace lamina::edit

@@ -1,0 +1,190 @@
+// Several sources as one stream of rows.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "lamina/error.h"
+#include "lamina/points.h"
+
+namespace lamina {
+namespace {
+
+bool is_colour(const std::string& name) {
+  return name == "red" || name == "green" || name == "blue" || name == "alpha";
+}
+
+/// What full brightness is in a type; 1 for floats.
+double full(ScalarType type) {
+  switch (type) {
+    case ScalarType::uint8:
+      return 255;
+    case ScalarType::uint16:
+      return 65535;
+    default:
+      return 1;
+  }
+}
+
+/// A type that holds the values of both.
+ScalarType wider(ScalarType a, ScalarType b) {
+  if (a == b) return a;
+  const auto is_unsigned = [](ScalarType t) {
+    return t == ScalarType::uint8 || t == ScalarType::uint16 || t == ScalarType::uint32;
+  };
+  const bool integers = a < ScalarType::float32 && b < ScalarType::float32;
+  if (!integers)
+    return a == ScalarType::float64 || b == ScalarType::float64 ? ScalarType::float64 : ScalarType::float32;
+  if (is_unsigned(a) == is_unsigned(b)) return byte_size(a) >= byte_size(b) ? a : b;
+  return std::max(byte_size(a), byte_size(b)) == 4 ? ScalarType::float64 : ScalarType::int32;
+}
+
+class JoinedPoints final : public PointSource {
+ public:
+  explicit JoinedPoints(std::vector<std::unique_ptr<PointSource>> sources) {
+    info_ = sources.front()->info();
+    info_.count = 0;
+    info_.attributes.clear();
+    info_.remarks.clear();
+    for (auto& source : sources) add(std::move(source));
+    if (sources.size() > 1) info_.path = fmt::format("{} and {} more", info_.path, sources.size() - 1);
+    for (const Part& part : parts_) {
+      const PointSourceInfo& from = part.source->info();
+      if (info_.radius_name.empty()) info_.radius_name = from.radius_name;
+      if (info_.quality_name.empty()) info_.quality_name = from.quality_name;
+    }
+    settle("normals", info_.has_normals, &PointSourceInfo::has_normals);
+    settle("radii", info_.has_radius, &PointSourceInfo::has_radius);
+    if (!info_.has_radius) info_.radius_name.clear();
+    for (Part& part : parts_) map_attributes(part);
+  }
+
+  void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
+    first = std::min(first, info_.count);
+    count = static_cast<std::size_t>(std::min<std::uint64_t>(count, info_.count - first));
+    size_batch(first, count, out);
+    auto part = std::upper_bound(parts_.begin(), parts_.end(), first,
+                                 [](std::uint64_t row, const Part& p) { return row < p.first; });
+    SampleBatch piece;
+    std::size_t done = 0;
+    if (count > 0) --part;
+    for (; done < count; ++part) {
+      const std::uint64_t begin = first + done - part->first;
+      part->source->read(begin, count - done, piece);
+      copy(*part, piece, done, out);
+      done += piece.size();
+    }
+  }
+
+ private:
+  struct Mapped {
+    std::size_t to;
+    double scale;
+  };
+  struct Part {
+    std::uint64_t first = 0;
+    std::unique_ptr<PointSource> source;
+    std::vector<Mapped> attributes;  ///< of the source's
+  };
+
+  void add(std::unique_ptr<PointSource> source) {
+    const PointSourceInfo& from = source->info();
+    if (from.count > std::numeric_limits<std::uint64_t>::max() - info_.count) {
+      throw Error(ExitCode::unreadable, fmt::format("{}: more points than can be counted", from.path));
+    }
+    info_.has_quality = info_.has_quality || from.has_quality;
+    info_.random_access = info_.random_access && from.random_access;
+    info_.double_precision = info_.double_precision || from.double_precision;
+    info_.geographic = info_.geographic || from.geographic;
+    info_.remarks.insert(info_.remarks.end(), from.remarks.begin(), from.remarks.end());
+    for (const AttributeSpec& spec : from.attributes) {
+      const auto known = std::find_if(info_.attributes.begin(), info_.attributes.end(),
+                                      [&](const AttributeSpec& a) { return a.name == spec.name; });
+      if (known == info_.attributes.end()) {
+        info_.attributes.push_back(spec);
+      } else {
+        known->type = wider(known->type, spec.type);
+      }
+    }
+    const std::uint64_t first = info_.count;
+    info_.count += from.count;
+    parts_.push_back({first, std::move(source), {}});
+  }
+
+  /// What only some sources have is dropped, and said so.
+  void settle(const char* what, bool& all, bool PointSourceInfo::*has) {
+    const auto lacks = [&](const Part& p) { return !(p.source->info().*has) && p.source->info().count > 0; };
+    const auto without = std::find_if(parts_.begin(), parts_.end(), lacks);
+    const auto with = std::find_if(parts_.begin(), parts_.end(), [&](const Part& p) { return p.source->info().*has; });
+    all = without == parts_.end() && with != parts_.end();
+    if (!all && with != parts_.end()) {
+      info_.remarks.push_back(fmt::format("{} has no {}, {} has: left out of all", without->source->info().path, what,
+                                          with->source->info().path));
+    }
+  }
+
+  void map_attributes(Part& part) const {
+    for (const AttributeSpec& spec : part.source->info().attributes) {
+      const auto to = std::find_if(info_.attributes.begin(), info_.attributes.end(),
+                                   [&](const AttributeSpec& a) { return a.name == spec.name; });
+      const double scale = is_colour(spec.name) ? full(to->type) / full(spec.type) : 1;
+      part.attributes.push_back({static_cast<std::size_t>(to - info_.attributes.begin()), scale});
+    }
+  }
+
+  void size_batch(std::uint64_t first, std::size_t count, SampleBatch& out) const {
+    out.first = first;
+    for (auto* axis : {&out.x, &out.y, &out.z}) axis->resize(count);
+    for (auto* normal : {&out.nx, &out.ny, &out.nz}) normal->resize(info_.has_normals ? count : 0);
+    out.radius.resize(info_.has_radius ? count : 0);
+    out.quality.assign(info_.has_quality ? count : 0, 1.0F);
+    out.attributes.resize(info_.attributes.size());
+    for (auto& attribute : out.attributes) attribute.assign(count, 0.0F);
+    out.exact.resize(info_.attributes.size());
+    for (std::size_t a = 0; a < info_.attributes.size(); ++a) {
+      out.exact[a].assign(fits_float(info_.attributes[a].type) ? 0 : count, 0.0);
+    }
+  }
+
+  static void copy(const Part& part, const SampleBatch& piece, std::size_t at, SampleBatch& out) {
+    const auto put = [&](const auto& from, auto& to) {
+      if (!from.empty() && !to.empty())
+        std::copy(from.begin(), from.end(), to.begin() + static_cast<std::ptrdiff_t>(at));
+    };
+    put(piece.x, out.x);
+    put(piece.y, out.y);
+    put(piece.z, out.z);
+    put(piece.nx, out.nx);
+    put(piece.ny, out.ny);
+    put(piece.nz, out.nz);
+    put(piece.radius, out.radius);
+    put(piece.quality, out.quality);
+    for (std::size_t a = 0; a < part.attributes.size(); ++a) {
+      const Mapped& mapped = part.attributes[a];
+      if (!out.exact[mapped.to].empty()) {
+        double* exact = out.exact[mapped.to].data() + at;
+        const bool has_exact = a < piece.exact.size() && !piece.exact[a].empty();
+        for (std::size_t i = 0; i < piece.size(); ++i) {
+          *exact++ = mapped.scale * (has_exact ? piece.exact[a][i] : double{piece.attributes[a][i]});
+        }
+      }
+      float* to = out.attributes[mapped.to].data() + at;
+      for (const float value : piece.attributes[a])
+        *to++ = mapped.scale == 1 ? value : static_cast<float>(value * mapped.scale);
+    }
+  }
+
+  std::vector<Part> parts_;
+};
+
+}  // namespace
+
+std::unique_ptr<PointSource> join_points(std::vector<std::unique_ptr<PointSource>> sources) {
+  if (sources.empty()) throw Error(ExitCode::usage, "no point files were named");
+  if (sources.size() == 1) return std::move(sources.front());
+  return std::make_unique<JoinedPoints>(std::move(sources));
+}
+
+}  // namespace lamina

@@ -1,0 +1,43 @@
+// The public header block of a LAS file (ASPRS, "LAS Specification", versions 1.0 to 1.4 R15) and what its variable
+// length records say of coordinates and extra bytes.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "lamina/attributes.h"
+#include "points/input_file.h"
+
+namespace lamina {
+
+/// A value some program put behind the standard ones of every point.
+struct LasExtra {
+  std::string name;  ///< usual_name()
+  ScalarType type = ScalarType::float32;
+  std::size_t offset = 0;  ///< in the point record
+  double scale = 1, shift = 0;
+};
+
+struct LasHeader {
+  int minor = 0;         ///< version 1.minor
+  int point_format = 0;  ///< 0 to 10
+  std::size_t record_bytes = 0;
+  std::uint64_t count = 0;
+  std::uint64_t data = 0;  ///< offset of the first point
+  std::array<double, 3> scale{}, offset{};
+  std::array<double, 3> low{}, high{};  ///< bounding box as the header gives it
+  bool geographic = false;              ///< x and y are degrees
+  std::vector<LasExtra> extras;         ///< of one value each, of a type this library has
+};
+
+/// Throws Error(unreadable) for what no version allows: sizes too small, an unknown point format, a scale of 0, more
+/// points than the file has room for.
+LasHeader read_las_header(const InputFile& file);
+
+/// Bytes of the standard values of a point format, 0 to 10.
+std::size_t las_record_bytes(int point_format);
+/// Offset of red in a record, 0 for formats without colours; green and blue follow, each of 16 bits.
+std::size_t las_colour_offset(int point_format);
+
+}  // namespace lamina

@@ -1,0 +1,60 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <filesystem>
+#include <utility>
+
+#include "lamina/error.h"
+#include "lamina/points_writer.h"
+#include "points/las_points_writer.h"
+#include "points/pcd_points_writer.h"
+#include "points/ply_points_writer.h"
+#include "points/text_points_writer.h"
+
+namespace lamina {
+namespace {
+
+using OpenWriter = std::unique_ptr<PointsWriter> (*)(const std::string&, const PointColumns&,
+                                                     const PointsWriterSettings&);
+
+/// By the ending of the file's name.
+constexpr std::array<std::pair<const char*, OpenWriter>, 5> kFormats{{{".ply", open_ply_points_writer},
+                                                                      {".xyz", open_xyz_points_writer},
+                                                                      {".csv", open_csv_points_writer},
+                                                                      {".pcd", open_pcd_points_writer},
+                                                                      {".las", open_las_points_writer}}};
+
+std::string lower_extension(const std::string& path) {
+  std::string e = std::filesystem::path(path).extension().string();
+  std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return e;
+}
+
+bool is_pipe_or_device(const std::string& path) {
+  std::error_code ignored;
+  const auto kind = std::filesystem::status(path, ignored).type();
+  return kind == std::filesystem::file_type::fifo || kind == std::filesystem::file_type::character ||
+         kind == std::filesystem::file_type::socket;
+}
+
+}  // namespace
+
+PointColumns columns_of(const PointSourceInfo& info) {
+  return {info.double_precision, info.has_normals, info.radius_name, info.quality_name, info.attributes};
+}
+
+std::unique_ptr<PointsWriter> open_points_writer(const std::string& path, const PointColumns& columns,
+                                                 const PointsWriterSettings& settings) {
+  const std::string extension = lower_extension(path);
+  std::string known;
+  for (const auto& [ending, open] : kFormats) {
+    if (extension == ending) return open(path, columns, settings);
+    known += (known.empty() ? "" : ", ") + std::string(ending);
+  }
+  if (path == "-" || is_pipe_or_device(path)) return open_ply_points_writer(path, columns, settings);
+  throw Error(ExitCode::usage, fmt::format("{}: unknown point format to write; known are {}", path, known));
+}
+
+}  // namespace lamina

@@ -1,0 +1,180 @@
+#include "points/pcd_points.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "lamina/error.h"
+#include "points/binary_rows.h"
+#include "points/little_endian.h"
+#include "points/lzf.h"
+#include "points/pcd_ascii.h"
+#include "points/pcd_header.h"
+
+namespace lamina {
+namespace {
+
+struct BinaryColumns {
+  std::vector<PointColumn> columns;      ///< offsets from the beginning of a point
+  std::vector<std::size_t> field_begin;  ///< of the field a column is part of
+  std::vector<std::size_t> field_bytes;
+};
+
+BinaryColumns binary_columns(const PcdHeader& header) {
+  BinaryColumns found;
+  std::vector<PointColumn>& columns = found.columns;
+  std::size_t offset = 0;
+  for (const PcdField& field : header.fields) {
+    if (is_packed(field)) {
+      for (std::size_t k = 0; k < pcd_channels(field); ++k) {
+        const std::size_t channel = k < 3 ? 2 - k : k;  // red first
+        if (!has_column(columns, kPcdChannels[channel]))
+          columns.push_back({kPcdChannels[channel], ScalarType::uint8, offset + channel});
+      }
+    } else if (field.name != "_" && field.count == 1 && field.type) {
+      columns.push_back({field.name, *field.type, offset});
+    }
+    found.field_begin.resize(columns.size(), offset);
+    found.field_bytes.resize(columns.size(), field.bytes);
+    offset += field.bytes * field.count;
+  }
+  return found;
+}
+
+void remark(const PcdHeader& header, const std::string& name, PointSourceInfo& info) {
+  std::string left_out;
+  for (const PcdField& field : header.fields) {
+    if (field.name != "_" && (field.count != 1 || !field.type))
+      left_out += (left_out.empty() ? "" : ", ") + quoted(field.name);
+  }
+  if (!left_out.empty())
+    info.remarks.push_back(fmt::format("{}: fields left out: {} (several values, or 64-bit integers)", name, left_out));
+  if (header.has_viewpoint)
+    info.remarks.push_back(
+        fmt::format("{}: points are taken as they stand; the file's VIEWPOINT is not applied", name));
+}
+
+void require_size(const InputFile& file, std::uint64_t have, std::uint64_t points, std::size_t point_bytes) {
+  if (points > have / point_bytes) {
+    throw Error(
+        ExitCode::unreadable,
+        fmt::format("{}: the header promises {} points, the file holds {} of {} bytes each: it was cut short or the "
+                    "header's count is wrong",
+                    file.name, points, have / point_bytes, point_bytes));
+  }
+  // Nothing but a wrong count leaves more than a rest of padding.
+  constexpr std::uint64_t kPadding = 4096;
+  if (have - points * point_bytes > kPadding) {
+    throw Error(ExitCode::unreadable,
+                fmt::format("{}: {} bytes follow the last point the header promises: a count or a field "
+                            "in the header is wrong",
+                            file.name, have - points * point_bytes));
+  }
+}
+
+class BinaryPcd final : public PointSource {
+ public:
+  BinaryPcd(InputFile file, const PcdHeader& header, PointSourceInfo info) : file_(std::move(file)) {
+    layout_ = {header.bytes, header.point_bytes(), false};
+    require_size(file_, file_.bytes - header.bytes, header.points, layout_.stride);
+    columns_ = binary_columns(header).columns;
+    info_ = std::move(info);
+    info_.random_access = true;
+    give_roles(columns_, info_, file_.name, "field");
+  }
+
+  void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
+    first = std::min(first, info_.count);
+    count = static_cast<std::size_t>(std::min<std::uint64_t>(count, info_.count - first));
+    read_binary_rows(file_, layout_, columns_, first, count, prepare_batch(info_, columns_, first, count, out));
+    round_exact_attributes(out);
+  }
+
+ private:
+  InputFile file_;
+  BinaryRows layout_;
+  std::vector<PointColumn> columns_;
+};
+
+/// Unpacked, the values lie field by field: each column is a file of its own, so to speak.
+class CompressedPcd final : public PointSource {
+ public:
+  CompressedPcd(const InputFile& file, const PcdHeader& header, PointSourceInfo info, const std::string& tmp_dir)
+      : file_(unpack(file, header, tmp_dir)) {
+    BinaryColumns found = binary_columns(header);
+    columns_ = std::move(found.columns);
+    for (std::size_t c = 0; c < columns_.size(); ++c) {
+      layouts_.push_back({found.field_begin[c] * header.points, found.field_bytes[c], false});
+      columns_[c].offset -= found.field_begin[c];
+    }
+    info_ = std::move(info);
+    info_.random_access = true;
+    give_roles(columns_, info_, file_.name, "field");
+  }
+
+  void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
+    first = std::min(first, info_.count);
+    count = static_cast<std::size_t>(std::min<std::uint64_t>(count, info_.count - first));
+    const std::vector<ColumnTarget> targets = prepare_batch(info_, columns_, first, count, out);
+    for (std::size_t c = 0; c < columns_.size(); ++c) {
+      read_binary_rows(file_, layouts_[c], {columns_[c]}, first, count, {targets[c]});
+    }
+    round_exact_attributes(out);
+  }
+
+ private:
+  static InputFile unpack(const InputFile& file, const PcdHeader& header, const std::string& tmp_dir) {
+    std::array<std::byte, 8> sizes{};
+    if (file.read(header.bytes, sizes.data(), sizes.size()) < sizes.size()) {
+      throw Error(ExitCode::unreadable, fmt::format("{}: ends before the compressed data", file.name));
+    }
+    const auto packed = load_little<std::uint32_t>(sizes.data());
+    const auto unpacked = load_little<std::uint32_t>(sizes.data() + 4);
+    const std::uint64_t begin = header.bytes + sizes.size();
+    if (packed > file.bytes - begin) {
+      throw Error(ExitCode::unreadable,
+                  fmt::format("{}: {} bytes of compressed data promised (at byte {}), the file holds {}: "
+                              "it was cut short",
+                              file.name, packed, header.bytes, file.bytes - begin));
+    }
+    const std::size_t point_bytes = header.point_bytes();
+    if (unpacked / point_bytes != header.points || unpacked % point_bytes != 0) {
+      throw Error(
+          ExitCode::unreadable,
+          fmt::format("{}: {} points of {} bytes are promised, but the data unpack to {} (at byte {}): a number in "
+                      "the header is wrong",
+                      file.name, header.points, point_bytes, unpacked, header.bytes + 4));
+    }
+    Spool spool(file.name, tmp_dir);
+    unpack_lzf(file, begin, packed, unpacked, spool);
+    return spool.finish();
+  }
+
+  InputFile file_;
+  std::vector<PointColumn> columns_;
+  std::vector<BinaryRows> layouts_;
+};
+
+}  // namespace
+
+std::unique_ptr<PointSource> open_pcd(InputFile file, const std::string& path, const std::string& tmp_dir) {
+  std::string start(static_cast<std::size_t>(std::min<std::uint64_t>(file.bytes, kSniffBytes)), '\0');
+  start.resize(file.read(0, start.data(), start.size()));
+  const PcdHeader header = parse_pcd_header(start, file.name);
+  PointSourceInfo info;
+  info.path = path;
+  info.count = header.points;
+  remark(header, file.name, info);
+  switch (header.data) {
+    case PcdData::ascii:
+      return open_ascii_pcd(std::move(file), header, std::move(info));
+    case PcdData::binary:
+      return std::make_unique<BinaryPcd>(std::move(file), header, std::move(info));
+    case PcdData::binary_compressed:
+      break;
+  }
+  return std::make_unique<CompressedPcd>(file, header, std::move(info), tmp_dir);
+}
+
+}  // namespace lamina

@@ -1,0 +1,90 @@
+#include "points/pose_transform.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "lamina/error.h"
+
+namespace lamina {
+
+PoseTransform::PoseTransform(const Pose& pose, const std::string& name) : pose_(pose) {
+  const auto refuse = [&](const char* what) {
+    throw Error(
+        ExitCode::unreadable,
+        fmt::format("{}: {}; a pose is 16 numbers, row by row: rotation and translation, and 0 0 0 1", name, what));
+  };
+  for (const auto& row : pose) {
+    if (!std::all_of(row.begin(), row.end(), [](double v) { return std::isfinite(v); }))
+      refuse("the pose is not finite");
+  }
+  constexpr double kTolerance = 1e-9;
+  for (std::size_t c = 0; c < 4; ++c) {
+    if (std::abs(pose[3][c] - (c == 3 ? 1 : 0)) > kTolerance) refuse("the pose's last row is not 0 0 0 1");
+  }
+  Eigen::Matrix3d linear;
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) linear(r, c) = pose[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
+  }
+  const double largest = linear.cwiseAbs().maxCoeff();
+  const double volume = linear.determinant();
+  if (!(std::abs(volume) > 1e-9 * largest * largest * largest)) refuse("the pose is singular");
+  const Eigen::Matrix3d normal = linear.inverse().transpose() * std::cbrt(std::abs(volume));
+  for (int r = 0; r < 3; ++r) {
+    for (int c = 0; c < 3; ++c) normal_[r][c] = normal(r, c);
+  }
+  radius_ = std::cbrt(std::abs(volume));
+}
+
+void PoseTransform::apply(SampleBatch& batch, std::size_t begin, std::size_t end) const {
+  for (std::size_t i = begin; i < end; ++i) {
+    const double x = batch.x[i];
+    const double y = batch.y[i];
+    const double z = batch.z[i];
+    batch.x[i] = pose_[0][0] * x + pose_[0][1] * y + pose_[0][2] * z + pose_[0][3];
+    batch.y[i] = pose_[1][0] * x + pose_[1][1] * y + pose_[1][2] * z + pose_[1][3];
+    batch.z[i] = pose_[2][0] * x + pose_[2][1] * y + pose_[2][2] * z + pose_[2][3];
+  }
+  for (std::size_t i = begin; i < end && !batch.nx.empty(); ++i) {
+    const double x = batch.nx[i];
+    const double y = batch.ny[i];
+    const double z = batch.nz[i];
+    batch.nx[i] = static_cast<float>(normal_[0][0] * x + normal_[0][1] * y + normal_[0][2] * z);
+    batch.ny[i] = static_cast<float>(normal_[1][0] * x + normal_[1][1] * y + normal_[1][2] * z);
+    batch.nz[i] = static_cast<float>(normal_[2][0] * x + normal_[2][1] * y + normal_[2][2] * z);
+  }
+  for (std::size_t i = begin; i < end && !batch.radius.empty(); ++i) {
+    batch.radius[i] = static_cast<float>(batch.radius[i] * radius_);
+  }
+}
+
+namespace {
+
+class PosedPoints final : public PointSource {
+ public:
+  PosedPoints(std::unique_ptr<PointSource> source, const Pose& pose)
+      : source_(std::move(source)), transform_(pose, source_->info().path) {
+    info_ = source_->info();
+    info_.double_precision = true;
+  }
+
+  void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
+    source_->read(first, count, out);
+    transform_.apply(out, 0, out.size());
+  }
+
+ private:
+  std::unique_ptr<PointSource> source_;
+  PoseTransform transform_;
+};
+
+}  // namespace
+
+std::unique_ptr<PointSource> pose_points(std::unique_ptr<PointSource> source, const Pose& pose) {
+  return std::make_unique<PosedPoints>(std::move(source), pose);
+}
+
+}  // namespace lamina

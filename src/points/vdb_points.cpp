@@ -1,0 +1,88 @@
+#include "points/vdb_points.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "lamina/error.h"
+#include "lamina/volume_points.h"
+#include "points/input_file.h"
+
+namespace lamina {
+namespace {
+
+bool needs_double(const SampleBatch& rows) {
+  const auto wide = [](double v) { return static_cast<double>(static_cast<float>(v)) != v; };
+  return std::any_of(rows.x.begin(), rows.x.end(), wide) || std::any_of(rows.y.begin(), rows.y.end(), wide) ||
+         std::any_of(rows.z.begin(), rows.z.end(), wide);
+}
+
+class VdbPoints final : public PointSource {
+ public:
+  explicit VdbPoints(const std::string& path) {
+    PointVolume volume = read_point_volume(path);
+    rows_ = std::move(volume.points.samples);
+    rows_.exact.resize(rows_.attributes.size());
+    info_.path = path;
+    info_.count = rows_.size();
+    info_.has_normals = !rows_.nx.empty();
+    info_.has_radius = !rows_.radius.empty();
+    info_.has_quality = !rows_.quality.empty();
+    if (info_.has_radius) info_.radius_name = "pscale";
+    if (info_.has_quality) info_.quality_name = "quality";
+    info_.random_access = true;
+    info_.double_precision = needs_double(rows_);
+    info_.attributes = std::move(volume.points.layout);
+    for (std::size_t a = 0; a < info_.attributes.size(); ++a) {
+      // Every source fills these where a float cannot hold the type.
+      if (!fits_float(info_.attributes[a].type) && rows_.exact[a].empty()) {
+        rows_.exact[a].assign(rows_.attributes[a].begin(), rows_.attributes[a].end());
+      }
+    }
+    std::string skipped;
+    for (const std::string& name : volume.skipped) skipped += (skipped.empty() ? "" : ", ") + quoted(name);
+    if (!skipped.empty())
+      info_.remarks.push_back(fmt::format("{}: attributes left out, as they are no numbers: {}", path, skipped));
+  }
+
+  void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
+    first = std::min(first, info_.count);
+    count = static_cast<std::size_t>(std::min<std::uint64_t>(count, info_.count - first));
+    const auto cut = [&](const auto& from, auto& to) {
+      if (from.empty()) return to.clear();
+      const auto begin = from.begin() + static_cast<std::ptrdiff_t>(first);
+      to.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
+    };
+    out.first = first;
+    cut(rows_.x, out.x);
+    cut(rows_.y, out.y);
+    cut(rows_.z, out.z);
+    cut(rows_.nx, out.nx);
+    cut(rows_.ny, out.ny);
+    cut(rows_.nz, out.nz);
+    cut(rows_.radius, out.radius);
+    cut(rows_.quality, out.quality);
+    out.attributes.resize(rows_.attributes.size());
+    out.exact.resize(rows_.exact.size());
+    for (std::size_t a = 0; a < rows_.attributes.size(); ++a) {
+      cut(rows_.attributes[a], out.attributes[a]);
+      cut(rows_.exact[a], out.exact[a]);
+    }
+  }
+
+ private:
+  SampleBatch rows_;
+};
+
+}  // namespace
+
+std::unique_ptr<PointSource> open_vdb(const std::string& path) {
+  if (path == "-") {
+    throw Error(ExitCode::unreadable,
+                "standard input: points from OpenVDB are read from files only; give the file's name");
+  }
+  return std::make_unique<VdbPoints>(path);
+}
+
+}  // namespace lamina

@@ -1,0 +1,16 @@
+// What a LevelSet holds.
+#pragma once
+#include <openvdb/openvdb.h>
+
+#include "lamina/volume_level_set.h"
+
+namespace lamina {
+
+struct LevelSet::Data {
+  openvdb::FloatGrid::ConstPtr grid;
+  std::string name;
+  std::string path;  ///< it came from, for messages; may be empty
+  bool open = false;
+};
+
+}  // namespace lamina

@@ -1,0 +1,110 @@
+#include <fmt/format.h>
+#include <openvdb/tools/VolumeToMesh.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "lamina/error.h"
+#include "meshes/with_threads.h"
+#include "volume/level_set_data.h"
+
+namespace lamina {
+namespace {
+
+using openvdb::Vec3d;
+
+double squared_distance(const TriangleMesh& mesh, std::uint32_t a, std::uint32_t b) {
+  double sum = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const double d = mesh.positions[a][k] - mesh.positions[b][k];
+    sum += d * d;
+  }
+  return sum;
+}
+
+/// OpenVDB winds its polygons clockwise seen from outside; a mirroring transform turns them round again.
+class Triangulator {
+ public:
+  Triangulator(TriangleMesh& mesh, bool mirrored) : mesh_(mesh), mirrored_(mirrored) {}
+  void triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    if (a == b || b == c || c == a) return;
+    if (mirrored_) std::swap(b, c);
+    mesh_.triangles.push_back({a, c, b});
+  }
+  void quad(const openvdb::Vec4I& q) {
+    if (squared_distance(mesh_, q[0], q[2]) <= squared_distance(mesh_, q[1], q[3])) {
+      triangle(q[0], q[1], q[2]);
+      triangle(q[0], q[2], q[3]);
+    } else {
+      triangle(q[0], q[1], q[3]);
+      triangle(q[1], q[2], q[3]);
+    }
+  }
+
+ private:
+  TriangleMesh& mesh_;
+  bool mirrored_;
+};
+
+void drop_unused(TriangleMesh& mesh) {
+  constexpr std::uint32_t kNone = ~std::uint32_t{0};
+  std::vector<std::uint32_t> number(mesh.positions.size(), kNone);
+  for (const auto& t : mesh.triangles)
+    for (const std::uint32_t v : t) number[v] = 0;
+  std::uint32_t next = 0;
+  for (std::size_t v = 0; v < number.size(); ++v) {
+    if (number[v] == kNone) continue;
+    mesh.positions[next] = mesh.positions[v];
+    number[v] = next++;
+  }
+  mesh.positions.resize(next);
+  for (auto& t : mesh.triangles)
+    for (std::uint32_t& v : t) v = number[v];
+}
+
+TriangleMesh mesh_grid(const openvdb::FloatGrid& grid, const MeshingSettings& s) {
+  // OpenVDB gives positions as floats: they are taken in voxels from the corner of the band, and go to the world here.
+  const Vec3d corner = grid.evalActiveVoxelBoundingBox().getStart().asVec3d();
+  auto local = openvdb::math::Transform::createLinearTransform();
+  local->postTranslate(-corner);
+  const openvdb::FloatGrid::ConstPtr moved = grid.copyReplacingTransform(local);
+  std::vector<openvdb::Vec3s> points;
+  std::vector<openvdb::Vec3I> triangles;
+  std::vector<openvdb::Vec4I> quads;
+  openvdb::tools::volumeToMesh(*moved, points, triangles, quads, s.isovalue, s.adaptivity);
+
+  TriangleMesh mesh;
+  mesh.positions.reserve(points.size());
+  for (const openvdb::Vec3s& p : points) {
+    const Vec3d world = grid.transform().indexToWorld(Vec3d(p) + corner);
+    mesh.positions.push_back({world[0], world[1], world[2]});
+  }
+  const bool mirrored = grid.transform().baseMap()->determinant() < 0;
+  Triangulator out(mesh, mirrored);
+  for (const auto& q : quads) out.quad(q);
+  for (const auto& t : triangles) out.triangle(t[0], t[1], t[2]);
+  drop_unused(mesh);
+  return mesh;
+}
+
+}  // namespace
+
+TriangleMesh mesh_level_set(const LevelSet& level_set, const MeshingSettings& settings, const RunContext& run) {
+  if (!(settings.adaptivity >= 0 && settings.adaptivity <= 1))
+    throw Error(ExitCode::usage, "--adaptivity must be in 0..1");
+  if (!(std::abs(settings.isovalue) < level_set.band())) {
+    throw Error(ExitCode::usage,
+                fmt::format("--isovalue must lie inside the band: between -{0:g} and {0:g}", level_set.band()));
+  }
+  TriangleMesh mesh;
+  meshes::with_threads(run.threads, [&] { mesh = mesh_grid(*level_set.data().grid, settings); });
+  if (mesh.triangles.empty()) {
+    const std::string& path = level_set.data().path;
+    throw Error(ExitCode::empty, fmt::format("{}{}grid {} has no surface at distance {:g}", path,
+                                             path.empty() ? "" : ": ", level_set.name(), settings.isovalue));
+  }
+  return mesh;
+}
+
+}  // namespace lamina

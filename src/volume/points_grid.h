@@ -1,0 +1,39 @@
+// Building the leaves of an OpenVDB points grid from plain arrays.
+#pragma once
+#include <openvdb/openvdb.h>
+#include <openvdb/points/PointDataGrid.h>
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lamina/volume_points.h"
+
+namespace lamina::volume {
+
+/// One array of the points grid, and the arrays of the cloud it is made of.
+struct PointColumn {
+  enum class Kind : std::uint8_t { float32, int32, vector };
+  std::string name;
+  Kind kind = Kind::float32;
+  std::array<const float*, 3> from{};  ///< one for scalars
+  float scale = 1;
+  std::string types;  ///< of the attributes it came from, for the way back
+};
+
+/// What the arrays become; P is not among them. Throws Error(usage) for a name given twice.
+std::vector<PointColumn> point_columns(const PointArrays& points);
+
+/// A transform of a power-of-two voxel, offset by whole voxels where the numbers of voxels would not fit.
+openvdb::math::Transform::Ptr point_transform(const PointArrays& points, double voxel);
+
+/// The grid, without name or creator. Points are ordered by leaf, voxel and row.
+openvdb::points::PointDataGrid::Ptr point_grid(const PointArrays& points, const std::vector<PointColumn>& columns,
+                                               const openvdb::math::Transform::Ptr& transform);
+
+/// Grid metadata: the types of the arrays a column was made of, behind this prefix and its name.
+inline constexpr const char* kTypeMetadata = "type_";
+
+}  // namespace lamina::volume

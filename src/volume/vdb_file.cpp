@@ -1,0 +1,102 @@
+#include "volume/vdb_file.h"
+
+#include <fmt/format.h>
+#include <openvdb/io/Stream.h>
+#include <openvdb/points/PointDataGrid.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+
+#include "lamina/error.h"
+#include "lamina/version.h"
+#include "meshes/output_file.h"
+#include "volume/vdb_bytes.h"
+
+namespace lamina::volume {
+namespace {
+
+[[noreturn]] void refuse(const std::string& path, const std::string& what) {
+  throw Error(ExitCode::unreadable, fmt::format("{}: {}", path, what));
+}
+
+/// The file's magic number and what comes behind it: lengths in a file that is none would be taken for real.
+std::string check_header(std::ifstream& file, const std::string& path) {
+  constexpr std::uint32_t kMagic = 0x56444220;
+  constexpr std::uint32_t kOldest = 214, kUnknown = 1000;
+  std::uint64_t magic = 0;
+  std::uint32_t version = 0, major = 0, minor = 0;
+  for (auto [to, size] : {std::pair<void*, std::streamsize>{&magic, 8}, {&version, 4}, {&major, 4}, {&minor, 4}})
+    file.read(static_cast<char*>(to), size);
+  if (!file) refuse(path, "is too short for a .vdb file");
+  if ((magic & 0xFFFFFFFFU) != kMagic) refuse(path, "is not a .vdb file");
+  if (version < kOldest || version > kUnknown)
+    refuse(path, fmt::format("is a .vdb file of version {}, which cannot be read", version));
+  file.seekg(0);
+  return fmt::format("{}.{}/{}", major, minor, version);
+}
+
+}  // namespace
+
+VdbFile read_vdb(const std::string& path) {
+  openvdb::initialize();
+  std::error_code ec;
+  if (std::filesystem::is_directory(path, ec)) refuse(path, "is a directory, not a .vdb file");
+  std::ifstream file(path, std::ios::binary);
+  if (!file) refuse(path, fmt::format("cannot be opened: {}", std::strerror(errno)));
+  VdbFile out;
+  out.version = check_header(file, path);
+  out.bytes = std::filesystem::file_size(path, ec);
+  // OpenVDB does not look whether its reads succeed.
+  file.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
+  try {
+    openvdb::io::Stream stream(file, /*delayLoad=*/false);
+    const openvdb::GridPtrVecPtr grids = stream.getGrids();
+    if (grids != nullptr) out.grids = *grids;
+  } catch (const std::ios::failure&) {
+    refuse(path, "the .vdb file is truncated: it ends inside a grid");
+  } catch (const std::exception& e) {
+    refuse(path, fmt::format("the .vdb file cannot be read: {}", e.what()));
+  }
+  if (out.grids.empty()) refuse(path, "the .vdb file holds no grids");
+  std::stable_sort(out.grids.begin(), out.grids.end(),
+                   [](const auto& a, const auto& b) { return a->getName() < b->getName(); });
+  return out;
+}
+
+std::string kind_of(const openvdb::GridBase& grid) {
+  if (grid.isType<openvdb::points::PointDataGrid>()) return "points";
+  if (grid.getGridClass() == openvdb::GRID_LEVEL_SET) return "a level set";
+  if (grid.getGridClass() == openvdb::GRID_FOG_VOLUME) return "a fog volume";
+  return grid.valueType() + " values";
+}
+
+std::string list_of(const openvdb::GridPtrVec& grids) {
+  std::string text;
+  for (const auto& grid : grids)
+    text += fmt::format("{}{} ({})", text.empty() ? "" : ", ", grid->getName(), kind_of(*grid));
+  return text;
+}
+
+bool is_open(const openvdb::GridBase& grid) {
+  const auto open = grid.getMetadata<openvdb::BoolMetadata>(kOpenMetadata);
+  return open != nullptr && open->value();
+}
+
+void label(openvdb::GridBase& grid, const std::string& name, bool half) {
+  grid.setName(name);
+  grid.setCreator(fmt::format("lamina {}", version()));
+  grid.setSaveFloatAsHalf(half);
+}
+
+std::uint64_t write_vdb(const openvdb::GridCPtrVec& grids, const std::string& path) {
+  meshes::OutputFile out(path);
+  const std::string bytes = vdb_bytes(grids);
+  out.write(bytes);
+  out.commit();
+  return bytes.size();
+}
+
+}  // namespace lamina::volume

@@ -1,0 +1,69 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "lamina/error.h"
+#include "meshes/with_threads.h"
+#include "volume/points_grid.h"
+#include "volume/vdb_file.h"
+
+namespace lamina {
+namespace {
+
+[[noreturn]] void usage(const std::string& message) {
+  throw Error(ExitCode::usage, message);
+}
+
+void check(const PointArrays& points, const PointVolumeSettings& settings) {
+  const SampleBatch& s = points.samples;
+  if (settings.name.empty()) usage("--name must be a word");
+  if (!(settings.voxel >= 0 && std::isfinite(settings.voxel))) usage("--voxelsize must be a positive length, or 0");
+  if (s.size() == 0) throw Error(ExitCode::empty, "there are no points to write");
+  bool equal = s.y.size() == s.size() && s.z.size() == s.size() && s.attributes.size() == points.layout.size() &&
+               s.ny.size() == s.nx.size() && s.nz.size() == s.nx.size();
+  for (const auto* a : {&s.nx, &s.radius, &s.quality}) equal = equal && (a->empty() || a->size() == s.size());
+  for (const auto& a : s.attributes) equal = equal && a.size() == s.size();
+  if (!equal) usage("the points' arrays differ in length");
+  for (std::size_t i = 0; i < s.size(); ++i) {
+    if (std::isfinite(s.x[i]) && std::isfinite(s.y[i]) && std::isfinite(s.z[i])) continue;
+    throw Error(ExitCode::unreadable,
+                fmt::format("row {} (counted from 0) has a coordinate that is not finite; remove it first", i));
+  }
+}
+
+/// A power of two, so that floats stay what they are; some eight points a voxel were they spread over a surface.
+double choose_voxel(const SampleBatch& s, double wanted) {
+  // OpenVDB takes smaller voxels for a singular transform.
+  constexpr double kSmallest = 0x1p-16;
+  if (wanted > 0) return std::max(kSmallest, std::exp2(std::floor(std::log2(wanted))));
+  double diagonal = 0;
+  for (const auto* axis : {&s.x, &s.y, &s.z}) {
+    const auto [low, high] = std::minmax_element(axis->begin(), axis->end());
+    diagonal = std::hypot(diagonal, *high - *low);
+  }
+  if (!(diagonal > 0)) return 1;
+  const double edge = diagonal * std::sqrt(8 / static_cast<double>(s.size()));
+  return std::max(kSmallest, std::exp2(std::round(std::log2(edge) - 0.5)));
+}
+
+}  // namespace
+
+PointVolumeStats write_point_volume(const PointArrays& points, const PointVolumeSettings& settings,
+                                    const std::string& path, const RunContext& run) {
+  check(points, settings);
+  openvdb::initialize();
+  PointVolumeStats stats;
+  meshes::with_threads(run.threads, [&] {
+    const auto columns = volume::point_columns(points);
+    stats.voxel = choose_voxel(points.samples, settings.voxel);
+    const auto grid = volume::point_grid(points, columns, volume::point_transform(points, stats.voxel));
+    volume::label(*grid, settings.name, false);
+    stats.points = points.samples.size();
+    stats.voxels = grid->activeVoxelCount();
+    stats.bytes = volume::write_vdb({grid}, path);
+  });
+  return stats;
+}
+
+}  // namespace lamina
