@@ -15,7 +15,7 @@ namespace lamina::tools {
 namespace {
 
 struct TransferOptions {
-  std::string mesh, points, output;
+  std::string mesh, points, output, columns;
   TransferSettings settings;
   RunOptions run;
 };
@@ -25,7 +25,7 @@ void run_transfer(const TransferOptions& o) {
     throw Error(ExitCode::usage, "MESH and POINTS both name standard input; give one of them a file");
   const RunContext context = make_context(o.run);
   TriangleMesh mesh = read_mesh_input(o.mesh, o.run.tmp_dir);
-  const auto points = open_points(o.points, o.run.tmp_dir);
+  const auto points = open_point_input(o.points, o.columns, context);
   const TransferReport report = transfer_attributes(*points, mesh, o.settings, context);
   write_mesh(mesh, o.output);
   if (report.unreachable > 0) {
@@ -76,6 +76,7 @@ void add_attribtransfer(CLI::App& app) {
       ->type_name("LENGTH")
       ->capture_default_str()
       ->group(group);
+  add_columns(*tool, o->columns);
   add_run_options(*tool, o->run);
   add_examples(*tool,
                "  lamina attribtransfer mesh.ply scan.ply --attributes red,green,blue -o coloured.ply\n"

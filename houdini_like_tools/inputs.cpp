@@ -44,6 +44,20 @@ PointColumns with_precision(PointColumns columns, Precision precision) {
   return columns;
 }
 
+void add_columns(CLI::App& app, std::string& columns) {
+  app.add_option("--columns", columns,
+                 "What the columns of text files hold: names as in x,y,z,nx,ny,nz,red:uchar,-, - for those to skip")
+      ->type_name("NAMES")
+      ->group("Input");
+}
+
+std::unique_ptr<PointSource> open_point_input(const std::string& path, const std::string& columns,
+                                              const RunContext& context) {
+  std::unique_ptr<PointSource> source = open_points(path, PointSettings{context.tmp_dir, columns});
+  for (const std::string& remark : source->info().remarks) context.info(remark);
+  return source;
+}
+
 std::string shown_name(const std::string& path) {
   return path == "-" ? "standard input" : path;
 }
