@@ -5,6 +5,7 @@
 
 #include <algorithm>
 
+#include "support/program.h"
 #include "tools/tool_files.h"
 
 namespace lamina::tools {

@@ -9,6 +9,7 @@
 #include "lamina/error.h"
 #include "lamina/measure.h"
 #include "support/mesh_check.h"
+#include "support/program.h"
 #include "tools/tool_files.h"
 
 namespace lamina::tools {
@@ -46,10 +47,10 @@ TEST_F(ClipTool, KeepsTheRowsThatBruteForceKeeps) {
 
 TEST_F(ClipTool, StreamsThroughPipes) {
   ASSERT_EQ(run_lamina({"clip", cloud_, "--plane", "0,0,0,1,0,0", "-o", out_}).code, 0);
-  const auto piped = run_shell("cat " + quoted(cloud_) + " | lamina clip - --plane 0,0,0,1,0,0 -o - --quiet");
+  const auto piped = run_shell("cat " + test::quoted(cloud_) + " | lamina clip - --plane 0,0,0,1,0,0 -o - --quiet");
   EXPECT_EQ(piped.code, 0) << piped.err;
   EXPECT_TRUE(piped.out == read_text(out_));
-  const auto meshes = run_shell("cat " + quoted(mesh_) +
+  const auto meshes = run_shell("cat " + test::quoted(mesh_) +
                                 " | lamina clip - --plane 0,0,0,1,0,0 -o - --quiet | lamina check - --expect manifold");
   EXPECT_EQ(meshes.code, 0) << meshes.err;
 }

@@ -5,6 +5,7 @@
 
 #include "lamina/info.h"
 #include "lamina/measure.h"
+#include "support/program.h"
 #include "tools/tool_files.h"
 
 namespace lamina::tools {
@@ -28,7 +29,7 @@ TEST_F(ConvertTool, PointsStayWhatTheyAre) {
   ASSERT_EQ(run_lamina({"convert", cloud_, "--precision", "float", "-o", out_}).code, 0);
   EXPECT_FALSE(open_points(out_)->info().double_precision);
   EXPECT_EQ(read_points(out_).x[3], static_cast<double>(static_cast<float>(rows_.x[3])));
-  const auto piped = run_shell("cat " + quoted(cloud_) + " | lamina convert stdin.ply -o stdout.ply --quiet");
+  const auto piped = run_shell("cat " + test::quoted(cloud_) + " | lamina convert stdin.ply -o stdout.ply --quiet");
   ASSERT_EQ(run_lamina({"convert", cloud_, "-o", out_}).code, 0);
   EXPECT_TRUE(piped.out == read_text(out_)) << piped.err;
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "support/program.h"
 #include "tools/tool_files.h"
 
 namespace lamina::tools {
@@ -66,8 +67,8 @@ TEST_F(InfoTool, CountsRadiiBySize) {
 
 TEST_F(InfoTool, KnowsMeshesAndPipes) {
   const std::string mesh = sphere_mesh(folder_ / "mesh.ply", 3);
-  for (const std::string line :
-       {"lamina info --json " + quoted(mesh), "cat " + quoted(mesh) + " | lamina info - --json"}) {
+  for (const std::string& line : std::vector<std::string>{"lamina info --json " + test::quoted(mesh),
+                                                          "cat " + test::quoted(mesh) + " | lamina info - --json"}) {
     const auto outcome = run_shell(line);
     ASSERT_EQ(outcome.code, 0) << outcome.err;
     const json info = json::parse(outcome.out);
@@ -75,7 +76,7 @@ TEST_F(InfoTool, KnowsMeshesAndPipes) {
     EXPECT_EQ(info["triangles"], read_mesh(mesh).triangles.size());
     EXPECT_EQ(info["high"][2], 3);
   }
-  EXPECT_THAT(run_shell("cat " + quoted(cloud_) + " | lamina info -").out, HasSubstr("700 points"));
+  EXPECT_THAT(run_shell("cat " + test::quoted(cloud_) + " | lamina info -").out, HasSubstr("700 points"));
 }
 
 TEST_F(InfoTool, KnowsVolumes) {

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "support/program.h"
 #include "tools/tool_files.h"
 
 namespace lamina::tools {
@@ -85,7 +86,7 @@ TEST(MeasureTool, PrintsATableOrJson) {
   const auto table = run_lamina({"measure", folder / "cube.ply"});
   EXPECT_EQ(table.code, 0) << table.err;
   EXPECT_THAT(table.out, HasSubstr("24"));
-  const auto piped = run_shell("cat " + quoted(folder / "cube.ply") + " | lamina measure - --json");
+  const auto piped = run_shell("cat " + test::quoted(folder / "cube.ply") + " | lamina measure - --json");
   EXPECT_NEAR(nlohmann::json::parse(piped.out)["volume"].get<double>(), 8, 1e-9) << piped.err;
 }
 

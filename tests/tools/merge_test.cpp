@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "lamina/measure.h"
+#include "support/program.h"
 #include "tools/tool_files.h"
 
 namespace lamina::tools {
@@ -37,8 +38,8 @@ TEST_F(MergeTool, AppendsAllRowsInOrder) {
   for (const auto* part : {&second_, &first_})
     for (const auto& text : row_texts(*part)) expected.push_back(text);
   EXPECT_EQ(row_texts(read_points(out_)), expected);
-  const auto piped =
-      run_shell("cat " + quoted(b_) + " | lamina merge " + quoted(a_) + " - " + quoted(a_) + " -o - --quiet");
+  const auto piped = run_shell("cat " + test::quoted(b_) + " | lamina merge " + test::quoted(a_) + " - " +
+                               test::quoted(a_) + " -o - --quiet");
   EXPECT_TRUE(piped.out == read_text(out_)) << piped.err;
 }
 

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "lamina/surface.h"
+#include "support/program.h"
 #include "tools/tool_files.h"
 
 namespace lamina::tools {
@@ -69,7 +70,7 @@ TEST_F(RadiusTool, ThreadsMemoryAndPipesDoNotMatter) {
   const std::string few = folder_ / "few.ply";
   ASSERT_EQ(run_lamina({"radius", cloud_, "-o", few, "--threads", "3", "--max-memory", "64K"}).code, 0);
   EXPECT_TRUE(read_text(out_) == read_text(few));
-  const auto piped = run_shell("cat " + quoted(cloud_) + " | lamina radius - -o - --quiet");
+  const auto piped = run_shell("cat " + test::quoted(cloud_) + " | lamina radius - -o - --quiet");
   EXPECT_TRUE(piped.out == read_text(out_)) << piped.err;
 }
 

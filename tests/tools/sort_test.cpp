@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "support/program.h"
 #include "tools/tool_files.h"
 
 namespace lamina::tools {

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "lamina/measure.h"
+#include "support/program.h"
 #include "tools/tool_files.h"
 
 namespace lamina::tools {
