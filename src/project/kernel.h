@@ -71,9 +71,11 @@ struct FitOutput {
 /// where there is none. Lengths in steps.
 struct CornerField {
   static constexpr int kRow = 16;
-  static constexpr int kPlane = 10 * kRow;
+  static constexpr int kRows = 10;
+  static constexpr int kPlane = kRows * kRow;
   static constexpr int kSize = 10 * kPlane;
   std::array<float, kSize> distance, nx, ny, nz, trusted;
+  std::array<std::uint8_t, 10 * kRows> any;  ///< [z + 1][y + 1]: whether the row has trusted corners
 };
 
 /// What the trusted ones among 26 neighbours say about eight corners. Weights are 1 / m^2, m = L1 offset in cells.

@@ -53,7 +53,7 @@ void Pipeline::mark(const ActiveBucket& bucket) {
   constexpr std::size_t kPiece = 4096;
   const std::size_t n = bucket.samples.size();
   const auto [low, high] = std::minmax_element(bucket.samples.z.begin(), bucket.samples.z.end());
-  for (covered_ = std::min(covered_, resolved_.lattice.slab_of(*low)); covered_ <= resolved_.lattice.slab_of(*high);
+  for (covered_ = std::min(covered_, resolved_.lattice.slab_of(*low)); covered_ <= resolved_.lattice.slab_of(*high) + 1;
        ++covered_) {
     window_.cover(covered_);
   }
@@ -91,7 +91,7 @@ void Pipeline::finish_to(std::int32_t slab) {
 void Pipeline::number_to(std::int32_t slab) {
   for (; numbered_ <= std::min(slab, last_); ++numbered_) {
     IsoSlab* below = iso_.empty() ? nullptr : iso_.back().get();
-    auto here = std::make_shared<IsoSlab>();
+    std::shared_ptr<IsoSlab> here = spare_ != nullptr ? std::move(spare_) : std::make_shared<IsoSlab>();
     number_edges(window_, numbered_, below, *here);
     isovertices_ += here->vertices.size();
     iso_.push_back(std::move(here));
@@ -123,6 +123,7 @@ void Pipeline::write_finished() {
     place_vertices(slab, *iso_.front(), next, frame_, static_cast<float>(settings_.chord), vertices_);
     sink_.append_vertices(vertices_);
     sink_.append_triangles(slab.triangles);
+    if (iso_.front().use_count() == 1) spare_ = std::move(iso_.front());
     iso_.pop_front();
     ++written_;
   }

@@ -48,6 +48,7 @@ class Pipeline {
   std::int32_t refined_, placed_, projected_, finished_, numbered_, triangulated_, written_;
   std::int32_t covered_;
   std::deque<std::shared_ptr<IsoSlab>> iso_;  ///< slabs written_ .. numbered_ - 1
+  std::shared_ptr<IsoSlab> spare_;            ///< storage of a slab that was written, for the next
   VertexBatch vertices_;
   ExtractCounts extracted_;
   std::uint64_t isovertices_ = 0, isotriangles_ = 0;
