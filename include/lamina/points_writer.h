@@ -64,10 +64,12 @@ class PointsWriter {
   std::uint64_t rows_ = 0;
 };
 
-/// Opens a point file for writing, its format chosen by the ending of `path`: .ply (binary little-endian). "-" is
-/// standard output, and it, pipes and devices are PLY.
-/// Throws Error(usage) for another ending, naming the known ones, and when standard output is a terminal; Error(budget)
-/// naming path and reason when the file cannot be written; Error(internal) for column names the format cannot hold.
+/// Opens a point file for writing, its format chosen by the ending of `path`: .ply (binary little-endian), .xyz and
+/// .csv (text below a line of names), .pcd (binary), .las (1.4; rows always wait until commit(), and coordinates are
+/// rounded to a step of a power of ten, a 2e-10th of the extent or so). "-" is standard output, and it, pipes and
+/// devices are PLY. src/points/*_writer.h say what becomes of the columns; docs/formats.md tells it to users. Throws
+/// Error(usage) for another ending, naming the known ones, and when standard output is a terminal; Error(budget) naming
+/// path and reason when the file cannot be written; Error(internal) for column names the format cannot hold.
 std::unique_ptr<PointsWriter> open_points_writer(const std::string& path, const PointColumns& columns,
                                                  const PointsWriterSettings& settings = {});
 

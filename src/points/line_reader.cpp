@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstring>
 
 #include "lamina/error.h"
@@ -19,7 +20,11 @@ bool is_blank(std::string_view line) {
 }  // namespace
 
 LineReader::LineReader(const InputFile& file, std::uint64_t offset, std::uint64_t lines, char line_end)
-    : file_(&file), offset_(offset), line_(lines), line_end_(line_end), buffer_(kBufferBytes) {}
+    : file_(&file),
+      offset_(offset),
+      line_(lines),
+      line_end_(line_end),
+      buffer_(static_cast<std::size_t>(std::min<std::uint64_t>(kBufferBytes, file.bytes + 1))) {}
 
 bool LineReader::next(std::string_view& line) {
   while (next_of_any_kind(line)) {

@@ -5,27 +5,15 @@
 #include "points/las_points.h"
 #include "points/obj_points.h"
 #include "points/pcd_points.h"
-#include "points/ply_ascii.h"
-#include "points/ply_binary.h"
-#include "points/ply_header.h"
-#include "points/ply_rows.h"
+#include "points/ply_points.h"
 #include "points/ptx_points.h"
 #include "points/sniff.h"
+#include "points/text_layout.h"
 #include "points/text_points.h"
 
 namespace lamina {
-namespace {
-
-std::unique_ptr<PointSource> open_ply(InputFile file, const std::string& path) {
-  const PlyHeader header = read_ply_header(file);
-  PlyRows rows = understand_vertices(header, path, file.name);
-  return header.format == PlyFormat::ascii ? open_ascii_ply(std::move(file), header, std::move(rows))
-                                           : open_binary_ply(std::move(file), header, std::move(rows));
-}
-
-}  // namespace
-
 std::unique_ptr<PointSource> open_points(const std::string& path, const PointSettings& settings) {
+  require_columns(settings.columns);
   InputFile file = open_input(path, settings.tmp_dir);
   std::string start(kSniffBytes, '\0');
   start.resize(file.read(0, start.data(), start.size()));

@@ -8,7 +8,10 @@
 
 #include "lamina/error.h"
 #include "lamina/points_writer.h"
+#include "points/las_points_writer.h"
+#include "points/pcd_points_writer.h"
 #include "points/ply_points_writer.h"
+#include "points/text_points_writer.h"
 
 namespace lamina {
 namespace {
@@ -17,7 +20,11 @@ using OpenWriter = std::unique_ptr<PointsWriter> (*)(const std::string&, const P
                                                      const PointsWriterSettings&);
 
 /// By the ending of the file's name.
-constexpr std::array<std::pair<const char*, OpenWriter>, 1> kFormats{{{".ply", open_ply_points_writer}}};
+constexpr std::array<std::pair<const char*, OpenWriter>, 5> kFormats{{{".ply", open_ply_points_writer},
+                                                                      {".xyz", open_xyz_points_writer},
+                                                                      {".csv", open_csv_points_writer},
+                                                                      {".pcd", open_pcd_points_writer},
+                                                                      {".las", open_las_points_writer}}};
 
 std::string lower_extension(const std::string& path) {
   std::string e = std::filesystem::path(path).extension().string();

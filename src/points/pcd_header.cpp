@@ -39,6 +39,11 @@ class HeaderParser {
     throw Error(ExitCode::unreadable, fmt::format("{}, line {}: {}", name_, header_.lines, what));
   }
 
+  /// About the header as a whole, which the last line read is not to blame for.
+  [[noreturn]] void fail_header(const std::string& what) const {
+    throw Error(ExitCode::unreadable, fmt::format("{}: in the PCD header, {}", name_, what));
+  }
+
   bool next_line() {
     const std::size_t end = text_.find('\n', static_cast<std::size_t>(header_.bytes));
     if (end == std::string_view::npos) return false;
@@ -65,6 +70,7 @@ class HeaderParser {
   void take(std::string_view keyword) {
     if (keyword == "FIELDS" || keyword == "COLUMNS") {
       if (words_.size() > kMostFields) fail(fmt::format("more than {} fields", kMostFields));
+      if (!header_.fields.empty()) fail("a second list of fields");
       for (const std::string_view word : words_)
         header_.fields.push_back({usual_name(word), ScalarType::float32, 4, 1});
     } else if (keyword == "SIZE" || keyword == "TYPE" || keyword == "COUNT") {
@@ -114,13 +120,13 @@ class HeaderParser {
                  : is("F8") ? std::optional(ScalarType::float64)
                             : std::nullopt;
     if (!field.type && !is("I8") && !is("U8")) {
-      fail(fmt::format("field {} has TYPE {} and SIZE {}, which is no type of a PCD file", quoted(field.name),
-                       quoted(type), quoted(size)));
+      fail_header(fmt::format("field {} has TYPE {} and SIZE {}, which is no type of a PCD file", quoted(field.name),
+                              quoted(type), quoted(size)));
     }
   }
 
   PcdHeader finish() {
-    if (header_.fields.empty()) fail("the header has no FIELDS line before DATA");
+    if (header_.fields.empty()) fail_header("the header has no FIELDS line before DATA");
     std::size_t values = 0;
     for (std::size_t i = 0; i < header_.fields.size(); ++i) {
       PcdField& field = header_.fields[i];
@@ -129,15 +135,15 @@ class HeaderParser {
         field.count = static_cast<std::size_t>(std::min<std::uint64_t>(number(counts_[i]), kMostValues));
       values += field.count;
     }
-    if (values == 0 || values >= kMostValues) fail(fmt::format("{} values a point are not read", values));
+    if (values == 0 || values >= kMostValues) fail_header(fmt::format("{} values a point are not read", values));
     const bool has_size = width_ && height_;
     // Two numbers below 2^32 do not overflow; greater ones no file holds.
     constexpr std::uint64_t kMost = 0xFFFFFFFFU;
-    if (has_size && (*width_ > kMost || *height_ > kMost)) fail("WIDTH or HEIGHT is absurd");
-    if (!points_ && !has_size) fail("the header has neither POINTS nor WIDTH and HEIGHT");
+    if (has_size && (*width_ > kMost || *height_ > kMost)) fail_header("WIDTH or HEIGHT is absurd");
+    if (!points_ && !has_size) fail_header("the header has neither POINTS nor WIDTH and HEIGHT");
     header_.points = points_ ? *points_ : *width_ * *height_;
     if (has_size && *width_ * *height_ != header_.points) {
-      fail(fmt::format("POINTS is {}, but WIDTH times HEIGHT {}", header_.points, *width_ * *height_));
+      fail_header(fmt::format("POINTS is {}, but WIDTH times HEIGHT {}", header_.points, *width_ * *height_));
     }
     return std::move(header_);
   }

@@ -29,7 +29,7 @@ struct Told {
 std::vector<Told> parse_told(const std::string& told) {
   const auto refuse = [&](const std::string& what) {
     throw Error(ExitCode::usage,
-                fmt::format("columns {}: {}; write names such as x,y,z,red,green,blue,-", quoted(told), what));
+                fmt::format("--columns {}: {}; write names such as x,y,z,red,green,blue,-", quoted(told), what));
   };
   std::vector<Told> columns;
   std::vector<std::string_view> words;
@@ -136,6 +136,10 @@ std::string list_of(const std::vector<PointColumn>& columns) {
 }
 
 }  // namespace
+
+void require_columns(const std::string& told) {
+  if (!told.empty()) parse_told(told);
+}
 
 TextLayout understand_text(const InputFile& file, char line_end, const std::string& told, PointSourceInfo& info) {
   const std::vector<Told> wanted = told.empty() ? std::vector<Told>{} : parse_told(told);

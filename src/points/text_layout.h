@@ -16,6 +16,9 @@ struct TextLayout {
   std::uint64_t top_lines = 0;  ///< lines before the first row or count, which are not to be read as such
 };
 
+/// Throws Error(usage) for PointSettings::columns that cannot be meant.
+void require_columns(const std::string& told);
+
 /// Looks at rows from the beginning, the middle and the end of the file. Fills in `info`'s layout and remarks.
 /// Throws Error(unreadable) naming the line: nothing but comments, rows of different lengths, words, decimal commas, no
 /// x y z; Error(usage) for `told` (PointSettings::columns) that cannot be meant.

@@ -160,6 +160,12 @@ void take_others(const InputFile& file, char line_end, std::uint64_t offset, Tex
 TextSample sample_text(const InputFile& file, char line_end) {
   TextSample sample;
   std::vector<Row> rows = head_rows(file, line_end, sample);
+  if (rows.empty() && !sample.names.empty()) {
+    sample.columns = sample.names.size();
+    sample.is_word.assign(sample.columns, false);
+    sample.is_whole.assign(sample.columns, true);
+    return sample;
+  }
   if (rows.empty()) {
     throw Error(ExitCode::unreadable, fmt::format("{}: holds no rows of numbers", file.name));
   }

@@ -1,0 +1,12 @@
+// Files of any format, with gzip and the telling of formats before.
+#include "harness.h"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace lamina;
+  const InputFile file = fuzz::as_file(data, size);
+  const std::string path = "/proc/self/fd/" + std::to_string(file.file.get());
+  return fuzz::run([&] {
+    constexpr std::size_t kGzipRatio = 1032;
+    fuzz::read_all(*open_points(path, PointSettings{fuzz::kScratch, {}}), kGzipRatio * size);
+  });
+}
