@@ -44,7 +44,7 @@ void clip_points(const ClipOptions& o, const RunContext& context) {
 }
 
 void clip_triangles(const ClipOptions& o, const RunContext& context) {
-  const TriangleMesh mesh = read_mesh(o.input);
+  const TriangleMesh mesh = read_mesh_input(o.input, context);
   const TriangleMesh clipped = clip_mesh(mesh, o.region, o.keep, context);
   if (clipped.positions.empty()) nothing_left(o);
   write_mesh(clipped, o.output);

@@ -115,7 +115,7 @@ void write_vertices(const ConvertOptions& o, const TriangleMesh& mesh, const Run
 }
 
 void convert_mesh(const ConvertOptions& o, const RunContext& context) {
-  const TriangleMesh mesh = read_mesh(o.input);
+  const TriangleMesh mesh = read_mesh_input(o.input, context);
   if (o.vertices) return write_vertices(o, mesh, context);
   if (o.fog)
     throw Error(ExitCode::usage, shown_name(o.input) + ": --fog wants a level set; make a .vdb of the mesh first");

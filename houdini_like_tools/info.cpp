@@ -195,7 +195,7 @@ void run_info(const InfoOptions& o) {
     case FileContent::points:
       return show(o, describe_points(*open_point_input(o.input, o.columns, context), context));
     case FileContent::mesh:
-      return show(o, describe_mesh(read_mesh(o.input, NonFinite::keep)));
+      return show(o, describe_mesh(read_mesh_input(o.input, context, NonFinite::keep)));
     case FileContent::volume:
       return show(o, describe_volume(o.input));
   }

@@ -37,8 +37,9 @@ std::unique_ptr<PointSource> open_point_input(const std::string& path, const std
 /// "standard input" for "-".
 std::string shown_name(const std::string& path);
 
-/// read_mesh(), also from standard input.
-TriangleMesh read_mesh_input(const std::string& path, const std::string& tmp_dir = {},
+/// read_mesh(), also from standard input. Meshes are held whole: throws Error(budget) when the file is too large for
+/// context.max_memory.
+TriangleMesh read_mesh_input(const std::string& path, const RunContext& context,
                              NonFinite non_finite = NonFinite::refuse);
 
 /// What a tool's help ends with: command lines that work as they stand (the tests run them).

@@ -49,7 +49,7 @@ void merge_triangles(const MergeOptions& o, const std::vector<PointInput>& input
     if (input.posed)
       throw Error(ExitCode::usage, input.path + ": is a mesh; only points are moved by a pose, see 'lamina transform'");
     names.push_back(shown_name(input.path));
-    meshes.push_back(read_mesh(input.path));
+    meshes.push_back(read_mesh_input(input.path, context));
   }
   const TriangleMesh merged = merge_meshes(std::move(meshes), names, o.mixed);
   write_mesh(merged, o.output);

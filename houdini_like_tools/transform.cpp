@@ -60,7 +60,7 @@ void transform_points(const TransformOptions& o, const Eigen::Affine3d& transfor
 }
 
 void transform_triangles(const TransformOptions& o, const Eigen::Affine3d& transform, const RunContext& context) {
-  TriangleMesh mesh = read_mesh(o.input);
+  TriangleMesh mesh = read_mesh_input(o.input, context);
   transform_mesh(mesh, transform);
   write_mesh(mesh, o.output);
   context.info(fmt::format("moved {} vertices", count_text(mesh.positions.size())));
