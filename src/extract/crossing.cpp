@@ -22,6 +22,23 @@ void set_layer(std::uint8_t& layers, int z, bool on) {
   layers = static_cast<std::uint8_t>((layers & ~(1U << z)) | static_cast<unsigned>(on) << z);
 }
 
+/// Of a block that other tiles may be reaching too.
+void reach_layer(CornerBlock* block, int z) {
+  if (block == nullptr) return;
+  const std::atomic_ref<std::uint8_t> layers(block->surface_layers);
+  const auto bit = static_cast<std::uint8_t>(1U << z);
+  if ((layers.load(std::memory_order_relaxed) & bit) == 0) layers.fetch_or(bit, std::memory_order_relaxed);
+}
+
+/// Notes the layers in which edges of layer z begin and end.
+void reach_ends(const TileView& tile, int z, const std::array<std::uint64_t, 3>& accepted) {
+  if ((accepted[0] | accepted[1] | accepted[2]) == 0) return;
+  reach_layer(&tile.leaf(), z);
+  if ((accepted[0] & ~bits::columns_below(7)) != 0) reach_layer(tile.neighbour(1, 0, 0), z);
+  if ((accepted[1] >> 56) != 0) reach_layer(tile.neighbour(0, 1, 0), z);
+  if (accepted[2] != 0) reach_layer(tile.neighbour(0, 0, (z + 1) >> 3), (z + 1) & 7);
+}
+
 /// The finest level that holds a corner of `level`. Levels in between need not hold it: a leaf cell may lie beside one
 /// that is subdivided twice there.
 void mark_finest(Window& window, int level, Cell corner) {
@@ -34,6 +51,7 @@ void mark_finest(Window& window, int level, Cell corner) {
     holder = block;
     offset = offset_in_block(corner);
   }
+  reach_layer(holder, offset >> 6);
   set_shared(holder->surface.words[offset >> 6], std::uint64_t{1} << (offset & 63));
 }
 
@@ -59,10 +77,9 @@ void find_crossing(const TileView& tile) {
     // The words of a mask at the other ends of the layer's edges.
     const auto ends = [&](BlockMask CornerBlock::*mask) {
       const std::uint64_t here = (leaf.*mask).words[z];
-      return std::array<std::uint64_t, 3>{
-          bits::shift_x(0, here, right == nullptr ? 0 : (right->*mask).words[z], -1),
-          bits::shift_y(0, here, up == nullptr ? 0 : (up->*mask).words[z], -1),
-          above == nullptr ? 0 : (above->*mask).words[(z + 1) & 7]};
+      return std::array<std::uint64_t, 3>{bits::shift_x(0, here, right == nullptr ? 0 : (right->*mask).words[z], -1),
+                                          bits::shift_y(0, here, up == nullptr ? 0 : (up->*mask).words[z], -1),
+                                          above == nullptr ? 0 : (above->*mask).words[(z + 1) & 7]};
     };
     std::array<std::uint64_t, 3> change{};
     std::array<std::uint64_t, 3> accepted{};
@@ -91,6 +108,9 @@ void find_crossing(const TileView& tile) {
         accepted[axis] = change[axis] & leaf.valued.words[z] & valued[axis] & (leaf.carried.words[z] | carried[axis]);
       }
     }
+    const bool has_edges = (change[0] | change[1] | change[2]) != 0;
+    // Nearly all layers are without edges and were before: their masks stay out of the cache.
+    if (!has_edges && ((leaf.busy_layers | leaf.doubtful_layers) >> z & 1U) == 0) continue;
     for (int axis = 0; axis < 3; ++axis) {
       leaf.crossing[axis].words[z] = change[axis];
       leaf.accepted[axis].words[z] = accepted[axis];
@@ -98,7 +118,7 @@ void find_crossing(const TileView& tile) {
     leaf.busy.words[z] = accepted[0] | accepted[1] | accepted[2];
     set_layer(leaf.busy_layers, z, leaf.busy.words[z] != 0);
     set_layer(leaf.doubtful_layers, z, accepted != change);
-    leaf.surface.words[z] = 0;
+    reach_ends(tile, z, accepted);
   }
 }
 
@@ -111,7 +131,7 @@ void add_finer_busy(const TileView& tile, const Window& window) {
       const int qy = quarter >> 1;
       const CornerBlock* finer =
           window.probe(tile.level - 1, {2 * tile.block.x + qx, 2 * tile.block.y + qy, 2 * tile.block.z + half});
-      if (finer == nullptr) continue;
+      if (finer == nullptr || finer->busy_layers == 0) continue;
       for (int z = std::max(tile.begin, 4 * half); z < std::min(tile.end, 4 * half + 4); ++z) {
         const int from = 2 * (z - 4 * half);
         const std::uint64_t pair = finer->busy.words[from] | finer->busy.words[from + 1];

@@ -5,8 +5,9 @@
 
 namespace lamina {
 
-/// Sets `crossing` and `accepted` in the tile's layers of the slab, `busy` as far as its own edges go, and clears
-/// `surface` there.
+/// Sets `crossing` and `accepted` in the tile's layers of the slab, `busy` as far as its own edges go, and notes the
+/// layers with ends of accepted edges, in the tile and beyond, in `surface_layers`. A slab is numbered once: `surface`
+/// is empty there.
 void find_crossing(const TileView& tile);
 
 /// Completes `busy` in the layers of a tile above the finest level, once it is complete in the level below.

@@ -20,6 +20,16 @@ void for_views(const Window& window, const std::vector<TileView>& views, const B
                     });
 }
 
+/// The tiles in which accepted edges begin or end.
+std::vector<TileView> at_surface(const std::vector<TileView>& views) {
+  std::vector<TileView> out;
+  for (const TileView& tile : views) {
+    const unsigned layers = (1U << tile.end) - (1U << tile.begin);
+    if ((tile.leaf().surface_layers & layers) != 0) out.push_back(tile);
+  }
+  return out;
+}
+
 /// Gives every layer the base of its vertices and corners and sizes the slab's tables.
 void assign_numbers(const Window& window, const std::vector<TileView>& views, IsoSlab& out) {
   std::uint32_t vertices = 0;
@@ -188,10 +198,12 @@ void number_edges(Window& window, std::int32_t slab, IsoSlab* previous, IsoSlab&
     if (views[first].level == 0) continue;
     tbb::parallel_for(first, end, [&](std::size_t i) { add_finer_busy(views[i], window); });
   }
-  for_views(window, views, [&](const TileView& tile, BlockCache&) { mark_surface(tile, window); });
-  assign_numbers(window, views, out);
-  for_views(window, views, [&](const TileView& tile, BlockCache&) { fill_corners(window, tile, out); });
-  for_views(window, views, [&](const TileView& tile, BlockCache& cache) {
+  for_views(window, at_surface(views), [&](const TileView& tile, BlockCache&) { mark_surface(tile, window); });
+  // Again: a corner that a finer level holds may have been marked in a tile without edges.
+  const std::vector<TileView> surface = at_surface(views);
+  assign_numbers(window, surface, out);
+  for_views(window, surface, [&](const TileView& tile, BlockCache&) { fill_corners(window, tile, out); });
+  for_views(window, surface, [&](const TileView& tile, BlockCache& cache) {
     Numbering numbering(out, cache);
     const std::int32_t first = window.lattice().first_layer(tile.level, slab);
     numbering.fill_vertices(tile, first + window.lattice().layers(tile.level) - 1);

@@ -112,14 +112,10 @@ Signs extended_signs(const Kernel& kernel, const CornerField& field, int z, floa
   Signs out;
   for (int y = 0; y < 8; ++y) {
     if (((wanted >> (8 * y)) & 0xFFU) == 0) continue;
-    Extension e{};
-    kernel.extend(field, y, z, cell, e);
-    for (int l = 0; l < kLanes; ++l) {
-      const bool valued = e.weight[l] > 0;
-      out.positive |= static_cast<std::uint64_t>(!(e.distance[l] < 0)) << (8 * y + l);
-      out.valued |= static_cast<std::uint64_t>(valued) << (8 * y + l);
-      out.carried |= static_cast<std::uint64_t>(valued && e.aside[l] <= kSurrounded) << (8 * y + l);
-    }
+    const Extension e = kernel.extend(field, y, z, cell, kSurrounded);
+    out.positive |= std::uint64_t{e.positive} << (8 * y);
+    out.valued |= std::uint64_t{e.valued} << (8 * y);
+    out.carried |= std::uint64_t{e.surrounded} << (8 * y);
   }
   return {out.positive & wanted, out.valued & wanted, out.carried & wanted};
 }
@@ -128,7 +124,8 @@ void finish_tile(const Window& window, int level, const Tile& t, int begin, int 
                  float boundary, CornerField& field) {
   const auto cell = static_cast<float>(window.lattice().cell_size(level));
   const std::array<CornerBlock*, 27>& around = t.leaf->around;
-  const bits::Neighbourhood trusted = good_around(around);
+  std::array<std::uint64_t, 8> spread{};  // corners beside trusted ones
+  bits::dilate_layers<-1, 1>(good_around(around), begin, end, &spread[begin]);
   bool gathered = false;
   for (int z = begin; z < end; ++z) {
     const std::uint64_t corners = t.leaf->corners.words[z];
@@ -143,7 +140,7 @@ void finish_tile(const Window& window, int level, const Tile& t, int begin, int 
     signs.carried |= t.leaf->seen.words[z] & ~shared;
     if (const std::uint64_t wanted = corners & ~shared & ~good; wanted != 0) {
       Signs extended;
-      if (const std::uint64_t beside = wanted & bits::dilate_layer(trusted, z, -1, 1); beside != 0) {
+      if (const std::uint64_t beside = wanted & spread[z]; beside != 0) {
         if (!gathered) gather_field(window, level, around, begin, end, field);
         gathered = true;
         extended = extended_signs(kernel, field, z, cell, beside);

@@ -13,8 +13,9 @@ inline Vec& vec(Lanes& l) {
   return *reinterpret_cast<Vec*>(l.v.data());
 }
 
-/// Attribute count known at compile time where A >= 0.
-template <int A>
+/// `A`: number of attributes where known at compile time, else negative. `B`: whether samples have bands narrower than
+/// their supports; otherwise every contributing sample is near enough.
+template <int A, bool B>
 void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query, Lanes* sums) {
   const Vec qx = vec(query.x);
   const Vec qy = vec(query.y);
@@ -31,10 +32,12 @@ void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count,
   Vec wr = vec(sums[kWR]);
   Vec nearest = vec(sums[kNearest]);
   Vec seen = vec(sums[kSeen]);
+  std::array<Vec, (A > 0 ? A : 1)> own{};
+  for (int a = 0; a < A; ++a) own[a] = vec(sums[kSums + a]);
+  const Vec seen_before = seen;
   const Vec zero = splat(0.0F);
   const Vec one = splat(1.0F);
   const Vec far = splat(1e30F);
-  const int attributes = A >= 0 ? A : static_cast<int>(s.attributes.size());
   for (int r = 0; r < count; ++r) {
     for (std::uint32_t i = ranges[r].begin; i < ranges[r].end; ++i) {
       const Vec dx = splat(s.x[i]) - qx;
@@ -58,11 +61,17 @@ void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count,
       pp += w * d2;
       pn += w * (dx * snx + dy * sny + dz * snz);
       wr += w * splat(s.support[i]);
-      // Only samples that contribute: which others are looked at is a matter of tiles and rows.
-      const Vec near = t > zero ? d2 * splat(s.inv_band2[i]) : far;
-      nearest = near < nearest ? near : nearest;
       seen += t > zero ? one : zero;
-      for (int a = 0; a < attributes; ++a) vec(sums[kSums + a]) += w * splat(s.attributes[a][i]);
+      if constexpr (B) {
+        // Only samples that contribute: which others are looked at is a matter of tiles and rows.
+        const Vec near = t > zero ? d2 * splat(s.inv_band2[i]) : far;
+        nearest = near < nearest ? near : nearest;
+      }
+      if constexpr (A >= 0) {
+        for (int a = 0; a < A; ++a) own[a] += w * splat(s.attributes[a][i]);
+      } else {
+        for (std::size_t a = 0; a < s.attributes.size(); ++a) vec(sums[kSums + a]) += w * splat(s.attributes[a][i]);
+      }
     }
   }
   vec(sums[kW]) = w_sum;
@@ -75,19 +84,26 @@ void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count,
   vec(sums[kPP]) = pp;
   vec(sums[kPN]) = pn;
   vec(sums[kWR]) = wr;
-  vec(sums[kNearest]) = nearest;
+  vec(sums[kNearest]) = B ? nearest : (seen > seen_before ? zero : nearest);
   vec(sums[kSeen]) = seen;
+  for (int a = 0; a < A; ++a) vec(sums[kSums + a]) = own[a];
+}
+
+template <bool B>
+void accumulate_some(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query, Lanes* sums) {
+  switch (s.attributes.size()) {
+    case 0:
+      return accumulate_body<0, B>(s, ranges, count, query, sums);
+    case 3:
+      return accumulate_body<3, B>(s, ranges, count, query, sums);
+    default:
+      return accumulate_body<-1, B>(s, ranges, count, query, sums);
+  }
 }
 
 inline void accumulate(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query, Lanes* sums) {
-  switch (s.attributes.size()) {
-    case 0:
-      return accumulate_body<0>(s, ranges, count, query, sums);
-    case 3:
-      return accumulate_body<3>(s, ranges, count, query, sums);
-    default:
-      return accumulate_body<-1>(s, ranges, count, query, sums);
-  }
+  return s.banded ? accumulate_some<true>(s, ranges, count, query, sums)
+                  : accumulate_some<false>(s, ranges, count, query, sums);
 }
 
 /// Exactly rounded, so the same on all processors.
@@ -161,6 +177,16 @@ inline Vec load(const float* p) {
   return v;
 }
 
+typedef int IntVec __attribute__((vector_size(32)));  // NOLINT(modernize-use-using)
+
+/// A bit for every lane where a comparison holds.
+inline std::uint8_t lanes(const IntVec& holds) {
+  const IntVec bits = holds & IntVec{1, 2, 4, 8, 16, 32, 64, 128};
+  int out = 0;
+  for (int l = 0; l < kLanes; ++l) out |= bits[l];
+  return static_cast<std::uint8_t>(out);
+}
+
 /// A channel of three rows' corners side by side: the middle ones, and sum and difference of the outer ones.
 struct Triple {
   Vec middle, sum, difference;
@@ -172,7 +198,7 @@ inline Triple triple(const float* p) {
   return {load(p), low + high, high - low};
 }
 
-inline void extend(const CornerField& f, int y, int z, float cell, Extension& out) {
+inline Extension extend(const CornerField& f, int y, int z, float cell, float near) {
   const Vec zero = splat(0.0F);
   Vec s = zero;
   Vec w = zero;
@@ -214,7 +240,6 @@ inline void extend(const CornerField& f, int y, int z, float cell, Extension& ou
   const Vec n2 = nx * nx + ny * ny + nz * nz;
   const Vec along = ox * nx + oy * ny + oz * nz;
   const Vec n2_or_one = n2 > zero ? n2 : splat(1.0F);
-  vec(out.distance) = s;
-  vec(out.weight) = w;
-  vec(out.aside) = (ox * ox + oy * oy + oz * oz - along * along / n2_or_one) / (any * any);
+  const Vec aside = (ox * ox + oy * oy + oz * oz - along * along / n2_or_one) / (any * any);
+  return {lanes(s >= zero), lanes(w > zero), lanes((w > zero) & (aside <= splat(near)))};
 }

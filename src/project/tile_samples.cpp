@@ -222,10 +222,12 @@ void RowSamples::place(const Lattice& lattice, int level, std::span<const Run> r
     for (std::size_t c = 0; c < attributes; ++c) samples_.attributes[c][to] = from.attributes[c][f.sample];
     max_support_ = std::max(max_support_, f.support);
   }
+  samples_.banded = false;
   for (std::size_t k = 0; k < found_.size(); ++k) {
     const float reach = band * samples_.inv_band2[k] * inv;
     samples_.inv_support2[k] = 1.0F / (samples_.support[k] * samples_.support[k]);
     samples_.inv_band2[k] = 1.0F / (reach * reach);
+    samples_.banded |= reach < samples_.support[k];
   }
 }
 

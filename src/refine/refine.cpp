@@ -111,11 +111,18 @@ std::uint64_t from_parent(const BlockMask& parent, const Block& child, int z) {
 }
 
 void split_parents(Window& window, int level, std::int32_t slab) {
+  Block last{};
+  bool known = false;  // that `last` is there: neighbours mostly have the same parent
   for (const Tile& t : window.tiles(level, slab)) {
     const LeafLayers layers = leaf_layers(window, level, slab, t.block);
+    const Block parent = parent_block(t.block);
+    if (known && parent == last) continue;
     std::uint64_t any = 0;
     for (int z = layers.begin; z < layers.end; ++z) any |= t.leaf->touched.words[z] | t.leaf->split.words[z];
-    if (any != 0) window.touch(level + 1, parent_block(t.block));
+    if (any == 0) continue;
+    window.touch(level + 1, parent);
+    last = parent;
+    known = true;
   }
   for_tiles(window, level + 1, slab, [&](const Tile& t, int begin, int end) {
     for (int octant = 0; octant < 8; ++octant) {
@@ -141,16 +148,15 @@ void inherit(Window& window, int level, std::int32_t slab) {
   const int parent_level = level + 1;
   for (const Tile& t : window.tiles(parent_level, slab)) {
     const LeafLayers layers = leaf_layers(window, parent_level, slab, t.block);
+    std::array<std::uint64_t, 2> nodes{};  // of the lower and of the upper half's layers, one above the other
+    for (int z = layers.begin; z < layers.end; ++z) {
+      nodes[z >> 2] |= t.leaf->split.words[z] & t.leaf->reached.words[z];
+    }
     for (int octant = 0; octant < 8; ++octant) {
-      const Block child{t.block.x * 2 + (octant & 1), t.block.y * 2 + ((octant >> 1) & 1),
-                        t.block.z * 2 + (octant >> 2)};
-      std::uint64_t any = 0;
-      const int oz = (octant >> 2) * 4;
-      for (int z = std::max(layers.begin, oz); z < std::min(layers.end, oz + 4); ++z) {
-        const std::uint64_t w = t.leaf->split.words[z] & t.leaf->reached.words[z];
-        any |= bits::spread_quarter(w, octant & 1, (octant >> 1) & 1);
-      }
-      if (any != 0) window.touch(level, child);
+      const std::uint64_t quarter = std::uint64_t{0x0F0F0F0F} << (4 * (octant & 1) + 32 * ((octant >> 1) & 1));
+      if ((nodes[octant >> 2] & quarter) == 0) continue;
+      window.touch(level,
+                   {t.block.x * 2 + (octant & 1), t.block.y * 2 + ((octant >> 1) & 1), t.block.z * 2 + (octant >> 2)});
     }
   }
   for_tiles(window, parent_level, slab, [&](const Tile& t, int begin, int end) {

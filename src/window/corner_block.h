@@ -12,8 +12,8 @@
 namespace lamina {
 
 /// 512 bits, a 64-bit word per layer z; bit x + 8 y inside a word. OpenVDB's own linear order with its i axis as z:
-/// Coord(z, y, x), so that a slab is a run of words.
-struct BlockMask {
+/// Coord(z, y, x), so that a slab is a run of words. A cache line, whole.
+struct alignas(64) BlockMask {
   std::array<std::uint64_t, 8> words{};
 
   static constexpr int offset(int x, int y, int z) { return x + (y << 3) + (z << 6); }
@@ -115,6 +115,12 @@ struct CornerBlock : Projected {
   std::array<CornerBlock*, 27> around{};
   static constexpr int towards(int dx, int dy, int dz) { return 13 + dx + 3 * dy + 9 * dz; }
 
+  // Layers in which extraction has something to look at, bit z for layer z: most leaves lie off the surface.
+  std::uint8_t busy_layers = 0;      ///< `busy` is not empty
+  std::uint8_t doubtful_layers = 0;  ///< an edge is in `crossing` and not in `accepted`
+  std::uint8_t surface_layers = 0;   ///< `surface` may hold corners: an accepted edge begins or ends there
+  bool inherits = false;             ///< `above` is not empty
+
   // Cells of the octree. A cell of this level exists when its parent is split (or at the coarsest level when touched).
   BlockMask home;     ///< cells that hold a sample of this level
   BlockMask touched;  ///< cells that a sample of this level reaches: within two cells of its home
@@ -136,11 +142,8 @@ struct CornerBlock : Projected {
   // Minimal edges with a sign change, by axis, keyed by their lower corner; written by extraction.
   std::array<BlockMask, 3> crossing;
   std::array<BlockMask, 3> accepted;  ///< subset of crossing: the isovertex is valid
-  BlockMask busy;                ///< cells with an accepted edge of this or a finer level at or above their low corner
-  BlockMask surface;             ///< corners at an end of an accepted edge
-  bool inherits = false;         ///< `above` is not empty
-  std::uint8_t busy_layers = 0;  ///< bit z: layer z of `busy` is not empty
-  std::uint8_t doubtful_layers = 0;  ///< bit z: an edge of layer z is in `crossing` and not in `accepted`
+  BlockMask busy;     ///< cells with an accepted edge of this or a finer level at or above their low corner
+  BlockMask surface;  ///< corners at an end of an accepted edge
   std::array<LayerNumbers, 8> numbers{};
 
   /// Cell centres, where diffusion projects those instead of the corners; shared so that a block can be copied.

@@ -62,6 +62,7 @@ struct Window::Trees {
     std::int32_t x0 = 0, y0 = 0, nx = 0, ny = 0;  ///< extent of the tables in blocks
   };
   std::vector<Level> levels;
+  std::vector<std::unique_ptr<CornerLeaf>> spare;  ///< retired leaves, used again: leaves come and go all the time
   std::mutex creation;
 
   /// Entry of the lookup table, null where the block lies outside of it.
@@ -100,11 +101,30 @@ struct Window::Trees {
   CornerBlock& create(int l, const Block& b) {
     Level& level = levels[l];
     cover(level, b.z);
-    CornerBlock& block = level.tree.touchLeaf(leaf_origin(b))->block;
+    CornerLeaf* leaf = new_leaf(leaf_origin(b));
+    level.tree.addLeaf(leaf);
+    CornerBlock& block = leaf->block;
     level.layers[b.z - level.z_base].tiles.push_back({b, &block});
     introduce(l, b, block);
     if (CornerBlock** s = slot(level, b)) std::atomic_ref(*s).store(&block, std::memory_order_release);
     return block;
+  }
+
+  CornerLeaf* new_leaf(const openvdb::Coord& origin) {
+    if (spare.empty()) return new CornerLeaf(origin);
+    CornerLeaf* leaf = spare.back().release();
+    spare.pop_back();
+    leaf->setOrigin(origin);
+    std::destroy_at(&leaf->block);
+    std::construct_at(&leaf->block);
+    return leaf;
+  }
+
+  void retire(Level& level, const Tile& t) {
+    take_leave(*t.leaf);
+    for (CornerValues& v : t.leaf->values) v = {};
+    t.leaf->centres.reset();
+    spare.emplace_back(level.tree.stealNode<CornerLeaf>(leaf_origin(t.block), false, false));
   }
 
   /// Stages look at a leaf's neighbours far more often than leaves come and go.
@@ -214,8 +234,7 @@ void Window::retire_below(std::int32_t slab) {
     while (!level.layers.empty() && level.z_base * 8 + 8 <= first) {
       for (const Tile& t : level.layers.front().tiles) {
         const openvdb::Coord origin = leaf_origin(t.block);
-        Trees::take_leave(*t.leaf);
-        delete level.tree.stealNode<CornerLeaf>(origin, false, false);
+        trees_->retire(level, t);
         level.lower.insert(origin & ~(static_cast<std::int32_t>(Lower::DIM) - 1));
         level.upper.insert(origin & ~(static_cast<std::int32_t>(Upper::DIM) - 1));
       }
@@ -238,7 +257,7 @@ std::size_t Window::leaf_count() const {
 }
 
 std::size_t Window::memory() const {
-  std::size_t bytes = 0;
+  std::size_t bytes = trees_->spare.size() * sizeof(CornerLeaf);
   for (const auto& level : trees_->levels) {
     const std::vector<openvdb::Index32> nodes = level.tree.nodeCount();
     bytes += nodes[Lower::LEVEL] * sizeof(Lower) + nodes[Upper::LEVEL] * sizeof(Upper);
