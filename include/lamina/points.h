@@ -58,9 +58,10 @@ struct PointSettings {
 /// the formats: PLY (also with a range grid), OBJ, XYZ and its kin, PTX, PCD, LAS.
 ///
 /// PLY, properties of element `vertex`: x y z; nx ny nz; radius (else pscale); quality (else confidence); every other
-/// one is an attribute, carried as float, integers of 32 bits and doubles in SampleBatch::exact as well. Positions in an
-/// ascii file keep all their digits even where the header says float, as georeferenced ones need them. Binary files and those of
-/// lines are random_access (ascii PLY is not) and never mapped: resident memory does not grow with the file.
+/// one is an attribute, carried as float, integers of 32 bits and doubles in SampleBatch::exact as well. Positions in
+/// an ascii file keep all their digits even where the header says float, as georeferenced ones need them. Binary files
+/// and those of lines are random_access (ascii PLY is not) and never mapped: resident memory does not grow with the
+/// file.
 ///
 /// Throws Error(unreadable) naming the file and the place: missing file, directory, empty file, unknown format,
 /// malformed header, no points, no x y z, an incomplete normal, a column named twice, a list among a PLY vertex's
