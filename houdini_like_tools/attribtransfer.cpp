@@ -1,6 +1,7 @@
 // lamina attribtransfer: attributes from points to a mesh.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 #include <memory>
 
@@ -15,7 +16,7 @@ namespace lamina::tools {
 namespace {
 
 struct TransferOptions {
-  std::string mesh, points, output;
+  std::string mesh, points, output, columns;
   TransferSettings settings;
   RunOptions run;
 };
@@ -24,9 +25,14 @@ void run_transfer(const TransferOptions& o) {
   if (o.mesh == "-" && o.points == "-")
     throw Error(ExitCode::usage, "MESH and POINTS both name standard input; give one of them a file");
   const RunContext context = make_context(o.run);
-  TriangleMesh mesh = read_mesh_input(o.mesh, o.run.tmp_dir);
-  const auto points = open_points(o.points, o.run.tmp_dir);
-  const TransferReport report = transfer_attributes(*points, mesh, o.settings, context);
+  TriangleMesh mesh = read_mesh_input(o.mesh, context);
+  const auto points = open_point_input(o.points, o.columns, context);
+  TransferSettings settings = o.settings;
+  if (context.max_memory > 0) {
+    const std::uint64_t bytes = 64 + 4 * points->info().attributes.size();
+    settings.points_at_once = std::clamp<std::uint64_t>(context.max_memory / 4 / bytes, 1, settings.points_at_once);
+  }
+  const TransferReport report = transfer_attributes(*points, mesh, settings, context);
   write_mesh(mesh, o.output);
   if (report.unreachable > 0) {
     context.warn(fmt::format("{} of {} vertices have no point near enough; they keep the mesh's values, or get 0",
@@ -76,6 +82,7 @@ void add_attribtransfer(CLI::App& app) {
       ->type_name("LENGTH")
       ->capture_default_str()
       ->group(group);
+  add_columns(*tool, o->columns);
   add_run_options(*tool, o->run);
   add_examples(*tool,
                "  lamina attribtransfer mesh.ply scan.ply --attributes red,green,blue -o coloured.ply\n"

@@ -93,7 +93,7 @@ std::string objections(const CheckReport& r, bool closed) {
 }
 
 void run_check(const CheckOptions& o) {
-  const TriangleMesh mesh = read_mesh_input(o.mesh, {}, NonFinite::keep);
+  const TriangleMesh mesh = read_mesh_input(o.mesh, o.run, NonFinite::keep);
   if (mesh.triangles.empty())
     throw Error(ExitCode::unreadable, fmt::format("{}: has no faces: a point cloud, not a mesh", o.mesh));
   const CheckReport report = check_mesh(mesh, o.run);

@@ -18,7 +18,7 @@ namespace lamina::tools {
 namespace {
 
 struct ClipOptions {
-  std::string input, output;
+  std::string input, output, columns;
   ClipRegion region;
   Keep keep = Keep::inside;
   BadSamples bad = BadSamples::drop;
@@ -32,7 +32,7 @@ struct ClipOptions {
 }
 
 void clip_points(const ClipOptions& o, const RunContext& context) {
-  const auto source = open_points(o.input, o.run.tmp_dir);
+  const auto source = open_point_input(o.input, o.columns, context);
   const auto writer = open_points_writer(o.output, with_precision(columns_of(source->info()), o.precision),
                                          {.count = {}, .tmp_dir = o.run.tmp_dir});
   const EditReport report = edit_points(
@@ -44,7 +44,7 @@ void clip_points(const ClipOptions& o, const RunContext& context) {
 }
 
 void clip_triangles(const ClipOptions& o, const RunContext& context) {
-  const TriangleMesh mesh = read_mesh(o.input);
+  const TriangleMesh mesh = read_mesh_input(o.input, context);
   const TriangleMesh clipped = clip_mesh(mesh, o.region, o.keep, context);
   if (clipped.positions.empty()) nothing_left(o);
   write_mesh(clipped, o.output);
@@ -89,6 +89,7 @@ void add_clip(CLI::App& app) {
       ->check(CLI::IsMember({"inside", "outside"}).description(""))
       ->type_name("inside|outside")
       ->group("Region");
+  add_columns(*tool, o->columns);
   add_bad_samples(*tool, o->bad);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

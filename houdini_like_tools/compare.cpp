@@ -49,7 +49,7 @@ void print_table(const CompareResult& r) {
 void run_compare(const CompareOptions& o) {
   if (o.a == "-" && o.b == "-")
     throw Error(ExitCode::usage, "A and B both name standard input; give one of them a file");
-  const TriangleMesh a = read_mesh_input(o.a), b = read_mesh_input(o.b);
+  const TriangleMesh a = read_mesh_input(o.a, o.run), b = read_mesh_input(o.b, o.run);
   const CompareResult r = compare(a, b, o.settings, o.run);
   if (!o.json) {
     print_table(r);

@@ -11,6 +11,9 @@
 #include "lamina/edit_points.h"
 #include "lamina/error.h"
 #include "lamina/volume.h"
+#include "lamina/volume_info.h"
+#include "lamina/volume_level_set.h"
+#include "lamina/volume_points.h"
 #include "text.h"
 #include "tool.h"
 
@@ -18,8 +21,10 @@ namespace lamina::tools {
 namespace {
 
 struct ConvertOptions {
-  std::string input, output;
-  bool vertices = false;
+  std::string input, output, columns;
+  std::string grid;
+  bool vertices = false, fog = false;
+  MeshingSettings meshing;
   VolumeSettings volume;
   BadSamples bad = BadSamples::drop;
   Precision precision = Precision::automatic;
@@ -32,13 +37,48 @@ std::string ending(const std::string& path) {
   return e;
 }
 
+template <class T>
+void append(std::vector<T>& to, const std::vector<T>& from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
+
+/// OpenVDB's points grid is made of the whole cloud.
+void points_to_volume(const ConvertOptions& o, PointSource& source, const RunContext& context) {
+  PointArrays all;
+  all.layout = source.info().attributes;
+  all.samples.attributes.resize(all.layout.size());
+  SampleBatch batch;
+  constexpr std::size_t kBatch = std::size_t{1} << 16;
+  EditReport report;
+  for (std::uint64_t first = 0; first < source.info().count; first += kBatch) {
+    if (context.cancelled()) throw Error(ExitCode::internal, "cancelled");
+    source.read(first, kBatch, batch);
+    const EditReport part = clean_rows(batch);
+    if (part.bad_rows > 0 && o.bad == BadSamples::refuse) refuse_bad_row(part, shown_name(o.input));
+    add(report, part);
+    SampleBatch& s = all.samples;
+    append(s.x, batch.x), append(s.y, batch.y), append(s.z, batch.z);
+    append(s.nx, batch.nx), append(s.ny, batch.ny), append(s.nz, batch.nz);
+    append(s.radius, batch.radius), append(s.quality, batch.quality);
+    for (std::size_t a = 0; a < all.layout.size(); ++a) append(s.attributes[a], batch.attributes[a]);
+  }
+  warn_of_bad_rows(report, shown_name(o.input), context);
+  PointVolumeSettings settings;
+  settings.voxel = o.volume.voxel;
+  if (!o.grid.empty()) settings.name = o.grid;
+  const PointVolumeStats stats = write_point_volume(all, settings, o.output, context);
+  context.info(fmt::format("{} points in {} voxels of {:.4g}, {}", count_text(stats.points), count_text(stats.voxels),
+                           stats.voxel, bytes_text(stats.bytes)));
+}
+
 void convert_points(const ConvertOptions& o, const RunContext& context) {
   const std::string to = ending(o.output);
-  if (to == ".off" || to == ".stl" || to == ".vdb")
+  if (to == ".vdb") return points_to_volume(o, *open_point_input(o.input, o.columns, context), context);
+  if (to == ".off" || to == ".stl")
     throw Error(ExitCode::usage, fmt::format("{}: points do not become a {} file: make a mesh of them with 'lamina "
                                              "surface' first",
                                              shown_name(o.input), to));
-  const auto source = open_points(o.input, o.run.tmp_dir);
+  const auto source = open_point_input(o.input, o.columns, context);
   const auto writer = open_points_writer(o.output, with_precision(columns_of(source->info()), o.precision),
                                          {.count = {}, .tmp_dir = o.run.tmp_dir});
   const EditReport report = edit_points(*source, *writer, {}, o.bad, context);
@@ -75,8 +115,10 @@ void write_vertices(const ConvertOptions& o, const TriangleMesh& mesh, const Run
 }
 
 void convert_mesh(const ConvertOptions& o, const RunContext& context) {
-  const TriangleMesh mesh = read_mesh(o.input);
+  const TriangleMesh mesh = read_mesh_input(o.input, context);
   if (o.vertices) return write_vertices(o, mesh, context);
+  if (o.fog)
+    throw Error(ExitCode::usage, shown_name(o.input) + ": --fog wants a level set; make a .vdb of the mesh first");
   if (ending(o.output) != ".vdb") {
     write_mesh(mesh, o.output);
     context.info(fmt::format("wrote {} vertices, {} triangles", count_text(mesh.positions.size()),
@@ -88,6 +130,49 @@ void convert_mesh(const ConvertOptions& o, const RunContext& context) {
                            stats.has_sign ? "signed" : "unsigned"));
 }
 
+void volume_points_to_points(const ConvertOptions& o, const RunContext& context) {
+  const PointVolume volume = read_point_volume(o.input, o.grid);
+  for (const std::string& name : volume.skipped)
+    context.warn(fmt::format("{}: attribute {} is neither a number nor a vector; left out", o.input, name));
+  const SampleBatch& s = volume.points.samples;
+  PointColumns columns;
+  columns.double_positions = std::any_of(s.x.begin(), s.x.end(), [](double c) { return double(float(c)) != c; }) ||
+                             std::any_of(s.y.begin(), s.y.end(), [](double c) { return double(float(c)) != c; }) ||
+                             std::any_of(s.z.begin(), s.z.end(), [](double c) { return double(float(c)) != c; });
+  columns.normals = !s.nx.empty();
+  if (!s.radius.empty()) columns.radius = "radius";
+  if (!s.quality.empty()) columns.quality = "quality";
+  columns.attributes = volume.points.layout;
+  const auto writer =
+      open_points_writer(o.output, with_precision(columns, o.precision), {.count = s.size(), .tmp_dir = o.run.tmp_dir});
+  writer->append(s);
+  writer->commit();
+  context.info(fmt::format("wrote {} points", count_text(s.size())));
+}
+
+void convert_volume(const ConvertOptions& o, const RunContext& context) {
+  const VolumeInfo info = describe_volume(o.input);
+  const auto chosen = std::find_if(info.grids.begin(), info.grids.end(),
+                                   [&](const GridInfo& g) { return o.grid.empty() ? g.points : g.name == o.grid; });
+  const bool points_only =
+      std::all_of(info.grids.begin(), info.grids.end(), [](const GridInfo& g) { return g.points; });
+  if (chosen != info.grids.end() && chosen->points && (points_only || !o.grid.empty()))
+    return volume_points_to_points(o, context);
+  const LevelSet level_set = read_level_set(o.input, o.grid);
+  if (ending(o.output) == ".vdb") {
+    if (!o.fog)
+      throw Error(ExitCode::usage,
+                  fmt::format("{}: is a volume already; --fog makes a fog volume of its level set", o.input));
+    const std::uint64_t bytes = write_fog(level_set, {"density", 0, o.volume.half}, o.output, context);
+    context.info(fmt::format("a fog volume of {}", bytes_text(bytes)));
+    return;
+  }
+  const TriangleMesh mesh = mesh_level_set(level_set, o.meshing, context);
+  write_mesh(mesh, o.output);
+  context.info(fmt::format("wrote {} vertices, {} triangles", count_text(mesh.positions.size()),
+                           count_text(mesh.triangles.size())));
+}
+
 void run_convert(const ConvertOptions& o) {
   const RunContext context = make_context(o.run);
   switch (content_of(o.input, o.run.tmp_dir)) {
@@ -96,7 +181,7 @@ void run_convert(const ConvertOptions& o) {
     case FileContent::mesh:
       return convert_mesh(o, context);
     case FileContent::volume:
-      throw Error(ExitCode::usage, o.input + ": volumes cannot be converted");
+      return convert_volume(o, context);
   }
 }
 
@@ -105,25 +190,50 @@ void run_convert(const ConvertOptions& o) {
 void add_convert(CLI::App& app) {
   auto* tool = app.add_subcommand("convert", "Write points or a mesh in another format");
   auto o = std::make_shared<ConvertOptions>();
-  add_files(*tool, o->input, "Points (streamed) or mesh", o->output,
-            "Points, mesh (.ply .obj .off .stl) or, of a mesh, a level set (.vdb)");
+  add_files(*tool, o->input, "Points (streamed), mesh or volume (.vdb: level set or points)", o->output,
+            "Points, mesh (.ply .obj .off .stl) or volume (.vdb: of a mesh its level set, of points a points grid)");
   tool->add_flag("--vertices", o->vertices, "Write a mesh's vertices as points")->group("Output");
-  tool->add_option("--voxelsize", o->volume.voxel, "Level set: edge of a voxel; 0: the mean length of the edges")
+  const std::string volume = "Volume";
+  tool->add_option("--grid", o->grid, "Name of the grid to read, or of the points grid to write")
+      ->type_name("NAME")
+      ->group(volume);
+  tool->add_option("--voxelsize", o->volume.voxel,
+                   "Edge of a voxel; 0: of a level set the mean length of the edges, of points for eight in a voxel")
       ->type_name("LENGTH")
       ->capture_default_str()
-      ->group("Output");
-  tool->add_option("--halfbandvoxels", o->volume.band, "Level set: half width of its band, in voxels")
+      ->group(volume);
+  tool->add_option("--halfbandvoxels", o->volume.band, "Half width of a level set's band, in voxels")
       ->type_name("N")
       ->capture_default_str()
-      ->group("Output");
+      ->group(volume);
+  tool->add_option("--adaptivity", o->meshing.adaptivity, "Mesh of a level set: simplify flat parts, 0 to 1")
+      ->type_name("A")
+      ->capture_default_str()
+      ->group(volume);
+  tool->add_option("--isovalue", o->meshing.isovalue, "Mesh of a level set: at this distance from the surface")
+      ->type_name("LENGTH")
+      ->capture_default_str()
+      ->group(volume);
+  tool->add_flag("--fog", o->fog, "Make a fog volume of a level set")->group(volume);
+  tool->add_flag("--half", o->volume.half, "Store a level set or fog in 16-bit floats")->group(volume);
+  add_columns(*tool, o->columns);
   add_bad_samples(*tool, o->bad);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);
   add_examples(*tool,
                "  lamina convert mesh.ply -o mesh.obj\n"
                "  lamina convert mesh.ply -o mesh.vdb --voxelsize 0.05\n"
+               "  lamina convert mesh.vdb -o remeshed.ply\n"
+               "  lamina convert mesh.vdb --fog -o fog.vdb\n"
+               "  lamina convert scan.ply -o scan.vdb\n"
                "  lamina convert scan.ply --precision double -o scan_double.ply");
-  tool->callback([o] { run_convert(*o); });
+  tool->callback([o, tool] {
+    if (ending(o->output) != ".vdb") {
+      for (const char* name : {"--voxelsize", "--halfbandvoxels", "--half", "--fog"})
+        if (tool->count(name) > 0) throw CLI::ValidationError(name, "is for .vdb files; name one with --output");
+    }
+    run_convert(*o);
+  });
 }
 
 }  // namespace lamina::tools

@@ -9,7 +9,7 @@
 
 #include "console.h"
 #include "inputs.h"
-#include "lamina/error.h"
+#include "lamina/volume_info.h"
 #include "text.h"
 #include "tool.h"
 
@@ -17,7 +17,7 @@ namespace lamina::tools {
 namespace {
 
 struct InfoOptions {
-  std::string input;
+  std::string input, columns;
   bool json = false;
   RunOptions run;
 };
@@ -121,6 +121,64 @@ void print(const std::string& path, const MeshInfo& info) {
   print_columns(info.columns);
 }
 
+Json as_json(const GridInfo& g) {
+  Json j{{"name", g.name},
+         {"type", g.type},
+         {"class", g.grid_class},
+         {"half", g.half},
+         {"active_voxels", g.active_voxels},
+         {"active_tiles", g.active_tiles},
+         {"leaf_nodes", g.leaf_nodes},
+         {"internal_nodes", g.internal_nodes},
+         {"leaf_fill", g.leaf_fill},
+         {"memory_bytes", g.memory_bytes},
+         {"index_low", g.index_low},
+         {"index_high", g.index_high},
+         {"low", g.world_low},
+         {"high", g.world_high},
+         {"voxel", g.voxel},
+         {"transform_type", g.transform_type},
+         {"index_to_world", g.index_to_world},
+         {"value_low", g.value_low},
+         {"value_high", g.value_high},
+         {"points", g.point_count}};
+  j["attributes"] = Json::object();
+  for (const auto& [name, type] : g.attributes) j["attributes"][name] = type;
+  j["metadata"] = Json::object();
+  for (const auto& [name, value] : g.metadata) j["metadata"][name] = value;
+  return j;
+}
+
+Json as_json(const std::string& path, const VolumeInfo& info) {
+  Json j{{"file", path}, {"content", "volume"}, {"version", info.version}, {"bytes", info.bytes}};
+  j["grids"] = Json::array();
+  for (const GridInfo& g : info.grids) j["grids"].push_back(as_json(g));
+  return j;
+}
+
+void print(const GridInfo& g) {
+  const auto row = [](const char* label, const std::string& value) { fmt::print("  {:<12} {}\n", label, value); };
+  fmt::print("grid '{}': {}, {}{}{}\n", g.name, g.type, g.grid_class, g.half ? ", 16-bit" : "",
+             g.open ? ", open: a band only near data" : "");
+  if (g.points) row("points", fmt::format("{}", g.point_count));
+  row("voxels", fmt::format("{} active, {} active tiles", g.active_voxels, g.active_tiles));
+  row("tree", fmt::format("{} leaves {:.0f} % full, {} inner nodes, {}", g.leaf_nodes, 100 * g.leaf_fill,
+                          g.internal_nodes, bytes_text(g.memory_bytes)));
+  row("transform",
+      fmt::format("{}, voxel {:.6g} x {:.6g} x {:.6g}", g.transform_type, g.voxel[0], g.voxel[1], g.voxel[2]));
+  row("box", fmt::format("{:.9g} {:.9g} {:.9g}  to  {:.9g} {:.9g} {:.9g}", g.world_low[0], g.world_low[1],
+                         g.world_low[2], g.world_high[0], g.world_high[1], g.world_high[2]));
+  if (!g.points) row("values", fmt::format("{:.6g} to {:.6g}, background {}", g.value_low, g.value_high, g.background));
+  for (const auto& [name, type] : g.attributes) row("attribute", fmt::format("{} {}", name, type));
+  for (const auto& [name, value] : g.metadata) row("metadata", fmt::format("{} = {}", name, value));
+}
+
+void print(const std::string& path, const VolumeInfo& info) {
+  fmt::print("{}: {} {}, format {}, {}\n", path, info.grids.size(), info.grids.size() == 1 ? "grid" : "grids",
+             info.version, bytes_text(info.bytes));
+  for (const GridInfo& g : info.grids) print(g);
+}
+
 template <class Info>
 void show(const InfoOptions& o, const Info& info) {
   const std::string name = shown_name(o.input);
@@ -135,11 +193,11 @@ void run_info(const InfoOptions& o) {
   const RunContext context = make_context(o.run);
   switch (content_of(o.input, o.run.tmp_dir)) {
     case FileContent::points:
-      return show(o, describe_points(*open_points(o.input, o.run.tmp_dir), context));
+      return show(o, describe_points(*open_point_input(o.input, o.columns, context), context));
     case FileContent::mesh:
-      return show(o, describe_mesh(read_mesh(o.input, NonFinite::keep)));
+      return show(o, describe_mesh(read_mesh_input(o.input, context, NonFinite::keep)));
     case FileContent::volume:
-      throw Error(ExitCode::usage, o.input + ": volumes are not described");
+      return show(o, describe_volume(o.input));
   }
 }
 
@@ -150,10 +208,11 @@ void add_info(CLI::App& app) {
   auto o = std::make_shared<InfoOptions>();
   tool->add_option_function<std::string>(
           "INPUT", [o](const std::string& name) { o->input = pipe_name(name); },
-          "Points or mesh; - for PLY on standard input")
+          "Points, mesh or volume (.vdb); - for PLY on standard input")
       ->required()
       ->type_name("");
   tool->add_flag("--json", o->json, "Print JSON");
+  add_columns(*tool, o->columns);
   add_run_options(*tool, o->run);
   add_examples(*tool, "  lamina info scan.ply\n  lamina info mesh.ply --json");
   tool->callback([o] { run_info(*o); });

@@ -1,6 +1,13 @@
 #include "inputs.h"
 
+#include <fmt/format.h>
+
+#include <filesystem>
 #include <map>
+#include <system_error>
+
+#include "lamina/error.h"
+#include "text.h"
 
 namespace lamina::tools {
 void add_precision(CLI::App& app, Precision& precision) {
@@ -44,13 +51,36 @@ PointColumns with_precision(PointColumns columns, Precision precision) {
   return columns;
 }
 
+void add_columns(CLI::App& app, std::string& columns) {
+  app.add_option("--columns", columns,
+                 "What the columns of text files hold: names as in x,y,z,nx,ny,nz,red:uchar,-, - for those to skip")
+      ->type_name("NAMES")
+      ->group("Input");
+}
+
+std::unique_ptr<PointSource> open_point_input(const std::string& path, const std::string& columns,
+                                              const RunContext& context) {
+  std::unique_ptr<PointSource> source = open_points(path, PointSettings{context.tmp_dir, columns});
+  for (const std::string& remark : source->info().remarks) context.info(remark);
+  return source;
+}
+
 std::string shown_name(const std::string& path) {
   return path == "-" ? "standard input" : path;
 }
 
-TriangleMesh read_mesh_input(const std::string& path, const std::string& tmp_dir, NonFinite non_finite) {
+TriangleMesh read_mesh_input(const std::string& path, const RunContext& context, NonFinite non_finite) {
   const std::string name = pipe_name(path);
-  if (name == "-") content_of(name, tmp_dir);
+  if (name == "-") content_of(name, context.tmp_dir);
+  // Positions become doubles, and most tools make a second mesh of the first.
+  constexpr std::uintmax_t kBytesPerByte = 4;
+  std::error_code unknown;
+  const std::uintmax_t bytes = std::filesystem::file_size(name == "-" ? "/dev/stdin" : name, unknown);
+  if (!unknown && context.max_memory > 0 && bytes > context.max_memory / kBytesPerByte) {
+    throw Error(ExitCode::budget,
+                fmt::format("{}: a mesh of {} needs up to {} of memory, --max-memory allows {}", shown_name(name),
+                            bytes_text(bytes), bytes_text(kBytesPerByte * bytes), bytes_text(context.max_memory)));
+  }
   return read_mesh(name, non_finite);
 }
 

@@ -1,6 +1,7 @@
 // What the tools share about the files they read and write.
 #pragma once
 #include <CLI/CLI.hpp>
+#include <memory>
 #include <string>
 
 #include "console.h"
@@ -26,11 +27,19 @@ void add_files(CLI::App& app, std::string& input, const std::string& input_forma
 /// The columns with their positions in the precision asked for.
 PointColumns with_precision(PointColumns columns, Precision precision);
 
+/// --columns NAMES, in the group "Input": PointSettings::columns.
+void add_columns(CLI::App& app, std::string& columns);
+
+/// open_points(), saying what the reader found worth saying.
+std::unique_ptr<PointSource> open_point_input(const std::string& path, const std::string& columns,
+                                              const RunContext& context);
+
 /// "standard input" for "-".
 std::string shown_name(const std::string& path);
 
-/// read_mesh(), also from standard input.
-TriangleMesh read_mesh_input(const std::string& path, const std::string& tmp_dir = {},
+/// read_mesh(), also from standard input. Meshes are held whole: throws Error(budget) when the file is too large for
+/// context.max_memory.
+TriangleMesh read_mesh_input(const std::string& path, const RunContext& context,
                              NonFinite non_finite = NonFinite::refuse);
 
 /// What a tool's help ends with: command lines that work as they stand (the tests run them).

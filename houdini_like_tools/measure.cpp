@@ -87,7 +87,7 @@ void run_measure(const MeasureOptions& o) {
     throw Error(ExitCode::unreadable, fmt::format("{}: holds points; only meshes have an area ('lamina info' tells "
                                                   "where points lie)",
                                                   shown_name(o.mesh)));
-  const TriangleMesh mesh = read_mesh(o.mesh);
+  const TriangleMesh mesh = read_mesh_input(o.mesh, context);
   MeshMeasures measures;
   try {
     measures = measure_mesh(mesh, context);

@@ -3,8 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 #include <memory>
+#include <optional>
 
 #include "console.h"
 #include "inputs.h"
@@ -17,18 +19,19 @@ namespace {
 
 struct MergeOptions {
   std::vector<std::string> inputs;
-  std::string output;
+  std::string output, columns;
   MixedAttributes mixed = MixedAttributes::refuse;
   BadSamples bad = BadSamples::drop;
   Precision precision = Precision::automatic;
   RunOptions run;
 };
 
-void merge_points(const MergeOptions& o, const RunContext& context) {
+void merge_points(const MergeOptions& o, const std::vector<PointInput>& inputs, const RunContext& context) {
   std::vector<std::unique_ptr<PointSource>> sources;
   std::vector<const PointSourceInfo*> infos;
-  for (const std::string& input : o.inputs) {
-    sources.push_back(open_points(input, o.run.tmp_dir));
+  for (const PointInput& input : inputs) {
+    auto source = open_point_input(input.path, o.columns, context);
+    sources.push_back(input.posed ? pose_points(std::move(source), input.pose) : std::move(source));
     infos.push_back(&sources.back()->info());
   }
   const auto writer = open_points_writer(o.output, with_precision(merged_columns(infos, o.mixed), o.precision),
@@ -39,13 +42,19 @@ void merge_points(const MergeOptions& o, const RunContext& context) {
   context.info(fmt::format("{} points of {} files", count_text(writer->rows()), sources.size()));
 }
 
-void merge_triangles(const MergeOptions& o, const RunContext& context) {
+void merge_triangles(const MergeOptions& o, const std::vector<PointInput>& inputs, const RunContext& context) {
   std::vector<TriangleMesh> meshes;
-  for (const std::string& input : o.inputs) meshes.push_back(read_mesh(input));
-  const TriangleMesh merged = merge_meshes(std::move(meshes), o.inputs, o.mixed);
+  std::vector<std::string> names;
+  for (const PointInput& input : inputs) {
+    if (input.posed)
+      throw Error(ExitCode::usage, input.path + ": is a mesh; only points are moved by a pose, see 'lamina transform'");
+    names.push_back(shown_name(input.path));
+    meshes.push_back(read_mesh_input(input.path, context));
+  }
+  const TriangleMesh merged = merge_meshes(std::move(meshes), names, o.mixed);
   write_mesh(merged, o.output);
   context.info(fmt::format("{} vertices, {} triangles of {} files", count_text(merged.positions.size()),
-                           count_text(merged.triangles.size()), o.inputs.size()));
+                           count_text(merged.triangles.size()), inputs.size()));
 }
 
 void run_merge(const MergeOptions& o) {
@@ -53,16 +62,20 @@ void run_merge(const MergeOptions& o) {
   const auto word = [](FileContent content) {
     return content == FileContent::points ? "points" : content == FileContent::mesh ? "a mesh" : "a volume";
   };
-  const FileContent first = content_of(o.inputs.front(), o.run.tmp_dir);
-  for (const std::string& input : o.inputs) {
-    const FileContent content = input == o.inputs.front() ? first : content_of(input, o.run.tmp_dir);
-    if (content != first)
+  const std::vector<PointInput> inputs = expand_inputs(o.inputs);
+  std::optional<FileContent> first;
+  for (const PointInput& input : inputs) {
+    const FileContent content = content_of(input.path, o.run.tmp_dir);
+    if (!first) first = content;
+    if (content != *first)
       throw Error(ExitCode::usage,
                   fmt::format("{} holds {}, {} holds {}: only files of a kind can be merged",
-                              shown_name(o.inputs.front()), word(first), shown_name(input), word(content)));
+                              shown_name(inputs.front().path), word(*first), shown_name(input.path), word(content)));
   }
-  if (first == FileContent::volume) throw Error(ExitCode::usage, o.inputs.front() + ": volumes cannot be merged");
-  first == FileContent::points ? merge_points(o, context) : merge_triangles(o, context);
+  if (std::count_if(inputs.begin(), inputs.end(), [](const PointInput& i) { return i.path == "-"; }) > 1)
+    throw Error(ExitCode::usage, "two inputs name standard input; give one of them a file");
+  if (first == FileContent::volume) throw Error(ExitCode::usage, inputs.front().path + ": volumes cannot be merged");
+  first == FileContent::points ? merge_points(o, inputs, context) : merge_triangles(o, inputs, context);
 }
 
 }  // namespace
@@ -75,7 +88,8 @@ void add_merge(CLI::App& app) {
           [o](const std::vector<std::string>& names) {
             for (const std::string& name : names) o->inputs.push_back(pipe_name(name));
           },
-          "Points (streamed) or meshes, in the order in which they are to stand; - for PLY on standard input")
+          "Points (streamed) or meshes, in the order in which they are to stand: files, folders, patterns, scan lists "
+          "(.conf), FILE@POSE.txt; - for PLY on standard input")
       ->required()
       ->expected(1, 1000000)
       ->type_name("");
@@ -93,6 +107,7 @@ void add_merge(CLI::App& app) {
       ->check(CLI::IsMember({"refuse", "fill", "intersect"}).description(""))
       ->type_name("refuse|fill|intersect")
       ->group("Input");
+  add_columns(*tool, o->columns);
   add_bad_samples(*tool, o->bad);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

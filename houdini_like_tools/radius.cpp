@@ -14,7 +14,7 @@ namespace lamina::tools {
 namespace {
 
 struct RadiusOptions {
-  std::string input, output, name = "radius";
+  std::string input, output, columns, name = "radius";
   PointRadiiSettings settings;
   Precision precision = Precision::automatic;
   RunOptions run;
@@ -22,7 +22,11 @@ struct RadiusOptions {
 
 void run_radius(const RadiusOptions& o) {
   const RunContext context = make_context(o.run);
-  const auto source = open_points(o.input, o.run.tmp_dir);
+  const auto source = open_point_input(o.input, o.columns, context);
+  if (source->info().geographic)
+    throw Error(ExitCode::unreadable, shown_name(o.input) +
+                                          ": x and y are degrees of longitude and latitude, in which "
+                                          "no distance can be measured; project them to metres first");
   PointColumns columns = with_precision(columns_of(source->info()), o.precision);
   columns.radius = o.name;
   for (const AttributeSpec& spec : columns.attributes) {
@@ -71,6 +75,7 @@ void add_radius(CLI::App& app) {
       ->check(CLI::IsMember({"radius", "pscale"}).description(""))
       ->type_name("radius|pscale")
       ->group(group);
+  add_columns(*tool, o->columns);
   add_bad_samples(*tool, s.bad_samples);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

@@ -53,7 +53,7 @@ void run_scatter(const ScatterOptions& o, bool scanning) {
     scatter_over(o, *shape_surface(o.shape, o.colour));
     return;
   }
-  const TriangleMesh mesh = amphora ? amphora_mesh() : read_mesh_input(o.mesh);
+  const TriangleMesh mesh = amphora ? amphora_mesh() : read_mesh_input(o.mesh, o.run);
   if (scanning)
     scan_mesh(o, mesh);
   else

@@ -15,7 +15,7 @@ namespace lamina::tools {
 namespace {
 
 struct SortOptions {
-  std::string input, output;
+  std::string input, output, columns;
   SortSettings settings;
   Precision precision = Precision::automatic;
   RunOptions run;
@@ -23,7 +23,7 @@ struct SortOptions {
 
 void run_sort(const SortOptions& o) {
   const RunContext context = make_context(o.run);
-  const auto source = open_points(o.input, o.run.tmp_dir);
+  const auto source = open_point_input(o.input, o.columns, context);
   const auto writer = open_points_writer(o.output, with_precision(columns_of(source->info()), o.precision),
                                          {.count = {}, .tmp_dir = o.run.tmp_dir});
   const EditReport report = sort_points(*source, *writer, o.settings, context);
@@ -61,6 +61,7 @@ void add_sort(CLI::App& app) {
       ->excludes(by)
       ->group("Order");
   tool->add_flag("--reverse", o->settings.reverse, "Largest first")->group("Order");
+  add_columns(*tool, o->columns);
   add_bad_samples(*tool, o->settings.bad_samples);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

@@ -17,7 +17,7 @@ namespace lamina::tools {
 namespace {
 
 struct TransformOptions {
-  std::string input, output;
+  std::string input, output, columns;
   TransformSettings settings;
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
   bool has_matrix = false, invert = false;
@@ -47,7 +47,7 @@ bool needs_double(PointSource& source, const Eigen::Affine3d& transform, const R
 }
 
 void transform_points(const TransformOptions& o, const Eigen::Affine3d& transform, const RunContext& context) {
-  const auto source = open_points(o.input, o.run.tmp_dir);
+  const auto source = open_point_input(o.input, o.columns, context);
   PointColumns columns = with_precision(columns_of(source->info()), o.precision);
   if (o.precision == Precision::automatic && !columns.double_positions)
     columns.double_positions = needs_double(*source, transform, context);
@@ -60,7 +60,7 @@ void transform_points(const TransformOptions& o, const Eigen::Affine3d& transfor
 }
 
 void transform_triangles(const TransformOptions& o, const Eigen::Affine3d& transform, const RunContext& context) {
-  TriangleMesh mesh = read_mesh(o.input);
+  TriangleMesh mesh = read_mesh_input(o.input, context);
   transform_mesh(mesh, transform);
   write_mesh(mesh, o.output);
   context.info(fmt::format("moved {} vertices", count_text(mesh.positions.size())));
@@ -121,6 +121,7 @@ void add_transform(CLI::App& app) {
   matrix->group(group);
   for (const char* other : {"--scale", "--rotate", "--translate", "--pivot"}) matrix->excludes(tool->get_option(other));
   tool->add_flag("--invert", o->invert, "Undo the transform instead")->group(group);
+  add_columns(*tool, o->columns);
   add_bad_samples(*tool, o->bad);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

@@ -23,7 +23,7 @@ struct VolumeOptions {
 
 void run_volume(const VolumeOptions& o) {
   const RunContext context = make_context(o.run);
-  const TriangleMesh mesh = read_mesh_input(o.mesh, o.run.tmp_dir);
+  const TriangleMesh mesh = read_mesh_input(o.mesh, context);
   VolumeStats stats;
   try {
     stats = write_volume(mesh, o.settings, o.output, context);

@@ -14,8 +14,8 @@ namespace lamina {
 
 enum class FileContent { points, mesh, volume };
 
-/// What a file holds, by its first bytes and its name: .vdb volumes; OBJ, OFF, STL, and PLY that names faces, each
-/// also as .gz: meshes; everything else: points, for open_points() to judge.
+/// What a file holds, by its first bytes and its name: .vdb volumes; OFF, STL, and OBJ and PLY that name faces,
+/// each also as .gz: meshes; everything else: points, for open_points() to judge.
 ///
 /// "-" is standard input. A pipe can be read only once: it is first spooled to an unnamed file in `tmp_dir` (empty: the
 /// system's), which takes the place of the process's standard input, so that open_points("-") and read_mesh("-") read

@@ -31,8 +31,9 @@ enum class NonFinite {
 /// there, a polygon of fewer than three.
 TriangleMesh read_mesh(const std::string& path, NonFinite non_finite = NonFinite::refuse);
 
-/// Writes PLY, OBJ, OFF or STL by extension; beside, then renamed. "-" is standard output, as PLY. Positions read back as the same bits (as floats from
-/// STL). Throws Error(budget) when the file cannot be written, Error(usage) for another extension.
+/// Writes PLY, OBJ, OFF or STL by extension; beside, then renamed. "-" is standard output, as PLY. Positions read back
+/// as the same bits (as floats from STL). Throws Error(budget) when the file cannot be written, Error(usage) for
+/// another extension.
 void write_mesh(const TriangleMesh& mesh, const std::string& path);
 
 }  // namespace lamina

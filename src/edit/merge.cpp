@@ -114,6 +114,7 @@ std::vector<std::optional<std::size_t>> places(const AttributeLayout& merged, co
 
 std::vector<std::string> names_of(const AttributeLayout& layout) {
   std::vector<std::string> names;
+  names.reserve(layout.size());
   for (const AttributeSpec& spec : layout) names.push_back(spec.name);
   return names;
 }

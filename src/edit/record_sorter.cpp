@@ -46,7 +46,9 @@ RecordSorter::RecordSorter(std::size_t record_bytes, std::size_t memory_bytes, s
       capacity_(
           std::clamp(memory_bytes / (record_bytes + kKeyBytes + sizeof(std::uint32_t)), kLeastRecords, kMostRecords)),
       records_(std::make_unique_for_overwrite<std::byte[]>(capacity_ * record_bytes)),
-      file_(std::move(directory)) {}
+      file_(std::move(directory)) {
+  keys_.reserve(capacity_);  // growing would take twice the memory for a while
+}
 
 RecordSorter::~RecordSorter() = default;
 

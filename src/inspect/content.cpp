@@ -4,6 +4,7 @@
 #include <unistd.h>
 #include <zlib.h>
 
+#include <array>
 #include <cerrno>
 #include <memory>
 #include <string>
@@ -77,6 +78,21 @@ bool names_faces(std::string_view header) {
   return false;
 }
 
+/// Vertices come first: the whole file has to be looked at when there are no faces.
+bool obj_names_faces(const std::string& path) {
+  const std::unique_ptr<gzFile_s, int (*)(gzFile)> file(gzopen(path.c_str(), "rb"), gzclose_r);
+  if (file == nullptr) return true;  // the mesh's reader will say why
+  gzbuffer(file.get(), 1U << 18);
+  std::array<char, 4096> line{};
+  bool line_start = true;
+  while (gzgets(file.get(), line.data(), static_cast<int>(line.size())) != nullptr) {
+    const std::string_view text(line.data());
+    if (line_start && (text.starts_with("f ") || text.starts_with("f\t"))) return true;
+    line_start = !text.empty() && text.back() == '\n';
+  }
+  return false;
+}
+
 }  // namespace
 
 FileContent content_of(const std::string& path, const std::string& tmp_dir) {
@@ -88,7 +104,7 @@ FileContent content_of(const std::string& path, const std::string& tmp_dir) {
   if (start.starts_with("ply\n") || start.starts_with("ply\r"))
     return names_faces(start) ? FileContent::mesh : FileContent::points;
   if (format == ".vdb") return FileContent::volume;
-  const bool mesh = format == ".obj" || format == ".off" || format == ".stl";
+  const bool mesh = format == ".off" || format == ".stl" || (format == ".obj" && obj_names_faces(path));
   return mesh ? FileContent::mesh : FileContent::points;
 }
 

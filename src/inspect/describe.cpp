@@ -40,6 +40,7 @@ bool is_finite_row(const SampleBatch& b, std::size_t i) {
 
 std::vector<ColumnRange> results(const std::vector<RangeOf>& ranges) {
   std::vector<ColumnRange> out;
+  out.reserve(ranges.size());
   for (const RangeOf& range : ranges) out.push_back(range.result());
   return out;
 }
