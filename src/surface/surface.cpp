@@ -21,6 +21,7 @@
 #include "surface/plan.h"
 #include "surface/stopwatch.h"
 #include "surface/survey.h"
+#include "volume/surface_volume.h"
 
 namespace lamina {
 namespace {
@@ -60,9 +61,21 @@ std::string temporary_directory(const SurfaceSettings& settings, const RunContex
   return parent.empty() ? "." : parent;
 }
 
+/// Volume tools like a lattice aligned with the input's axes.
+FrameMode frame_mode(const SurfaceSettings& settings) {
+  return settings.frame.value_or(settings.volume.wanted() ? FrameMode::axis : FrameMode::pca);
+}
+
 /// A mesh in the place of its points would cost the user the scan.
 void require_two_files(const SurfaceSettings& settings) {
   std::error_code ignored;
+  for (const std::string& grids : {settings.volume.path, settings.volume.points}) {
+    if (grids.empty()) continue;
+    const bool input = std::filesystem::is_regular_file(grids, ignored) && settings.input != "-" &&
+                       std::filesystem::equivalent(settings.input, grids, ignored);
+    if (input || grids == settings.output)
+      throw Error(ExitCode::usage, fmt::format("{}: is named twice; give the grids a file of their own", grids));
+  }
   if (settings.input == "-" || settings.output == "-" || settings.output.empty()) return;
   if (std::filesystem::is_regular_file(settings.output, ignored) &&
       std::filesystem::equivalent(settings.input, settings.output, ignored)) {
@@ -172,7 +185,7 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
   const PointSourceInfo& info = source->info();
   Survey survey;
   watch.time("survey", [&] { survey = survey_input(*source, settings.bad_samples, run); });
-  const Frame frame = choose_frame(survey, settings.frame);
+  const Frame frame = choose_frame(survey, frame_mode(settings));
   std::optional<Ingested> ingested;
   watch.time("store", [&] { ingested.emplace(ingest(*source, survey, frame, settings.radius_scale, tmp, run)); });
   const auto plan_for = [&](const SurfaceSettings& s) {
@@ -211,7 +224,11 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
     out.double_positions = needs_double(survey, resolved.plan.finest_cell);
     MeshSink sink(out);
     SampleFeed feed(ingested->store, resolved.lattice, resolved.feed, resolved.radii, info.has_radius);
-    Pipeline pipeline(settings, resolved, frame, ingested->extent, feed, info.attributes.size(), sink);
+    std::optional<SurfaceVolume> volume;
+    if (settings.volume.wanted())
+      volume.emplace(settings.volume, frame, resolved.lattice, resolved.main_level, info.attributes, tmp);
+    Pipeline pipeline(settings, resolved, frame, ingested->extent, feed, info.attributes.size(), sink,
+                      volume ? &*volume : nullptr);
     pipeline.run(run, watch);
     pipeline.report(stats);
     warn_of_contradictions(stats, input_name(settings), run);
@@ -225,6 +242,11 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
                   fmt::format("{}: no surface came out of {} samples; they lie too far apart for their radii, or on no "
                               "surface at all (try --blend or --particlescale above 1)",
                               input_name(settings), resolved.plan.samples));
+    }
+    if (volume) {
+      watch.time("volume", [&] { volume->finish(/*open=*/stats.rejected_loops > 0); });
+      volume->commit();
+      stats.volume = volume->stats();
     }
     watch.time("commit", [&] { sink.commit(); });
     stats.vertices = sink.vertices();
