@@ -5,14 +5,17 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <utility>
 
 #include "project/corner_value.h"
 #include "window/bits.h"
+#include "window/block_cache.h"
 
 namespace lamina::volume {
 namespace {
 
 constexpr std::int32_t kBatch = 8;  ///< planes worth a round
+constexpr float kBeyond = 1;        ///< voxels outside of the band that tell the side of its neighbours
 
 std::int16_t packed(float n) {
   return static_cast<std::int16_t>(std::lrint(std::clamp(n, -1.0F, 1.0F) * Brick::kUnit));
@@ -39,15 +42,19 @@ Band::Band(BandSettings settings, const Lattice& lattice) : settings_(std::move(
   settings_.rounds = std::clamp(settings_.rounds, 0, kMaxRounds);
 }
 
+std::uint64_t Band::key_of(const Block& b) {
+  return std::uint64_t{static_cast<std::uint32_t>(b.y)} << 32 | static_cast<std::uint32_t>(b.x);
+}
+
 Brick* Band::find(const Block& b) const {
   const auto layer = layers_.find(b.z);
   if (layer == layers_.end()) return nullptr;
-  const auto found = layer->second.find({b.y, b.x});
+  const auto found = layer->second.find(key_of(b));
   return found == layer->second.end() ? nullptr : found->second.get();
 }
 
 Brick& Band::touch(const Block& b) {
-  std::unique_ptr<Brick>& brick = layers_[b.z][{b.y, b.x}];
+  std::unique_ptr<Brick>& brick = layers_[b.z][key_of(b)];
   if (brick == nullptr) {
     // Values are written before they are read, where the masks say so.
     brick = std::make_unique_for_overwrite<Brick>();
@@ -90,7 +97,6 @@ void Band::collect_level(const Window& window, std::int32_t slab) {
     if (any != 0) jobs.push_back({t.leaf, &touch(t.block), begin, end});
   }
   const float per_voxel = 1.0F / static_cast<float>(lattice_.cell_size(level));
-  const auto limit = static_cast<float>(settings_.band);
   tbb::parallel_for(std::size_t{0}, jobs.size(), [&](std::size_t j) {
     const auto [leaf, brick, begin, end] = jobs[j];
     for (int z = begin; z < end; ++z) {
@@ -104,7 +110,6 @@ void Band::collect_level(const Window& window, std::int32_t slab) {
         const std::uint32_t i =
             base + static_cast<std::uint32_t>(std::popcount(near & ((std::uint64_t{1} << bit) - 1)));
         const float d = values.channel(kDistance)[i] * per_voxel;
-        if (!(std::abs(d) < limit)) continue;
         brick->known[0].set(at);
         brick->distance[at] = d;
         for (int k = 0; k < 3; ++k) brick->normal[k][at] = packed(values.channel(kNormalX + k)[i]);
@@ -132,20 +137,21 @@ void Band::collect_finer(const Window& window, std::int32_t slab, int level) {
   const std::vector<Tile> tiles = window.tiles(level, slab);
   std::vector<std::vector<Found>> found(tiles.size());
   const float per_voxel = 1.0F / static_cast<float>(lattice_.cell_size(settings_.level));
+  const auto limit = static_cast<float>(settings_.band) + kBeyond;
   tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
     const Tile& t = tiles[i];
     const std::int32_t first = lattice_.first_layer(level, slab) - t.block.z * 8;
     std::vector<float> attributes(static_cast<std::size_t>(window.attributes()));
     for (int z = std::max(first, 0); z < std::min(8, first + lattice_.layers(level)); ++z) {
       if (((t.block.z * 8 + z) & mask) != 0) continue;
-      for (std::uint64_t w = t.leaf->good.words[z] & t.leaf->valued.words[z]; w != 0; w &= w - 1) {
+      for (std::uint64_t w = t.leaf->valued.words[z]; w != 0; w &= w - 1) {
         const int bit = std::countr_zero(w);
         const Cell corner{t.block.x * 8 + (bit & 7), t.block.y * 8 + (bit >> 3), t.block.z * 8 + z};
         if (((corner.x | corner.y) & mask) != 0) continue;
         CornerValue v;
         if (!corner_value(window, level, corner, v, attributes.data())) continue;
         Found f{{corner.x >> shift, corner.y >> shift, corner.z >> shift}, v.distance * per_voxel, v.normal, {}};
-        if (!(std::abs(f.distance) < static_cast<float>(settings_.band))) continue;
+        if (!(std::abs(f.distance) < limit)) continue;
         for (const int c : settings_.channels) f.extra.push_back(channel_of(v, attributes, c));
         found[i].push_back(std::move(f));
       }
@@ -161,43 +167,63 @@ void Band::collect_coarser(const Window& window, std::int32_t slab, int level) {
   const std::vector<Tile> tiles = window.tiles(level, slab);
   std::vector<std::vector<Found>> found(tiles.size());
   const float per_voxel = 1.0F / static_cast<float>(lattice_.cell_size(settings_.level));
-  const auto limit = static_cast<float>(settings_.band);
+  const auto limit = static_cast<float>(settings_.band) + kBeyond;
   const float farthest = limit + 1.75F * static_cast<float>(side);  // no voxel of the cell lies in the band
   const std::size_t channels = settings_.channels.size();
   tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
     const Tile& t = tiles[i];
     const std::int32_t first = lattice_.first_layer(level, slab) - t.block.z * 8;
     std::vector<float> attributes(static_cast<std::size_t>(window.attributes()));
+    BlockCache cache(window);
     std::array<CornerValue, 8> corners;
     std::array<std::vector<float>, 8> extras;
     for (int z = std::max(first, 0); z < std::min(8, first + lattice_.layers(level)); ++z) {
       for (std::uint64_t w = t.leaf->cells.words[z]; w != 0; w &= w - 1) {
         const int bit = std::countr_zero(w);
         const Cell cell{t.block.x * 8 + (bit & 7), t.block.y * 8 + (bit >> 3), t.block.z * 8 + z};
-        bool complete = true;
-        for (int k = 0; k < 8 && complete; ++k) {
+        // The surface crosses a cell only between valued corners; far from it none is trusted.
+        int trusted = 0, valued = 0;
+        for (int k = 0; k < 8; ++k)
+          trusted += cache.test(level, cell + Cell{k & 1, k >> 1 & 1, k >> 2}, &CornerBlock::good);
+        if (trusted == 0) continue;
+        std::array<bool, 8> has{};
+        float nearest = farthest;
+        for (int k = 0; k < 8; ++k) {
           const Cell corner = cell + Cell{k & 1, k >> 1 & 1, k >> 2};
-          complete = corner_value(window, level, corner, corners[k], attributes.data()) &&
-                     std::abs(corners[k].distance) * per_voxel < farthest;
+          has[k] = corner_value(window, level, corner, corners[k], attributes.data());
+          if (!has[k]) continue;
+          nearest = std::min(nearest, std::abs(corners[k].distance) * per_voxel);
+          if (nearest >= farthest) break;
+          ++valued;
           extras[k].clear();
-          for (const int c : settings_.channels)
-            if (complete) extras[k].push_back(channel_of(corners[k], attributes, c));
+          for (const int c : settings_.channels) extras[k].push_back(channel_of(corners[k], attributes, c));
         }
-        if (!complete) continue;
+        if (valued < 4 || nearest >= farthest) continue;
         for (int v = 0; v < side * side * side; ++v) {
           const std::array<int, 3> in{v & (side - 1), v >> shift & (side - 1), v >> (2 * shift)};
           Found f{{(cell.x << shift) + in[0], (cell.y << shift) + in[1], (cell.z << shift) + in[2]}, 0, {}, {}};
           f.extra.assign(channels, 0);
+          float total = 0, values = 0, planes = 0;
           for (int k = 0; k < 8; ++k) {
-            float weight = 1;
+            if (!has[k]) continue;
+            float weight = 1, plane = corners[k].distance * per_voxel;
             for (int a = 0; a < 3; ++a) {
-              const float x = static_cast<float>(in[a]) / static_cast<float>(side);
-              weight *= (k >> a & 1) != 0 ? x : 1 - x;
+              const auto x = static_cast<float>(in[a]);
+              const float at_corner = (k >> a & 1) != 0 ? static_cast<float>(side) : 0.0F;
+              weight *= 1 - std::abs(x - at_corner) / static_cast<float>(side);
+              plane += corners[k].normal[a] * (x - at_corner);
             }
-            f.distance += weight * corners[k].distance * per_voxel;
+            total += weight;
+            values += weight * corners[k].distance * per_voxel;
+            planes += weight * plane;
             for (std::size_t a = 0; a < 3; ++a) f.normal[a] += weight * corners[k].normal[a];
             for (std::size_t c = 0; c < channels; ++c) f.extra[c] += weight * extras[k][c];
           }
+          if (!(total > 0)) continue;
+          // Values between corners lie outside of a curved surface's distance by as much as the corners' planes lie
+          // inside; corners without a value have no say in either, which only the planes can bear.
+          f.distance = (valued == 8 ? 0.5F * (values + planes) : planes) / total;
+          for (float& e : f.extra) e /= total;
           const float length = std::hypot(f.normal[0], f.normal[1], f.normal[2]);
           if (!(length > 1e-3F) || !(std::abs(f.distance) < limit)) continue;
           for (float& n : f.normal) n /= length;
@@ -264,9 +290,13 @@ std::vector<std::unique_ptr<Brick>> Band::pop(bool end) {
   // A layer's last plane is still read by the round of the plane above.
   while (!layers_.empty() && begun_ &&
          (end || layers_.begin()->first * 8 + 8 < done_[settings_.rounds] - (settings_.rounds > 0 ? 1 : 0))) {
+    const auto first = static_cast<std::ptrdiff_t>(out.size());
     for (auto& [key, brick] : layers_.begin()->second)
       if (all(*brick).any()) out.push_back(std::move(brick));
     layers_.erase(layers_.begin());
+    std::sort(out.begin() + first, out.end(), [](const auto& a, const auto& b) {
+      return std::pair(a->block.y, a->block.x) < std::pair(b->block.y, b->block.x);
+    });
   }
   return out;
 }

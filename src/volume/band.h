@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <utility>
+#include <unordered_map>
 #include <vector>
 
 #include "window/window.h"
@@ -51,7 +51,8 @@ class Band {
   [[nodiscard]] const BlockMask& all(const Brick& brick) const { return brick.known[settings_.rounds]; }
 
  private:
-  using Layer = std::map<std::pair<std::int32_t, std::int32_t>, std::unique_ptr<Brick>>;  // by y, x
+  using Layer = std::unordered_map<std::uint64_t, std::unique_ptr<Brick>>;  // by y, x
+  static std::uint64_t key_of(const Block& b);
   struct Found;
   Brick* find(const Block& b) const;
   Brick& touch(const Block& b);

@@ -1,9 +1,10 @@
-// The band grows: a voxel beside known ones takes its distance from their tangent planes.
+// The band grows: a known voxel gives those that lie beyond it along its normal the distance of its tangent plane.
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <optional>
 
 #include "volume/band.h"
 #include "window/bits.h"
@@ -11,142 +12,99 @@
 namespace lamina::volume {
 namespace {
 
-constexpr int kRow = 10, kPlane = kRow * kRow;
-
-/// A brick's known voxels and one around it, dense: [z + 1][y + 1][x + 1].
-struct Field {
-  std::array<float, 10 * kPlane> distance;
-  std::array<std::array<float, 10 * kPlane>, 3> normal;
-  std::array<bool, 10 * kPlane> known;
-};
-
 using Around = std::array<const Brick*, 27>;
 
-void gather(const Around& around, int round, int begin, int end, Field& f) {
-  std::fill(f.known.begin() + begin * kPlane, f.known.begin() + (end + 2) * kPlane, false);
-  for (int i = 0; i < 27; ++i) {
-    const Brick* brick = around[i];
-    if (brick == nullptr) continue;
-    const int dx = i % 3 - 1, dy = i / 3 % 3 - 1, dz = i / 9 - 1;
-    for (int z = std::max(begin - 1, dz * 8); z < std::min(end + 1, dz * 8 + 8); ++z) {
-      std::uint64_t w = brick->known[round].words[z - dz * 8];
-      if (dx < 0) w &= 0x8080808080808080ULL;
-      if (dx > 0) w &= 0x0101010101010101ULL;
-      if (dy < 0) w &= 0xFF00000000000000ULL;
-      if (dy > 0) w &= 0x00000000000000FFULL;
-      for (; w != 0; w &= w - 1) {
-        const int bit = std::countr_zero(w), from = (z - dz * 8) * 64 + bit;
-        const int at = (z + 1) * kPlane + ((bit >> 3) + dy * 8 + 1) * kRow + (bit & 7) + dx * 8 + 1;
-        f.known[at] = true;
-        f.distance[at] = brick->distance[from];
-        for (int k = 0; k < 3; ++k) f.normal[k][at] = brick->normal_at(k, from);
-      }
-    }
-  }
-}
-
 struct Offset {
-  int at;         ///< in the field
-  int x, y, z;    ///< of the neighbour
+  int x, y, z;
   float squared;  ///< length
 };
 
-constexpr std::array<Offset, 26> make_offsets() {
-  std::array<Offset, 26> out{};
-  std::size_t n = 0;
-  for (int z = -1; z <= 1; ++z)
-    for (int y = -1; y <= 1; ++y)
-      for (int x = -1; x <= 1; ++x)
-        if (x != 0 || y != 0 || z != 0)
-          out[n++] = {z * kPlane + y * kRow + x, x, y, z, static_cast<float>(x * x + y * y + z * z)};
+/// The middle is one of them, and out of everybody's reach.
+constexpr std::array<Offset, 27> make_offsets() {
+  std::array<Offset, 27> out{};
+  for (int i = 0; i < 27; ++i) {
+    const int x = i % 3 - 1, y = i / 3 % 3 - 1, z = i / 9 - 1;
+    out[static_cast<std::size_t>(i)] = {x, y, z, static_cast<float>(x * x + y * y + z * z)};
+  }
   return out;
 }
-constexpr std::array<Offset, 26> kOffsets = make_offsets();
+constexpr std::array<Offset, 27> kOffsets = make_offsets();
+constexpr std::uint32_t kMiddle = 13;
 
-/// A neighbour counts as far as the way from it leads along its normal: squared sideways distance below this, voxels.
-/// The best of 26 directions is off by 0.35 at most; a whole voxel sideways would let the band grow over a rim.
+/// A voxel reaches another as far as the way to it leads along its normal: squared sideways distance below this. The
+/// best of 26 directions is off by 0.35 at most; a whole voxel sideways would let the band grow over a rim.
 constexpr float kSideways = 0.75F;
-
-/// Repaired corners count within this distance of the surface, voxels; farther out the way along normals is exacter.
+/// Repaired corners count within this distance of the surface, voxels.
 constexpr float kRepaired = 1;
 
-struct Grown {
-  float distance = 0;
-  std::array<float, 3> normal{};
-  std::array<float, 26> weight{};
+float sideways(const Offset& o, const std::array<float, 3>& n) {
+  const float along = n[0] * static_cast<float>(o.x) + n[1] * static_cast<float>(o.y) + n[2] * static_cast<float>(o.z);
+  return along > 0 ? o.squared - along * along : o.squared;
+}
+
+/// The offsets that a normal may reach, by the sixteenths its components lie in.
+class Reach {
+ public:
+  Reach() {
+    for (int i = 0; i < 4096; ++i) {
+      std::array<float, 3> n{};
+      float squared = 0;
+      for (int k = 0; k < 3; ++k) {
+        n[k] = (static_cast<float>(i >> (4 * k) & 15) + 0.5F) / 8 - 1;
+        squared += n[k] * n[k];
+      }
+      for (float& c : n) c /= std::sqrt(squared);
+      // A component may differ by a sixteenth from the middle.
+      constexpr float kMargin = 0.3F;
+      for (std::uint32_t o = 0; o < 27; ++o)
+        if (o != kMiddle && sideways(kOffsets[o], n) < kSideways + kMargin) lists_[i] |= 1U << o;
+    }
+  }
+  [[nodiscard]] std::uint32_t of(const std::array<float, 3>& n) const {
+    int at = 0;
+    for (int k = 0; k < 3; ++k) at |= std::clamp(static_cast<int>((n[k] + 1) * 8), 0, 15) << (4 * k);
+    return lists_[at];
+  }
+
+ private:
+  std::array<std::uint32_t, 4096> lists_{};
 };
 
-bool normalise(float total, float least, Grown& out) {
-  const float length = std::hypot(out.normal[0], out.normal[1], out.normal[2]);
-  if (!(length > least * total)) return false;
-  out.distance /= total;
-  for (float& n : out.normal) n /= length;
-  for (float& w : out.weight) w /= total;
-  return true;
+const Reach& reach() {
+  static const Reach table;
+  return table;
 }
 
-/// As corner_value() does it: the mean of all neighbours' planes, weights 1 / m^2.
-bool repair(const Field& f, int at, Grown& out) {
-  float total = 0;
-  out = {};
-  for (std::size_t i = 0; i < 26; ++i) {
-    const Offset& o = kOffsets[i];
-    const int from = at + o.at;
-    if (!f.known[from]) continue;
-    const float w = 1 / (o.squared * o.squared);
-    const std::array<float, 3> n{f.normal[0][from], f.normal[1][from], f.normal[2][from]};
-    out.weight[i] = w;
-    total += w;
-    out.distance += w * (f.distance[from] - n[0] * static_cast<float>(o.x) - n[1] * static_cast<float>(o.y) -
-                         n[2] * static_cast<float>(o.z));
-    for (std::size_t k = 0; k < 3; ++k) out.normal[k] += w * n[k];
-  }
-  return total > 0 && normalise(total, 1e-6F, out);
-}
+/// Weighted sums at the voxels of a brick.
+struct Sums {
+  std::array<float, 512> weight, distance;
+  std::array<std::array<float, 512>, 3> normal;
+  std::vector<float> extra;
 
-bool extend(const Field& f, int at, Grown& out) {
-  float total = 0;
-  out.distance = 0;
-  out.normal = {};
-  for (std::size_t i = 0; i < 26; ++i) {
-    const Offset& o = kOffsets[i];
-    out.weight[i] = 0;
-    const int from = at + o.at;
-    if (!f.known[from]) continue;
-    const float nx = f.normal[0][from], ny = f.normal[1][from], nz = f.normal[2][from];
-    // The way from the neighbour to the voxel.
-    const float along = -(nx * static_cast<float>(o.x) + ny * static_cast<float>(o.y) + nz * static_cast<float>(o.z));
-    const float d = f.distance[from];
-    // Away from the surface only: what lies towards it is a hole in the data, not a part of the band.
-    if (along * d < 0) continue;
-    const float sideways = o.squared - along * along;
-    if (!(sideways < kSideways)) continue;
-    const float w = (kSideways - sideways) * (kSideways - sideways);
-    out.weight[i] = w;
-    total += w;
-    out.distance += w * (d + along);
-    out.normal[0] += w * nx;
-    out.normal[1] += w * ny;
-    out.normal[2] += w * nz;
+  void clear(int at, std::size_t channels) {
+    weight[at] = distance[at] = 0;
+    for (auto& n : normal) n[at] = 0;
+    extra.resize(std::max(extra.size(), 512 * channels));
+    for (std::size_t c = 0; c < channels; ++c) extra[c * 512 + at] = 0;
   }
-  // Neighbours of two sheets that face each other say nothing together.
-  return total > 0 && normalise(total, 0.5F, out);
-}
-
-/// Extra channels follow the same weights; they are seldom asked for, and looked up where they lie.
-void extend_extra(const Around& around, int x, int y, int z, const Grown& grown, std::size_t channels, Brick& brick) {
-  for (std::size_t c = 0; c < channels; ++c) {
-    float sum = 0;
-    for (std::size_t i = 0; i < 26; ++i) {
-      if (grown.weight[i] == 0) continue;
-      const int nx = x + kOffsets[i].x, ny = y + kOffsets[i].y, nz = z + kOffsets[i].z;
-      const Brick* from = around[(nx >> 3) + 1 + 3 * ((ny >> 3) + 1) + 9 * ((nz >> 3) + 1)];
-      sum +=
-          grown.weight[i] * from->extra[c * 512 + static_cast<std::size_t>(BlockMask::offset(nx & 7, ny & 7, nz & 7))];
-    }
-    brick.extra[c * 512 + static_cast<std::size_t>(BlockMask::offset(x, y, z))] = sum;
+  void add(int at, float w, float d, const std::array<float, 3>& n, const Brick& from, int from_at,
+           std::size_t channels) {
+    weight[at] += w;
+    distance[at] += w * d;
+    for (std::size_t k = 0; k < 3; ++k) normal[k][at] += w * n[k];
+    for (std::size_t c = 0; c < channels; ++c) extra[c * 512 + at] += w * from.extra[c * 512 + from_at];
   }
-}
+  /// False where neighbours of two sheets that face each other say nothing together.
+  bool store(int at, float least, std::size_t channels, Brick& to) const {
+    const float squared = normal[0][at] * normal[0][at] + normal[1][at] * normal[1][at] + normal[2][at] * normal[2][at];
+    if (!(squared > least * least * weight[at] * weight[at])) return false;
+    const float inverse = 1 / weight[at], unit = Brick::kUnit / std::sqrt(squared);
+    to.distance[at] = distance[at] * inverse;
+    for (std::size_t k = 0; k < 3; ++k) to.normal[k][at] = static_cast<std::int16_t>(std::lrint(normal[k][at] * unit));
+    for (std::size_t c = 0; c < channels; ++c) to.extra[c * 512 + at] = extra[c * 512 + at] * inverse;
+    return true;
+  }
+};
 
 bits::Neighbourhood masks(const Around& around, int round) {
   bits::Neighbourhood n{};
@@ -154,32 +112,131 @@ bits::Neighbourhood masks(const Around& around, int round) {
   return n;
 }
 
-void grow_brick(const Around& around, int round, int begin, int end, std::size_t channels, Brick& brick) {
-  static thread_local Field field;
-  const bits::Neighbourhood before = masks(around, round - 1);
-  bool gathered = false;
-  for (int z = begin; z < end; ++z) {
-    const std::uint64_t known = brick.known[round - 1].words[z];
-    std::uint64_t now = known;
-    for (std::uint64_t w = bits::dilate_layer(before, z, -1, 1) & ~known; w != 0; w &= w - 1) {
-      if (!gathered) gather(around, round - 1, begin, end, field);
-      gathered = true;
-      const int bit = std::countr_zero(w), x = bit & 7, y = bit >> 3, at = z * 64 + bit;
-      const int in_field = (z + 1) * kPlane + (y + 1) * kRow + x + 1;
-      Grown grown;
-      // Next to the surface the band agrees with the mesh.
-      const bool here = round == 1 && brick.repaired.test(at) && repair(field, in_field, grown) &&
-                        std::abs(grown.distance) <= kRepaired;
-      if (!here && !extend(field, in_field, grown)) continue;
-      now |= w & (~w + 1);
-      brick.distance[at] = grown.distance;
-      for (int k = 0; k < 3; ++k)
-        brick.normal[k][at] = static_cast<std::int16_t>(std::lrint(grown.normal[k] * Brick::kUnit));
-      if (channels > 0) extend_extra(around, x, y, z, grown, channels, brick);
+/// One step of one brick: from the voxels that are known, in a fixed order, to those beside them that are not.
+class Step {
+ public:
+  Step(const Around& around, int round, int begin, int end, const BandSettings& settings, Sums& sums)
+      : around_(around),
+        round_(round),
+        begin_(begin),
+        end_(end),
+        channels_(settings.channels.size()),
+        farthest_(static_cast<float>(settings.band) - 0.25F),
+        sums_(sums) {}
+
+  void run(Brick& brick) {
+    const bits::Neighbourhood before = masks(around_, round_ - 1);
+    bool any = false;
+    for (int z = begin_; z < end_; ++z) {
+      wanted_.words[z] = bits::dilate_layer(before, z, -1, 1) & ~brick.known[round_ - 1].words[z];
+      any = any || wanted_.words[z] != 0;
+      for (std::uint64_t w = wanted_.words[z]; w != 0; w &= w - 1) sums_.clear(z * 64 + std::countr_zero(w), channels_);
+      brick.known[round_].words[z] = brick.known[round_ - 1].words[z];
     }
-    brick.known[round].words[z] = now;
+    if (!any) return;
+    for (int z = begin_; z < end_; ++z)
+      for (int y = 0; y < 8; ++y)
+        rows_[z + 2][y + 2] = static_cast<std::uint32_t>(wanted_.words[z] >> (8 * y) & 0xFF) << 2;
+    for (int i = 0; i < 27; ++i)
+      if (around_[i] != nullptr) push_from(*around_[i], i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+    for (int z = begin_; z < end_; ++z) {
+      for (std::uint64_t w = wanted_.words[z]; w != 0; w &= w - 1) {
+        const int at = z * 64 + std::countr_zero(w);
+        const bool reached = sums_.weight[at] > 0 && sums_.store(at, 0.5F, channels_, brick);
+        if (reached || (round_ == 1 && brick.repaired.test(at) && repair(at, brick)))
+          brick.known[round_].words[z] |= w & (~w + 1);
+      }
+    }
   }
-}
+
+ private:
+  /// Whether any voxel wanted lies next to the neighbour in that direction.
+  [[nodiscard]] bool touches(int dx, int dy) const {
+    std::uint64_t w = ~std::uint64_t{0};
+    if (dx != 0) w &= dx < 0 ? 0x0101010101010101ULL : 0x8080808080808080ULL;
+    if (dy != 0) w &= dy < 0 ? 0x00000000000000FFULL : 0xFF00000000000000ULL;
+    for (int z = begin_; z < end_; ++z)
+      if ((wanted_.words[z] & w) != 0) return true;
+    return false;
+  }
+
+  void push_from(const Brick& from, int dx, int dy, int dz) {
+    if (!touches(dx, dy)) return;
+    bits::Neighbourhood wanted{};
+    wanted[1 - dz][1 - dy][1 - dx] = &wanted_;
+    for (int z = std::max(begin_ - 1, dz * 8); z < std::min(end_ + 1, dz * 8 + 8); ++z) {
+      const int own_z = z - dz * 8;
+      std::uint64_t w = from.known[round_ - 1].words[own_z];
+      if (dx < 0) w &= 0x8080808080808080ULL;
+      if (dx > 0) w &= 0x0101010101010101ULL;
+      if (dy < 0) w &= 0xFF00000000000000ULL;
+      if (dy > 0) w &= 0x00000000000000FFULL;
+      if (w != 0) w &= bits::dilate_layer(wanted, own_z, -1, 1);
+      for (; w != 0; w &= w - 1) {
+        const int bit = std::countr_zero(w);
+        push(from, own_z * 64 + bit, (bit & 7) + dx * 8, (bit >> 3) + dy * 8, z);
+      }
+    }
+  }
+
+  /// The offsets from a voxel, of this brick or beside it, that lead to voxels wanted.
+  [[nodiscard]] std::uint32_t wanted_beside(int x, int y, int z) const {
+    std::uint32_t out = 0;
+    for (int i = 0; i < 9; ++i) {
+      const std::uint32_t row = rows_[z + 1 + i / 3][y + 1 + i % 3];
+      out |= (row >> (x + 1) & 7U) << (3 * i);
+    }
+    return out;
+  }
+
+  /// Away from the surface only: what lies towards it is a hole in the data, not a part of the band.
+  void push(const Brick& from, int from_at, int x, int y, int z) {
+    const float d = from.distance[from_at];
+    if (!(std::abs(d) < farthest_)) return;
+    const std::uint32_t beside = wanted_beside(x, y, z);
+    if (beside == 0) return;
+    const float side = d < 0 ? -1.0F : 1.0F;
+    const std::array<float, 3> n{from.normal_at(0, from_at), from.normal_at(1, from_at), from.normal_at(2, from_at)};
+    const std::array<float, 3> away{side * n[0], side * n[1], side * n[2]};
+    for (std::uint32_t list = reach().of(away) & beside; list != 0; list &= list - 1) {
+      const Offset& o = kOffsets[static_cast<std::size_t>(std::countr_zero(list))];
+      const float off = sideways(o, away);
+      if (!(off < kSideways)) continue;
+      const int at = BlockMask::offset(x + o.x, y + o.y, z + o.z);
+      const float along = side * std::sqrt(o.squared - off);
+      const float w = (kSideways - off) * (kSideways - off);
+      sums_.add(at, w * w, d + along, n, from, from_at, channels_);
+    }
+  }
+
+  /// A gap between samples that extraction bridges. As corner_value() does it: the mean of all neighbours' planes,
+  /// weights 1 / m^2.
+  bool repair(int at, Brick& brick) {
+    sums_.clear(at, channels_);
+    for (const Offset& o : kOffsets) {
+      if (o.squared == 0) continue;
+      const int x = (at & 7) + o.x, y = (at >> 3 & 7) + o.y, z = (at >> 6) + o.z;
+      const Brick* from = around_[(x >> 3) + 1 + 3 * ((y >> 3) + 1) + 9 * ((z >> 3) + 1)];
+      const int from_at = BlockMask::offset(x & 7, y & 7, z & 7);
+      if (from == nullptr || !from->known[0].test(from_at)) continue;
+      const std::array<float, 3> n{from->normal_at(0, from_at), from->normal_at(1, from_at),
+                                   from->normal_at(2, from_at)};
+      const float along =
+          -(n[0] * static_cast<float>(o.x) + n[1] * static_cast<float>(o.y) + n[2] * static_cast<float>(o.z));
+      sums_.add(at, 1 / (o.squared * o.squared), from->distance[from_at] + along, n, *from, from_at, channels_);
+    }
+    return sums_.weight[at] > 0 && std::abs(sums_.distance[at]) <= kRepaired * sums_.weight[at] &&
+           sums_.store(at, 1e-6F, channels_, brick);
+  }
+
+  const Around& around_;
+  int round_, begin_, end_;
+  std::size_t channels_;
+  float farthest_;  ///< a step along the normal, half a voxel at least, leads out of the band from here
+  Sums& sums_;
+  BlockMask wanted_;
+  std::array<std::array<std::uint32_t, 12>, 12> rows_{};  ///< of wanted_, [z + 2][y + 2], bit x + 2
+};
 
 }  // namespace
 
@@ -196,11 +253,12 @@ void Band::grow(int round, std::int32_t begin, std::int32_t end) {
       jobs.push_back({brick.get(), std::max(0, begin - bz * 8), std::min(8, end - bz * 8)});
   }
   tbb::parallel_for(std::size_t{0}, jobs.size(), [&](std::size_t j) {
+    static thread_local Sums sums;
     const Job& job = jobs[j];
     const Block& b = job.brick->block;
     Around around;
     for (int i = 0; i < 27; ++i) around[i] = find({b.x + i % 3 - 1, b.y + i / 3 % 3 - 1, b.z + i / 9 - 1});
-    grow_brick(around, round, job.begin, job.end, settings_.channels.size(), *job.brick);
+    Step(around, round, job.begin, job.end, settings_, sums).run(*job.brick);
   });
 }
 

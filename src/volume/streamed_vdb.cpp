@@ -69,8 +69,7 @@ Index slot_in(const Coord& local) {
 
 }  // namespace
 
-PackedLeaf pack(const FloatTree::LeafNodeType& leaf, float background, bool half) {
-  PackedLeaf out = pack_any(leaf, background, half);
+std::array<std::int8_t, 6> face_votes(const FloatTree::LeafNodeType& leaf) {
   // An active voxel's neighbour beyond the leaf must be on its side; the others only guess.
   std::array<int, 6> votes{};
   const auto count = [&](std::size_t face, Index at) {
@@ -83,7 +82,14 @@ PackedLeaf pack(const FloatTree::LeafNodeType& leaf, float background, bool half
       count(4, a << 6 | b << 3), count(5, a << 6 | b << 3 | 7);
     }
   }
-  for (std::size_t f = 0; f < 6; ++f) out.faces[f] = static_cast<std::int8_t>(std::clamp(votes[f] / 4, -16, 16));
+  std::array<std::int8_t, 6> out{};
+  for (std::size_t f = 0; f < 6; ++f) out[f] = static_cast<std::int8_t>(std::clamp(votes[f] / 4, -16, 16));
+  return out;
+}
+
+PackedLeaf pack(const FloatTree::LeafNodeType& leaf, float background, bool half) {
+  PackedLeaf out = pack_any(leaf, background, half);
+  out.faces = face_votes(leaf);
   return out;
 }
 

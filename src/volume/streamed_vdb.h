@@ -20,6 +20,9 @@ struct PackedLeaf {
   std::string bytes;
 };
 
+/// How a leaf's faces vote for the tiles beside them (LeafVotes::faces).
+std::array<std::int8_t, 6> face_votes(const openvdb::FloatTree::LeafNodeType& leaf);
+
 /// Packs a leaf (its values outside of the mask are +- the background, or 0 where that is). Safe from several threads.
 PackedLeaf pack(const openvdb::FloatTree::LeafNodeType& leaf, float background, bool half);
 PackedLeaf pack(const openvdb::Vec3STree::LeafNodeType& leaf, bool half);

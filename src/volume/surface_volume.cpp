@@ -23,10 +23,11 @@ using namespace volume;
   throw Error(ExitCode::usage, message);
 }
 
-/// Own values reach one and a half voxels from the surface; each round of growth adds one.
-int rounds_for(double band) {
-  constexpr double kOwn = 1.4;
-  return static_cast<int>(std::ceil(std::max(0.0, band - kOwn)));
+/// Own values reach one and a half voxels from the surface, those of finer cells less; each round of growth adds one,
+/// and the first closes gaps.
+int rounds_for(double band, bool has_finer) {
+  const double own = has_finer ? 0.5 : 1.4;
+  return std::clamp(static_cast<int>(std::ceil(band - own)), 1, kMaxRounds);
 }
 
 bool fits_half(double voxel, double band) {
@@ -99,7 +100,7 @@ void SurfaceVolume::Impl::add_level(const Lattice& lattice, int level, const std
   GridFrame grid(frame, lattice, level);
   half = half && fits_half(grid.voxel, settings.band);
   if (levels.empty()) stats.voxel = grid.voxel;
-  const int rounds = settings.levels ? 1 : rounds_for(settings.band);
+  const int rounds = settings.levels ? 1 : rounds_for(settings.band, level > 0);
   levels.push_back({name, std::move(grid), Band({level, !settings.levels, settings.band, rounds, channels}, lattice)});
 }
 
