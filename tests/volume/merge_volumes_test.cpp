@@ -50,7 +50,7 @@ TEST_F(MergeVolumes, JoinsWhatSurfaceSplit) {
   const test::Cloud cloud = test::sphere_cloud(8000);
   test::reconstruct(cloud, settings);
   settings.volume.path = folder_ / "part.vdb";
-  settings.volume.split = 150000;
+  settings.volume.split = 80000;
   const auto parts = test::reconstruct(cloud, settings).stats.volume.files;
   ASSERT_GE(parts.size(), 3U);
   EXPECT_EQ(parts[1], folder_ / "part.0002.vdb");
