@@ -13,6 +13,7 @@ int main(int argc, char** argv) {
       add_check,
       add_render,
       add_volume,
+      add_merge,
       // clang-format on
   };
   return run_program(argc, argv, tools);

@@ -12,5 +12,6 @@ void add_compare(CLI::App& app);
 void add_check(CLI::App& app);
 void add_render(CLI::App& app);
 void add_volume(CLI::App& app);
+void add_merge(CLI::App& app);
 
 }  // namespace lamina::tools

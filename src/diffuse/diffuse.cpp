@@ -52,23 +52,22 @@ struct Mean {
 };
 
 /// Adds a centre's surface as it is seen from the corner: the second-order distance of the osculating sphere.
-void add(const Window& window, const Leaf& leaf, const CornerValues& v, std::uint32_t i, int corner_level,
-         const Cell& corner, Mean& mean, float* attributes) {
+void add(const Window& window, const Leaf& leaf, const float* v, int corner_level, const Cell& corner, Mean& mean, float* attributes) {
   const auto cell = static_cast<float>(window.lattice().cell_size(leaf.level));
   const auto corner_at = window.lattice().position(corner_level, corner);
   const auto cell_at = window.lattice().position(leaf.level, leaf.cell);
   std::array<float, 3> o{};
   for (int k = 0; k < 3; ++k) o[k] = static_cast<float>(corner_at[k] - cell_at[k]) - 0.5F * cell;
-  const std::array<float, 3> n{v.channel(kNormalX)[i], v.channel(kNormalY)[i], v.channel(kNormalZ)[i]};
+  const std::array<float, 3> n{v[kNormalX], v[kNormalY], v[kNormalZ]};
   const float along = n[0] * o[0] + n[1] * o[1] + n[2] * o[2];
   const float across = o[0] * o[0] + o[1] * o[1] + o[2] * o[2] - along * along;
   const float w = 1.0F / cell;
   mean.weight += w;
-  mean.distance += w * (v.channel(kDistance)[i] + along + 0.5F * v.channel(kCurvature)[i] * across);
-  mean.curvature += w * v.channel(kCurvature)[i];
-  mean.reach += w * v.channel(kReach)[i];
+  mean.distance += w * (v[kDistance] + along + 0.5F * v[kCurvature] * across);
+  mean.curvature += w * v[kCurvature];
+  mean.reach += w * v[kReach];
   for (int k = 0; k < 3; ++k) mean.normal[k] += w * n[k];
-  for (int c = 0; c < window.attributes(); ++c) attributes[c] += w * v.channel(kFirstAttribute + c)[i];
+  for (int c = 0; c < window.attributes(); ++c) attributes[c] += w * v[kFirstAttribute + c];
 }
 
 void diffuse_corner(const Window& window, int level, const Cell& corner, CornerBlock& leaf, int offset,
@@ -85,29 +84,29 @@ void diffuse_corner(const Window& window, int level, const Cell& corner, CornerB
     leaves[count++] = l;
   }
   Mean mean;
-  float* const first_attribute = out.data.data() + static_cast<std::size_t>(kFirstAttribute) * out.count + at;
   std::vector<float> attributes(static_cast<std::size_t>(window.attributes()), 0.0F);
   for (int k = 0; k < count; ++k) {
     const Projected& centres = *window.probe(leaves[k].level, block_of(leaves[k].cell))->centres;
     const int o = offset_in_block(leaves[k].cell);
     if (trusted && !centres.good.test(o)) continue;
-    add(window, leaves[k], centres.values[window.brick_of(leaves[k].level, o >> 6)],
-        centres.value_index(o, window.brick_layers(leaves[k].level)), level, corner, mean, attributes.data());
+    const CornerValues& values = centres.values[window.brick_of(leaves[k].level, o >> 6)];
+    add(window, leaves[k], values.of(centres.value_index(o, window.brick_layers(leaves[k].level))), level, corner, mean,
+        attributes.data());
   }
   const float length =
       std::sqrt(mean.normal[0] * mean.normal[0] + mean.normal[1] * mean.normal[1] + mean.normal[2] * mean.normal[2]);
   if (mean.weight <= 0 || !(length > 1e-6F * mean.weight)) return;
   const float inv = 1.0F / mean.weight;
-  out.channel(kDistance)[at] = mean.distance * inv;
-  out.channel(kNormalX)[at] = mean.normal[0] / length;
-  out.channel(kNormalY)[at] = mean.normal[1] / length;
-  out.channel(kNormalZ)[at] = mean.normal[2] / length;
-  out.channel(kCurvature)[at] = mean.curvature * inv;
-  out.channel(kReach)[at] = mean.reach * inv;
-  for (int c = 0; c < window.attributes(); ++c) {
-    first_attribute[static_cast<std::size_t>(c) * out.count] = attributes[static_cast<std::size_t>(c)] * inv;
-  }
+  float* const v = out.of(at);
+  v[kDistance] = mean.distance * inv;
+  v[kNormalX] = mean.normal[0] / length;
+  v[kNormalY] = mean.normal[1] / length;
+  v[kNormalZ] = mean.normal[2] / length;
+  v[kCurvature] = mean.curvature * inv;
+  v[kReach] = mean.reach * inv;
+  for (int c = 0; c < window.attributes(); ++c) v[kFirstAttribute + c] = attributes[static_cast<std::size_t>(c)] * inv;
   leaf.seen.set(offset);
+  leaf.positive.assign(offset, mean.distance >= 0);
   if (trusted) leaf.good.set(offset);
 }
 
@@ -115,7 +114,7 @@ void diffuse_corner(const Window& window, int level, const Cell& corner, CornerB
 
 void diffuse_slab(Window& window, std::int32_t slab) {
   for (int level = 0; level < window.levels(); ++level) {
-    const std::vector<Tile> tiles = window.tiles(level, slab);
+    const Tiles tiles = window.tiles(level, slab);
     tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
       const Tile& t = tiles[i];
       const std::int32_t first = window.lattice().first_layer(level, slab) - t.block.z * 8;

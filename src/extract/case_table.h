@@ -8,8 +8,9 @@ namespace lamina {
 /// Corner i of a cell lies at (i & 1, (i >> 1) & 1, i >> 2); edge e runs along axis e / 4 from the corner whose
 /// coordinates on axes axis + 1 and axis + 2 (cyclic) are the two bits of e % 4.
 struct CaseTriangles {
-  std::uint8_t count = 0;                ///< triangles
-  std::array<std::uint8_t, 15> edges{};  ///< three a triangle, counter-clockwise seen from the positive side
+  static constexpr int kMost = 5;
+  std::uint8_t count = 0;                       ///< triangles
+  std::array<std::uint8_t, 3 * kMost> edges{};  ///< three a triangle, counter-clockwise seen from the positive side
 };
 
 constexpr std::array<int, 3> edge_low_corner(int edge) {

@@ -8,12 +8,35 @@ namespace {
 
 /// Corners at layer z with a subdivided cell among the eight around them: a finer level may hold them too.
 std::uint64_t beside_split(const Slice& below, const Slice& here) {
-  const auto four = [](const Slice& s) { return s.here() | s.at<-1, 0>() | s.at<0, -1>() | s.at<-1, -1>(); };
+  const auto four = [](const Slice& s) {
+    return s.any() ? s.here() | s.at<-1, 0>() | s.at<0, -1>() | s.at<-1, -1>() : 0;
+  };
   return four(below) | four(here);
 }
 
 void set_shared(std::uint64_t& word, std::uint64_t bits) {
   if (bits != 0) std::atomic_ref(word).fetch_or(bits, std::memory_order_relaxed);
+}
+
+void set_layer(std::uint8_t& layers, int z, bool on) {
+  layers = static_cast<std::uint8_t>((layers & ~(1U << z)) | static_cast<unsigned>(on) << z);
+}
+
+/// Of a block that other tiles may be reaching too.
+void reach_layer(CornerBlock* block, int z) {
+  if (block == nullptr) return;
+  const std::atomic_ref<std::uint8_t> layers(block->surface_layers);
+  const auto bit = static_cast<std::uint8_t>(1U << z);
+  if ((layers.load(std::memory_order_relaxed) & bit) == 0) layers.fetch_or(bit, std::memory_order_relaxed);
+}
+
+/// Notes the layers in which edges of layer z begin and end.
+void reach_ends(const TileView& tile, int z, const std::array<std::uint64_t, 3>& accepted) {
+  if ((accepted[0] | accepted[1] | accepted[2]) == 0) return;
+  reach_layer(&tile.leaf(), z);
+  if ((accepted[0] & ~bits::columns_below(7)) != 0) reach_layer(tile.neighbour(1, 0, 0), z);
+  if ((accepted[1] >> 56) != 0) reach_layer(tile.neighbour(0, 1, 0), z);
+  if (accepted[2] != 0) reach_layer(tile.neighbour(0, 0, (z + 1) >> 3), (z + 1) & 7);
 }
 
 /// The finest level that holds a corner of `level`. Levels in between need not hold it: a leaf cell may lie beside one
@@ -28,6 +51,7 @@ void mark_finest(Window& window, int level, Cell corner) {
     holder = block;
     offset = offset_in_block(corner);
   }
+  reach_layer(holder, offset >> 6);
   set_shared(holder->surface.words[offset >> 6], std::uint64_t{1} << (offset & 63));
 }
 
@@ -46,58 +70,60 @@ Quadrants around_edges(int axis, const Slice& below, const Slice& here) {
 
 void find_crossing(const TileView& tile) {
   CornerBlock& leaf = tile.leaf();
-  // The word of a mask at (x + dx, y + dy, z).
-  const auto shifted = [&](auto mask, int dx, int dy, int z) {
-    const CornerBlock* b = tile.neighbour(dx, dy, 0);
-    const std::uint64_t beyond = b == nullptr ? 0 : (b->*mask).words[z];
-    const std::uint64_t here = (leaf.*mask).words[z];
-    return dx > 0 ? bits::shift_x(0, here, beyond, -1) : bits::shift_y(0, here, beyond, -1);
-  };
+  const CornerBlock* const right = tile.neighbour(1, 0, 0);
+  const CornerBlock* const up = tile.neighbour(0, 1, 0);
   for (int z = tile.begin; z < tile.end; ++z) {
-    for (int axis = 0; axis < 3; ++axis) {
-      leaf.crossing[axis].words[z] = 0;
-      leaf.accepted[axis].words[z] = 0;
-    }
-    leaf.surface.words[z] = 0;
+    const CornerBlock* const above = tile.neighbour(0, 0, (z + 1) >> 3);
+    // The words of a mask at the other ends of the layer's edges.
+    const auto ends = [&](BlockMask CornerBlock::*mask) {
+      const std::uint64_t here = (leaf.*mask).words[z];
+      return std::array<std::uint64_t, 3>{bits::shift_x(0, here, right == nullptr ? 0 : (right->*mask).words[z], -1),
+                                          bits::shift_y(0, here, up == nullptr ? 0 : (up->*mask).words[z], -1),
+                                          above == nullptr ? 0 : (above->*mask).words[(z + 1) & 7]};
+    };
+    std::array<std::uint64_t, 3> change{};
+    std::array<std::uint64_t, 3> accepted{};
     const std::uint64_t corners = leaf.corners.words[z];
-    if (corners == 0) continue;
-    const std::uint64_t positive = leaf.positive.words[z];
-    const CornerBlock* above = tile.neighbour(0, 0, (z + 1) >> 3);
-    std::array<std::uint64_t, 3> change = {
-        (positive ^ shifted(&CornerBlock::positive, 1, 0, z)) & corners & shifted(&CornerBlock::corners, 1, 0, z),
-        (positive ^ shifted(&CornerBlock::positive, 0, 1, z)) & corners & shifted(&CornerBlock::corners, 0, 1, z), 0};
-    if (above != nullptr) {
-      change[2] = (positive ^ above->positive.words[(z + 1) & 7]) & corners & above->corners.words[(z + 1) & 7];
+    if (corners != 0) {
+      const std::array<std::uint64_t, 3> positive = ends(&CornerBlock::positive);
+      const std::array<std::uint64_t, 3> held = ends(&CornerBlock::corners);
+      for (int axis = 0; axis < 3; ++axis) {
+        change[axis] = (leaf.positive.words[z] ^ positive[axis]) & corners & held[axis];
+      }
     }
-    if ((change[0] | change[1] | change[2]) == 0) continue;
-    const Slice cells_below(tile, &CornerBlock::cells, z - 1);
-    const Slice cells(tile, &CornerBlock::cells, z);
-    for (int axis = 0; axis < 3; ++axis) change[axis] &= around_edges(axis, cells_below, cells).any();
-    if (tile.level > 0) {
-      const Slice split_below(tile, &CornerBlock::split, z - 1);
-      const Slice split(tile, &CornerBlock::split, z);
-      for (int axis = 0; axis < 3; ++axis) change[axis] &= ~around_edges(axis, split_below, split).any();
+    if ((change[0] | change[1] | change[2]) != 0) {
+      const Slice cells_below(tile, &CornerBlock::cells, z - 1);
+      const Slice cells(tile, &CornerBlock::cells, z);
+      for (int axis = 0; axis < 3; ++axis) change[axis] &= around_edges(axis, cells_below, cells).any();
+      if (tile.level > 0) {
+        const Slice split_below(tile, &CornerBlock::split, z - 1);
+        const Slice split(tile, &CornerBlock::split, z);
+        if (split_below.any() || split.any()) {
+          for (int axis = 0; axis < 3; ++axis) change[axis] &= ~around_edges(axis, split_below, split).any();
+        }
+      }
+      const std::array<std::uint64_t, 3> valued = ends(&CornerBlock::valued);
+      const std::array<std::uint64_t, 3> carried = ends(&CornerBlock::carried);
+      for (int axis = 0; axis < 3; ++axis) {
+        accepted[axis] = change[axis] & leaf.valued.words[z] & valued[axis] & (leaf.carried.words[z] | carried[axis]);
+      }
     }
-    const std::array<std::uint64_t, 3> valued = {shifted(&CornerBlock::valued, 1, 0, z),
-                                                 shifted(&CornerBlock::valued, 0, 1, z),
-                                                 above == nullptr ? 0 : above->valued.words[(z + 1) & 7]};
-    const std::array<std::uint64_t, 3> carried = {shifted(&CornerBlock::carried, 1, 0, z),
-                                                  shifted(&CornerBlock::carried, 0, 1, z),
-                                                  above == nullptr ? 0 : above->carried.words[(z + 1) & 7]};
+    const bool has_edges = (change[0] | change[1] | change[2]) != 0;
+    // Nearly all layers are without edges and were before: their masks stay out of the cache.
+    if (!has_edges && ((leaf.busy_layers | leaf.doubtful_layers) >> z & 1U) == 0) continue;
     for (int axis = 0; axis < 3; ++axis) {
       leaf.crossing[axis].words[z] = change[axis];
-      leaf.accepted[axis].words[z] =
-          change[axis] & leaf.valued.words[z] & valued[axis] & (leaf.carried.words[z] | carried[axis]);
+      leaf.accepted[axis].words[z] = accepted[axis];
     }
+    leaf.busy.words[z] = accepted[0] | accepted[1] | accepted[2];
+    set_layer(leaf.busy_layers, z, leaf.busy.words[z] != 0);
+    set_layer(leaf.doubtful_layers, z, accepted != change);
+    reach_ends(tile, z, accepted);
   }
 }
 
-void mark_busy(const TileView& tile, const Window& window) {
+void add_finer_busy(const TileView& tile, const Window& window) {
   CornerBlock& leaf = tile.leaf();
-  for (int z = tile.begin; z < tile.end; ++z) {
-    leaf.busy.words[z] = leaf.accepted[0].words[z] | leaf.accepted[1].words[z] | leaf.accepted[2].words[z];
-  }
-  if (tile.level == 0) return;
   for (int half = 0; half < 2; ++half) {
     if (tile.begin >= 4 * half + 4 || tile.end <= 4 * half) continue;
     for (int quarter = 0; quarter < 4; ++quarter) {
@@ -105,11 +131,12 @@ void mark_busy(const TileView& tile, const Window& window) {
       const int qy = quarter >> 1;
       const CornerBlock* finer =
           window.probe(tile.level - 1, {2 * tile.block.x + qx, 2 * tile.block.y + qy, 2 * tile.block.z + half});
-      if (finer == nullptr) continue;
+      if (finer == nullptr || finer->busy_layers == 0) continue;
       for (int z = std::max(tile.begin, 4 * half); z < std::min(tile.end, 4 * half + 4); ++z) {
         const int from = 2 * (z - 4 * half);
         const std::uint64_t pair = finer->busy.words[from] | finer->busy.words[from + 1];
         leaf.busy.words[z] |= bits::even_quarter(bits::fold_pairs(pair), qx, qy);
+        set_layer(leaf.busy_layers, z, leaf.busy.words[z] != 0);
       }
     }
   }

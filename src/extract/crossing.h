@@ -5,11 +5,13 @@
 
 namespace lamina {
 
-/// Sets `crossing` and `accepted` in the tile's layers of the slab and clears `surface` there.
+/// Sets `crossing` and `accepted` in the tile's layers of the slab, `busy` as far as its own edges go, and notes the
+/// layers with ends of accepted edges, in the tile and beyond, in `surface_layers`. A slab is numbered once: `surface`
+/// is empty there.
 void find_crossing(const TileView& tile);
 
-/// Sets `busy` in the tile's layers of the slab. Accepted edges of all levels must be known, `busy` of finer ones.
-void mark_busy(const TileView& tile, const Window& window);
+/// Completes `busy` in the layers of a tile above the finest level, once it is complete in the level below.
+void add_finer_busy(const TileView& tile, const Window& window);
 
 /// Sets `surface` for the corners of the tile's layers that end an accepted edge, edges from the layer below included.
 /// A corner that several levels hold is marked in the finest only, possibly in another tile: all tiles of the slab must

@@ -22,7 +22,8 @@ struct ExtractCounts {
 
 /// Step 1, numbers: finds the minimal edges with a sign change whose lower end lies in the slab, numbers those that are
 /// valid (both ends have a value, at least one is carried by samples around it) and the corners at their ends, and
-/// fills out.corners, out.corner_attributes and out.vertices. The octree up to this slab, the signs of its corners and
+/// fills out.corners, out.corner_attributes and out.vertices (what `out` held before is gone, its storage used again).
+/// The octree up to this slab, the signs of its corners and
 /// of the next one's first plane, and the values of its corners must be final. `previous` (null before the first slab)
 /// is the slab below: its vertical edges that end in this slab are completed now (`high`, `t`). Order of vertices:
 /// level, tile (z, y, x), layer, axis, place in the layer; of corners: level, tile, layer, place. A corner that several

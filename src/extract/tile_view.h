@@ -1,5 +1,5 @@
-// The tiles of a slab with their neighbours at hand, and words of their masks seen from a tile: found once per tile, so
-// that the passes over it work on 64-bit slices alone.
+// The tiles of a slab, and words of their masks and their neighbours' seen from a tile, so that the passes over it work
+// on 64-bit slices alone.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -10,16 +10,17 @@
 
 namespace lamina {
 
-/// A leaf, its 26 neighbours (null where absent) and the layers of it that belong to the slab.
+/// A leaf and the layers of it that belong to the slab.
 struct TileView {
+  CornerBlock* corners = nullptr;
   int level = 0;
   Block block;
   int begin = 0, end = 0;  ///< leaf layers [begin, end)
-  std::array<CornerBlock*, 27> around{};
 
-  static constexpr int index(int dx, int dy, int dz) { return 13 + dx + 3 * dy + 9 * dz; }
-  [[nodiscard]] CornerBlock& leaf() const { return *around[13]; }
-  [[nodiscard]] CornerBlock* neighbour(int dx, int dy, int dz) const { return around[index(dx, dy, dz)]; }
+  [[nodiscard]] CornerBlock& leaf() const { return *corners; }
+  [[nodiscard]] CornerBlock* neighbour(int dx, int dy, int dz) const {
+    return corners->around[CornerBlock::towards(dx, dy, dz)];
+  }
   [[nodiscard]] Cell cell(int offset) const {
     return {block.x * 8 + (offset & 7), block.y * 8 + ((offset >> 3) & 7), block.z * 8 + (offset >> 6)};
   }
@@ -36,11 +37,16 @@ struct Slice {
   Slice(const TileView& tile, BlockMask CornerBlock::*mask, int z) {
     const int base = z < 0 ? 0 : (z < 8 ? 9 : 18);
     for (int i = 0; i < 9; ++i) {
-      const CornerBlock* b = tile.around[base + i];
+      const CornerBlock* b = tile.leaf().around[base + i];
       words[i] = b == nullptr ? 0 : (b->*mask).words[z & 7];
     }
   }
   [[nodiscard]] std::uint64_t here() const { return words[4]; }
+  [[nodiscard]] bool any() const {
+    std::uint64_t all = 0;
+    for (const std::uint64_t w : words) all |= w;
+    return all != 0;
+  }
   /// The word whose bit (x, y) is the mask's at (x + DX, y + DY).
   template <int DX, int DY>
   [[nodiscard]] std::uint64_t at() const {

@@ -58,7 +58,7 @@ class EdgeNumbers {
 /// case_table() with its edges as offsets into EdgeNumbers.
 struct PlainCase {
   int count = 0;
-  std::array<std::uint16_t, 15> edges{};
+  std::array<std::uint16_t, 3 * CaseTriangles::kMost> edges{};
 };
 
 std::array<PlainCase, 256> plain_cases() {
@@ -74,49 +74,75 @@ std::array<PlainCase, 256> plain_cases() {
   return out;
 }
 
-/// Cells of a layer with valid and with invalid isovertices on some of their edges.
-struct CellEdges {
-  std::uint64_t valid = 0, invalid = 0;
+/// Words of a mask at layer z in [0, 8] over the tile and its three neighbours at greater x or y.
+struct Corner4 {
+  std::uint64_t here = 0, right = 0, up = 0, up_right = 0;
 
-  CellEdges operator|(const CellEdges& o) const { return {valid | o.valid, invalid | o.invalid}; }
-};
-
-CellEdges edges_at(const TileView& tile, int axis, int dx, int dy, int z) {
-  const CornerBlock* b = tile.neighbour(dx, dy, z >> 3);
-  if (b == nullptr) return {};
-  const std::uint64_t valid = b->accepted[axis].words[z & 7];
-  return {valid, b->crossing[axis].words[z & 7] & ~valid};
-}
-CellEdges from_next_column(const CellEdges& here, const CellEdges& right) {
-  return {bits::shift_x(0, here.valid, right.valid, -1), bits::shift_x(0, here.invalid, right.invalid, -1)};
-}
-CellEdges from_next_row(const CellEdges& here, const CellEdges& above) {
-  return {bits::shift_y(0, here.valid, above.valid, -1), bits::shift_y(0, here.invalid, above.invalid, -1)};
-}
-
-/// What a layer's cells need to know of one plane of corners.
-struct Plane {
-  std::array<std::uint64_t, 4> positive{};  ///< at (x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)
-  CellEdges edges;                          ///< in the plane
-
-  Plane() = default;
-  Plane(const TileView& tile, int z) {
-    const Slice s(tile, &CornerBlock::positive, z);
-    positive = {s.here(), s.at<1, 0>(), s.at<0, 1>(), s.at<1, 1>()};
-    const CellEdges along_x = edges_at(tile, 0, 0, 0, z);
-    const CellEdges along_y = edges_at(tile, 1, 0, 0, z);
-    edges = along_x | from_next_row(along_x, edges_at(tile, 0, 0, 1, z)) | along_y |
-            from_next_column(along_y, edges_at(tile, 1, 1, 0, z));
+  Corner4() = default;
+  template <typename Word>  // of a block and a layer in it
+  Corner4(const TileView& tile, int z, const Word& word) {
+    const auto at = [&](int dx, int dy) {
+      const CornerBlock* b = tile.neighbour(dx, dy, z >> 3);
+      return b == nullptr ? std::uint64_t{0} : word(*b, z & 7);
+    };
+    here = at(0, 0);
+    right = at(1, 0);
+    up = at(0, 1);
+    up_right = at(1, 1);
+  }
+  [[nodiscard]] std::uint64_t next_column() const { return bits::shift_x(0, here, right, -1); }
+  [[nodiscard]] std::uint64_t next_row() const { return bits::shift_y(0, here, up, -1); }
+  [[nodiscard]] std::uint64_t next_both() const {
+    return bits::shift_x(0, next_row(), bits::shift_y(0, right, up_right, -1), -1);
   }
 };
 
-CellEdges vertical_edges(const TileView& tile, int z) {
-  const auto rows = [&](int dx) {
-    const CellEdges e = edges_at(tile, 2, dx, 0, z);
-    return e | from_next_row(e, edges_at(tile, 2, dx, 1, z));
+/// Cells of layer z with an edge of a kind: `edges` gives the words of an axis in a block.
+template <typename Edges>
+std::uint64_t cells_with(const TileView& tile, int z, const Edges& edges) {
+  const auto words = [&](int axis, int layer) {
+    return Corner4(tile, layer, [&](const CornerBlock& b, int in_block) { return edges(b, axis, in_block); });
   };
-  const CellEdges e = rows(0);
-  return e | from_next_column(e, rows(1));
+  std::uint64_t out = 0;
+  for (int plane = z; plane <= z + 1; ++plane) {
+    const Corner4 along_x = words(0, plane);
+    const Corner4 along_y = words(1, plane);
+    out |= along_x.here | along_x.next_row() | along_y.here | along_y.next_column();
+  }
+  const Corner4 upright = words(2, z);
+  return out | upright.here | upright.next_column() | upright.next_row() | upright.next_both();
+}
+
+std::uint64_t valid_edges(const CornerBlock& b, int axis, int z) {
+  return b.accepted[axis].words[z];
+}
+std::uint64_t invalid_edges(const CornerBlock& b, int axis, int z) {
+  return b.crossing[axis].words[z] & ~b.accepted[axis].words[z];
+}
+
+/// Signs of one plane of corners as a layer's cells need them: at (x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1).
+struct Plane {
+  std::array<std::uint64_t, 4> positive{};
+
+  Plane() = default;
+  Plane(const TileView& tile, int z) {
+    const Corner4 c(tile, z, [](const CornerBlock& b, int layer) { return b.positive.words[layer]; });
+    positive = {c.here, c.next_column(), c.next_row(), c.next_both()};
+  }
+};
+
+/// Layers [begin, end] of the tile, and of its neighbours at greater x, y or z, in which a kind of edge occurs.
+unsigned layers_with(const TileView& tile, std::uint8_t CornerBlock::*layers) {
+  unsigned out = 0;
+  for (int dz = 0; dz < 2; ++dz) {
+    for (int dy = 0; dy < 2; ++dy) {
+      for (int dx = 0; dx < 2; ++dx) {
+        const CornerBlock* b = tile.neighbour(dx, dy, dz);
+        if (b != nullptr) out |= static_cast<unsigned>(b->*layers) << (8 * dz);
+      }
+    }
+  }
+  return out & ((2U << tile.end) - (1U << tile.begin));
 }
 
 /// Cells with a subdivided one among their 18 face and edge neighbours.
@@ -125,8 +151,10 @@ std::uint64_t beside_split(const TileView& tile, int z) {
     return s.here() | s.at<1, 0>() | s.at<-1, 0>() | s.at<0, 1>() | s.at<0, -1>();
   };
   const Slice s(tile, &CornerBlock::split, z);
-  return cross(s) | s.at<1, 1>() | s.at<1, -1>() | s.at<-1, 1>() | s.at<-1, -1>() |
-         cross(Slice(tile, &CornerBlock::split, z - 1)) | cross(Slice(tile, &CornerBlock::split, z + 1));
+  const Slice below(tile, &CornerBlock::split, z - 1);
+  const Slice above(tile, &CornerBlock::split, z + 1);
+  if (!s.any() && !below.any() && !above.any()) return 0;
+  return cross(s) | s.at<1, 1>() | s.at<1, -1>() | s.at<-1, 1>() | s.at<-1, -1>() | cross(below) | cross(above);
 }
 
 /// Cells with accepted edges in or around them.
@@ -141,6 +169,8 @@ class TilePass {
       : lattice_(cache.window().lattice()), slab_(slab), cases_(&cases), emitter_(cache, slab, here, next) {}
 
   void run(const TileView& tile, TriangleRun& out) {
+    if (layers_with(tile, &CornerBlock::busy_layers) == 0) return;  // no valid isovertex: nothing to emit
+    const unsigned doubtful = layers_with(tile, &CornerBlock::doubtful_layers);
     const CornerBlock& leaf = tile.leaf();
     int loaded = tile.begin;  // layers of edges in numbers_
     Plane below(tile, tile.begin);
@@ -155,11 +185,11 @@ class TilePass {
       const std::uint64_t general = hanging == 0 ? 0 : hanging & beside_busy(tile, z);
       std::uint64_t mixed = cells & any & ~all & ~hanging;
       std::uint64_t rim = 0;
-      if (mixed != 0) {
+      if (mixed != 0 && (doubtful & (3U << z)) != 0) {
         // Most cells with an invalid isovertex have nothing else: the far ends of what samples reach.
-        const CellEdges edges = below.edges | above.edges | vertical_edges(tile, z);
-        mixed &= edges.valid;
-        rim = mixed & edges.invalid;
+        rim = mixed & cells_with(tile, z, invalid_edges);
+        mixed &= ~rim | cells_with(tile, z, valid_edges);
+        rim &= mixed;
       }
       if ((mixed & ~rim) != 0) {
         for (loaded = std::max(loaded, z); loaded <= z + 1; ++loaded) load_edges(tile, loaded);
@@ -182,8 +212,14 @@ class TilePass {
   void emit_layer(const TileView& tile, int z, const Plane& below, const Plane& above, const Kinds& kinds,
                   TriangleRun& out) {
     const std::uint64_t special = kinds.general | kinds.rim;
+    IsoTriangle* end = layer_.data();  // of the plain triangles since the last special cell
+    const auto flush = [&] {
+      out.triangles.insert(out.triangles.end(), layer_.data(), end);
+      end = layer_.data();
+    };
     for_bits(kinds.mixed | kinds.general, [&](int bit) {
       if (((special >> bit) & 1U) != 0) {
+        flush();
         const bool crossing = emitter_.emit(tile.level, tile.cell(z * 64 + bit), out);
         out.counts.crossing_cells += crossing ? 1 : 0;
         out.counts.general_cells += crossing ? (kinds.general >> bit) & 1U : 0;
@@ -197,12 +233,12 @@ class TilePass {
       const PlainCase& c = (*cases_)[signs];
       const int base = EdgeNumbers::offset(0, bit & 7, bit >> 3, z);
       for (int t = 0; t < 3 * c.count; t += 3) {
-        out.triangles.push_back({SlabIndex{numbers_.at(base + c.edges[t])},
-                                 SlabIndex{numbers_.at(base + c.edges[t + 1])},
-                                 SlabIndex{numbers_.at(base + c.edges[t + 2])}});
+        *end++ = {SlabIndex{numbers_.at(base + c.edges[t])}, SlabIndex{numbers_.at(base + c.edges[t + 1])},
+                  SlabIndex{numbers_.at(base + c.edges[t + 2])}};
       }
-      ++out.counts.crossing_cells;
     });
+    out.counts.crossing_cells += static_cast<unsigned>(std::popcount(kinds.mixed & ~special));
+    flush();
   }
 
   const Lattice& lattice_;
@@ -210,6 +246,7 @@ class TilePass {
   const std::array<PlainCase, 256>* cases_;
   CellEmitter emitter_;
   EdgeNumbers numbers_;
+  std::array<IsoTriangle, 64 * CaseTriangles::kMost> layer_;
 };
 
 /// Appends the runs in order; their centre vertices go behind the edges'.

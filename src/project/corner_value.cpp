@@ -15,16 +15,22 @@ Place place_of(const Window& window, int level, const Cell& corner) {
   return {window.probe(level, block_of(corner)), offset_in_block(corner)};
 }
 
+/// The place beside another, at most one step away on each axis.
+Place beside(const Place& p, int dx, int dy, int dz) {
+  const int x = (p.offset & 7) + dx;
+  const int y = ((p.offset >> 3) & 7) + dy;
+  const int z = (p.offset >> 6) + dz;
+  return {p.block->around[CornerBlock::towards(x >> 3, y >> 3, z >> 3)], BlockMask::offset(x & 7, y & 7, z & 7)};
+}
+
 /// Own value; the corner must be near and its slab projected.
 void own_value(const Window& window, int level, const Place& p, CornerValue& out, float* attributes, float weight) {
   const CornerValues& values = p.block->values[window.brick_of(level, p.offset >> 6)];
   const std::uint32_t i = p.block->value_index(p.offset, window.brick_layers(level));
-  out.distance = values.channel(kDistance)[i];
-  out.normal = {values.channel(kNormalX)[i], values.channel(kNormalY)[i], values.channel(kNormalZ)[i]};
-  out.curvature = values.channel(kCurvature)[i];
-  out.reach = values.channel(kReach)[i];
+  const float* const v = values.of(i);
+  out = {v[kDistance], {v[kNormalX], v[kNormalY], v[kNormalZ]}, v[kCurvature], v[kReach]};
   if (attributes == nullptr) return;
-  for (int c = 0; c < window.attributes(); ++c) attributes[c] += weight * values.channel(kFirstAttribute + c)[i];
+  for (int c = 0; c < window.attributes(); ++c) attributes[c] += weight * v[kFirstAttribute + c];
 }
 
 bool has_values(const Window& window, int level, const Place& p) {
@@ -51,7 +57,7 @@ bool corner_value(const Window& window, int level, const Cell& corner, CornerVal
       for (int dx = -1; dx <= 1; ++dx) {
         const int m = (dx != 0) + (dy != 0) + (dz != 0);
         if (m == 0) continue;
-        const Place p = place_of(window, level, corner + Cell{dx, dy, dz});
+        const Place p = beside(here, dx, dy, dz);
         if (p.block == nullptr || !p.block->good.test(p.offset) || !has_values(window, level, p)) continue;
         const float w = 1.0F / static_cast<float>(m * m);
         CornerValue v;

@@ -25,41 +25,34 @@ void gather_block(const Window& window, int level, const CornerBlock& from, int 
   if (values.count == 0) return;
   const std::uint32_t base = from.value_index(z * 64, layers);
   const std::uint64_t near = from.near.words[z];
-  const float* const d = values.channel(kDistance);
-  const float* const nx = values.channel(kNormalX);
-  const float* const ny = values.channel(kNormalY);
-  const float* const nz = values.channel(kNormalZ);
   for (; w != 0; w &= w - 1) {
     const int bit = std::countr_zero(w);
     const std::uint32_t i = base + static_cast<std::uint32_t>(std::popcount(near & ((std::uint64_t{1} << bit) - 1)));
-    const int at =
-        (to_z + 1) * CornerField::kPlane + ((bit >> 3) + dy * 8 + 1) * CornerField::kRow + (bit & 7) + dx * 8 + 1;
-    f.distance[at] = d[i];
-    f.nx[at] = nx[i];
-    f.ny[at] = ny[i];
-    f.nz[at] = nz[i];
+    const float* const v = values.of(i);
+    const int row = (bit >> 3) + dy * 8 + 1;
+    const int at = (to_z + 1) * CornerField::kPlane + row * CornerField::kRow + (bit & 7) + dx * 8 + 1;
+    f.distance[at] = v[kDistance];
+    f.nx[at] = v[kNormalX];
+    f.ny[at] = v[kNormalY];
+    f.nz[at] = v[kNormalZ];
     f.trusted[at] = 1.0F;
+    f.any[(to_z + 1) * CornerField::kRows + row] = 1;
   }
 }
 
 /// The trusted corners of a block and of its 26 neighbours.
-bits::Neighbourhood good_around(const std::array<const CornerBlock*, 27>& around) {
+bits::Neighbourhood good_around(const std::array<CornerBlock*, 27>& around) {
   bits::Neighbourhood n{};
   for (int i = 0; i < 27; ++i) n[i / 9][i / 3 % 3][i % 3] = around[i] == nullptr ? nullptr : &around[i]->good;
   return n;
 }
 
-std::array<const CornerBlock*, 27> blocks_around(const Window& window, int level, const Block& b) {
-  std::array<const CornerBlock*, 27> around{};
-  for (int i = 0; i < 27; ++i) around[i] = window.probe(level, {b.x + i % 3 - 1, b.y + i / 3 % 3 - 1, b.z + i / 9 - 1});
-  return around;
-}
-
-void gather_field(const Window& window, int level, const std::array<const CornerBlock*, 27>& around, int begin, int end,
+void gather_field(const Window& window, int level, const std::array<CornerBlock*, 27>& around, int begin, int end,
                   CornerField& f) {
   for (auto* a : {&f.distance, &f.nx, &f.ny, &f.nz, &f.trusted}) {
     std::fill(a->begin() + begin * CornerField::kPlane, a->begin() + (end + 2) * CornerField::kPlane, 0.0F);
   }
+  std::fill(f.any.begin() + begin * CornerField::kRows, f.any.begin() + (end + 2) * CornerField::kRows, 0);
   for (int dz = -1; dz <= 1; ++dz) {
     const int from = std::max(begin - 1, dz * 8);
     const int to = std::min(end + 1, dz * 8 + 8);
@@ -90,23 +83,13 @@ constexpr float kSurrounded = 0.3F * 0.3F;
 /// Corners of the layer whose own projected point lies beyond the limit.
 std::uint64_t beyond(const Window& window, int level, const CornerBlock& leaf, int z, float boundary) {
   std::uint64_t out = 0;
+  if (leaf.seen.words[z] == 0) return 0;
   const CornerValues& values = leaf.values[window.brick_of(level, z)];
   std::uint32_t i = leaf.value_index(z * 64, window.brick_layers(level));
   for (std::uint64_t w = leaf.near.words[z]; w != 0; w &= w - 1, ++i) {
     if (values.channel(kReach)[i] > boundary) out |= w & (~w + 1);
   }
   return out & leaf.seen.words[z];
-}
-
-/// Signs of the layer's corners in `wanted`, by their own distances.
-std::uint64_t own_signs(const Window& window, int level, const CornerBlock& leaf, int z, std::uint64_t wanted) {
-  std::uint64_t positive = 0;
-  const CornerValues& values = leaf.values[window.brick_of(level, z)];
-  std::uint32_t i = leaf.value_index(z * 64, window.brick_layers(level));
-  for (std::uint64_t w = leaf.near.words[z]; w != 0; w &= w - 1, ++i) {
-    if (values.channel(kDistance)[i] >= 0) positive |= w & (~w + 1);
-  }
-  return positive & wanted;
 }
 
 /// Of the layer's corners that a finer level holds.
@@ -129,14 +112,10 @@ Signs extended_signs(const Kernel& kernel, const CornerField& field, int z, floa
   Signs out;
   for (int y = 0; y < 8; ++y) {
     if (((wanted >> (8 * y)) & 0xFFU) == 0) continue;
-    Extension e{};
-    kernel.extend(field, y, z, cell, e);
-    for (int l = 0; l < kLanes; ++l) {
-      const bool valued = e.weight[l] > 0;
-      out.positive |= static_cast<std::uint64_t>(!(e.distance[l] < 0)) << (8 * y + l);
-      out.valued |= static_cast<std::uint64_t>(valued) << (8 * y + l);
-      out.carried |= static_cast<std::uint64_t>(valued && e.aside[l] <= kSurrounded) << (8 * y + l);
-    }
+    const Extension e = kernel.extend(field, y, z, cell, kSurrounded);
+    out.positive |= std::uint64_t{e.positive} << (8 * y);
+    out.valued |= std::uint64_t{e.valued} << (8 * y);
+    out.carried |= std::uint64_t{e.surrounded} << (8 * y);
   }
   return {out.positive & wanted, out.valued & wanted, out.carried & wanted};
 }
@@ -144,22 +123,24 @@ Signs extended_signs(const Kernel& kernel, const CornerField& field, int z, floa
 void finish_tile(const Window& window, int level, const Tile& t, int begin, int end, const Kernel& kernel,
                  float boundary, CornerField& field) {
   const auto cell = static_cast<float>(window.lattice().cell_size(level));
-  const std::array<const CornerBlock*, 27> around = blocks_around(window, level, t.block);
-  const bits::Neighbourhood trusted = good_around(around);
+  const std::array<CornerBlock*, 27>& around = t.leaf->around;
+  std::array<std::uint64_t, 8> spread{};  // corners beside trusted ones
+  bits::dilate_layers<-1, 1>(good_around(around), begin, end, &spread[begin]);
   bool gathered = false;
   for (int z = begin; z < end; ++z) {
     const std::uint64_t corners = t.leaf->corners.words[z];
     if (corners == 0) continue;
     const std::uint64_t shared = t.leaf->shared.words[z];
     const std::uint64_t good = t.leaf->good.words[z];
+    const std::uint64_t own = t.leaf->positive.words[z];  // as projection left them
     Signs signs;
     if (shared != 0) signs = finer_signs(window, level, t, z);
-    signs.positive |= own_signs(window, level, *t.leaf, z, good & ~shared);
+    signs.positive |= own & good & ~shared;
     signs.valued |= good & ~shared;
     signs.carried |= t.leaf->seen.words[z] & ~shared;
     if (const std::uint64_t wanted = corners & ~shared & ~good; wanted != 0) {
       Signs extended;
-      if (const std::uint64_t beside = wanted & bits::dilate_layer(trusted, z, -1, 1); beside != 0) {
+      if (const std::uint64_t beside = wanted & spread[z]; beside != 0) {
         if (!gathered) gather_field(window, level, around, begin, end, field);
         gathered = true;
         extended = extended_signs(kernel, field, z, cell, beside);
@@ -169,7 +150,7 @@ void finish_tile(const Window& window, int level, const Tile& t, int begin, int 
       std::uint64_t alone = lone & t.leaf->seen.words[z];
       if (alone != 0) alone &= ~beyond(window, level, *t.leaf, z, kOwnReach);
       signs.positive |= (extended.positive & extended.valued) | (lone & ~alone);
-      if (alone != 0) signs.positive |= own_signs(window, level, *t.leaf, z, alone);
+      signs.positive |= own & alone;
       signs.valued |= extended.valued | alone;
       signs.carried |= extended.carried;
     }
@@ -185,7 +166,7 @@ void finish_tile(const Window& window, int level, const Tile& t, int begin, int 
 void finish_slab(Window& window, std::int32_t slab, const Kernel& kernel, float boundary) {
   tbb::enumerable_thread_specific<CornerField> fields;
   for (int level = 0; level < window.levels(); ++level) {
-    const std::vector<Tile> tiles = window.tiles(level, slab);
+    const Tiles tiles = window.tiles(level, slab);
     tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
       const std::int32_t first = window.lattice().first_layer(level, slab) - tiles[i].block.z * 8;
       const int end = std::min(8, first + window.lattice().layers(level));

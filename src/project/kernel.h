@@ -24,7 +24,8 @@ enum Sum : int {
   kPP,       ///< sum w p.p
   kPN,       ///< sum w p.n
   kWR,       ///< sum w R
-  kNearest,  ///< min |p - x|^2 / band^2 over samples with w > 0, band = the sample's own
+  kNearest,  ///< min |p - x|^2 / band^2 over samples with w > 0, band = the sample's own; 0 where no band is narrower
+             ///< than its sample's support
   kSeen,     ///< number of samples with w > 0
   kSums      ///< then one sum w c per attribute
 };
@@ -36,6 +37,7 @@ struct TileSamples {
   std::vector<float> inv_support2;  ///< 1 / R^2
   std::vector<float> inv_band2;     ///< 1 / band^2
   std::vector<float> weight;        ///< q_i
+  bool banded = true;               ///< some sample's band is narrower than its support
   std::vector<std::vector<float>> attributes;
   void resize(std::size_t n, std::size_t attribute_count);
 };
@@ -71,16 +73,19 @@ struct FitOutput {
 /// where there is none. Lengths in steps.
 struct CornerField {
   static constexpr int kRow = 16;
-  static constexpr int kPlane = 10 * kRow;
+  static constexpr int kRows = 10;
+  static constexpr int kPlane = kRows * kRow;
   static constexpr int kSize = 10 * kPlane;
   std::array<float, kSize> distance, nx, ny, nz, trusted;
+  std::array<std::uint8_t, 10 * kRows> any;  ///< [z + 1][y + 1]: whether the row has trusted corners
 };
 
-/// What the trusted ones among 26 neighbours say about eight corners. Weights are 1 / m^2, m = L1 offset in cells.
+/// What the trusted ones among 26 neighbours say about eight corners, a bit each. Weights are 1 / m^2, m = L1 offset in
+/// cells.
 struct Extension {
-  Lanes distance;  ///< weighted sum of the neighbours' planes' distances, steps
-  Lanes weight;    ///< sum of weights; 0: no trusted neighbour
-  Lanes aside;     ///< squared distance, along the surface, of the neighbours' weighted mean from the corner, cells^2
+  std::uint8_t positive;    ///< the weighted sum of the neighbours' planes' distances is not negative
+  std::uint8_t valued;      ///< there are trusted neighbours
+  std::uint8_t surrounded;  ///< and their weighted mean lies near the corner, measured along the surface
 };
 
 struct Kernel {
@@ -88,8 +93,9 @@ struct Kernel {
   /// Adds samples of `ranges` to `sums` (kSums + attributes lanes).
   void (*accumulate)(const TileSamples&, const SampleRange* ranges, int count, const Queries&, Lanes* sums);
   void (*fit)(const Lanes* sums, const FitInput&, FitOutput&);
-  /// Extends trusted neighbours' planes to the eight corners of row (y, z) of a tile. `cell` in steps.
-  void (*extend)(const CornerField&, int y, int z, float cell, Extension& out);
+  /// Extends trusted neighbours' planes to the eight corners of row (y, z) of a tile. `cell` in steps; `near`: squared
+  /// distance in cells up to which a corner is surrounded.
+  Extension (*extend)(const CornerField&, int y, int z, float cell, float near);
 };
 
 /// Kernels this processor can run, best last.

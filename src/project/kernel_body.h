@@ -13,8 +13,9 @@ inline Vec& vec(Lanes& l) {
   return *reinterpret_cast<Vec*>(l.v.data());
 }
 
-/// Attribute count known at compile time where A >= 0.
-template <int A>
+/// `A`: number of attributes where known at compile time, else negative. `B`: whether samples have bands narrower than
+/// their supports; otherwise every contributing sample is near enough.
+template <int A, bool B>
 void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query, Lanes* sums) {
   const Vec qx = vec(query.x);
   const Vec qy = vec(query.y);
@@ -31,10 +32,12 @@ void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count,
   Vec wr = vec(sums[kWR]);
   Vec nearest = vec(sums[kNearest]);
   Vec seen = vec(sums[kSeen]);
+  std::array<Vec, (A > 0 ? A : 1)> own{};
+  for (int a = 0; a < A; ++a) own[a] = vec(sums[kSums + a]);
+  const Vec seen_before = seen;
   const Vec zero = splat(0.0F);
   const Vec one = splat(1.0F);
   const Vec far = splat(1e30F);
-  const int attributes = A >= 0 ? A : static_cast<int>(s.attributes.size());
   for (int r = 0; r < count; ++r) {
     for (std::uint32_t i = ranges[r].begin; i < ranges[r].end; ++i) {
       const Vec dx = splat(s.x[i]) - qx;
@@ -58,11 +61,17 @@ void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count,
       pp += w * d2;
       pn += w * (dx * snx + dy * sny + dz * snz);
       wr += w * splat(s.support[i]);
-      // Only samples that contribute: which others are looked at is a matter of tiles and rows.
-      const Vec near = t > zero ? d2 * splat(s.inv_band2[i]) : far;
-      nearest = near < nearest ? near : nearest;
       seen += t > zero ? one : zero;
-      for (int a = 0; a < attributes; ++a) vec(sums[kSums + a]) += w * splat(s.attributes[a][i]);
+      if constexpr (B) {
+        // Only samples that contribute: which others are looked at is a matter of tiles and rows.
+        const Vec near = t > zero ? d2 * splat(s.inv_band2[i]) : far;
+        nearest = near < nearest ? near : nearest;
+      }
+      if constexpr (A >= 0) {
+        for (int a = 0; a < A; ++a) own[a] += w * splat(s.attributes[a][i]);
+      } else {
+        for (std::size_t a = 0; a < s.attributes.size(); ++a) vec(sums[kSums + a]) += w * splat(s.attributes[a][i]);
+      }
     }
   }
   vec(sums[kW]) = w_sum;
@@ -75,73 +84,91 @@ void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count,
   vec(sums[kPP]) = pp;
   vec(sums[kPN]) = pn;
   vec(sums[kWR]) = wr;
-  vec(sums[kNearest]) = nearest;
+  vec(sums[kNearest]) = B ? nearest : (seen > seen_before ? zero : nearest);
   vec(sums[kSeen]) = seen;
+  for (int a = 0; a < A; ++a) vec(sums[kSums + a]) = own[a];
+}
+
+template <bool B>
+void accumulate_some(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query, Lanes* sums) {
+  switch (s.attributes.size()) {
+    case 0:
+      return accumulate_body<0, B>(s, ranges, count, query, sums);
+    case 3:
+      return accumulate_body<3, B>(s, ranges, count, query, sums);
+    default:
+      return accumulate_body<-1, B>(s, ranges, count, query, sums);
+  }
 }
 
 inline void accumulate(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query, Lanes* sums) {
-  switch (s.attributes.size()) {
-    case 0:
-      return accumulate_body<0>(s, ranges, count, query, sums);
-    case 3:
-      return accumulate_body<3>(s, ranges, count, query, sums);
-    default:
-      return accumulate_body<-1>(s, ranges, count, query, sums);
-  }
+  return s.banded ? accumulate_some<true>(s, ranges, count, query, sums)
+                  : accumulate_some<false>(s, ranges, count, query, sums);
+}
+
+/// Exactly rounded, so the same on all processors.
+inline Vec root(const Vec& v) {
+  Vec out;
+  for (int l = 0; l < kLanes; ++l) out[l] = std::sqrt(v[l]);
+  return out;
 }
 
 /// Plane or algebraic sphere through the weighted samples (Guennebaud & Gross 2007, the closed form of the
 /// normal-constrained fit), evaluated at the corner.
 inline void fit(const Lanes* sums, const FitInput& in, FitOutput& out) {
-  constexpr float kTiny = 1e-20F;
-  constexpr float kFlat = 1e-3F;  // spread of the samples below which no curvature is estimated, in support^2
-  for (int l = 0; l < kLanes; ++l) {
-    const float w = sums[kW][l];
-    const float inv = w > 0 ? 1.0F / w : 0.0F;
-    const float ax = sums[kPx][l] * inv;
-    const float ay = sums[kPy][l] * inv;
-    const float az = sums[kPz][l] * inv;
-    const float mx = sums[kNx][l] * inv;
-    const float my = sums[kNy][l] * inv;
-    const float mz = sums[kNz][l] * inv;
-    const float support = sums[kWR][l] * inv;
-    const float pp = sums[kPP][l] * inv;
-    const float spread = pp - (ax * ax + ay * ay + az * az);
-    const float co = sums[kPN][l] * inv - (mx * ax + my * ay + mz * az);
-    const bool curved = in.sphere && spread > kFlat * support * support;
-    const float u4 = curved ? co / (2.0F * spread) : 0.0F;
-    const float ux = mx - 2.0F * u4 * ax;
-    const float uy = my - 2.0F * u4 * ay;
-    const float uz = mz - 2.0F * u4 * az;
-    const float u0 = -(ux * ax + uy * ay + uz * az + u4 * pp);
-    const float yx = in.offset.x[l];
-    const float yy = in.offset.y[l];
-    const float yz = in.offset.z[l];
-    const float f = u0 + (ux * yx + uy * yy + uz * yz) + u4 * (yx * yx + yy * yy + yz * yz);
-    const float gx = ux + 2.0F * u4 * yx;
-    const float gy = uy + 2.0F * u4 * yy;
-    const float gz = uz + 2.0F * u4 * yz;
-    const float g2 = gx * gx + gy * gy + gz * gz;
-    const float g = std::sqrt(g2 > kTiny ? g2 : kTiny);
-    const float disc = g2 - 4.0F * u4 * f;
-    const float d = disc >= 0 ? 2.0F * f / (g + std::sqrt(disc >= 0 ? disc : 0.0F)) : f / g;
-    const float inv_g = 1.0F / g;
-    const float nx = gx * inv_g;
-    const float ny = gy * inv_g;
-    const float nz = gz * inv_g;
-    const float u2 = ux * ux + uy * uy + uz * uz - 4.0F * u0 * u4;
-    const float scale = std::sqrt(u2 > kTiny ? u2 : kTiny);
-    const float rx = yx - d * nx - ax;
-    const float ry = yy - d * ny - ay;
-    const float rz = yz - d * nz - az;
-    const bool ok = w > 0 && g2 > kTiny;
-    out.distance[l] = ok ? d : 0.0F;
-    out.nx[l] = ok ? nx : 0.0F;
-    out.ny[l] = ok ? ny : 0.0F;
-    out.nz[l] = ok ? nz : 0.0F;
-    out.curvature[l] = ok ? 2.0F * u4 / scale : 0.0F;
-    out.reach[l] = ok ? std::sqrt(rx * rx + ry * ry + rz * rz) / support : 0.0F;
-  }
+  const Vec zero = splat(0.0F);
+  const Vec one = splat(1.0F);
+  const Vec two = splat(2.0F);
+  const Vec four = splat(4.0F);
+  const Vec tiny = splat(1e-20F);
+  const Vec w = vec(sums[kW]);
+  const Vec inv = w > zero ? one / (w > zero ? w : one) : zero;
+  const Vec ax = vec(sums[kPx]) * inv;
+  const Vec ay = vec(sums[kPy]) * inv;
+  const Vec az = vec(sums[kPz]) * inv;
+  const Vec mx = vec(sums[kNx]) * inv;
+  const Vec my = vec(sums[kNy]) * inv;
+  const Vec mz = vec(sums[kNz]) * inv;
+  const Vec support = vec(sums[kWR]) * inv;
+  const Vec pp = vec(sums[kPP]) * inv;
+  const Vec spread = pp - (ax * ax + ay * ay + az * az);
+  const Vec co = vec(sums[kPN]) * inv - (mx * ax + my * ay + mz * az);
+  // Where the samples spread less than this (in support^2) no curvature is estimated.
+  const Vec flat = in.sphere ? splat(1e-3F) * support * support : splat(1e30F);
+  const Vec u4 = spread > flat ? co / (spread > flat ? two * spread : one) : zero;
+  const Vec ux = mx - two * u4 * ax;
+  const Vec uy = my - two * u4 * ay;
+  const Vec uz = mz - two * u4 * az;
+  const Vec u0 = -(ux * ax + uy * ay + uz * az + u4 * pp);
+  const Vec yx = vec(in.offset.x);
+  const Vec yy = vec(in.offset.y);
+  const Vec yz = vec(in.offset.z);
+  const Vec f = u0 + (ux * yx + uy * yy + uz * yz) + u4 * (yx * yx + yy * yy + yz * yz);
+  const Vec gx = ux + two * u4 * yx;
+  const Vec gy = uy + two * u4 * yy;
+  const Vec gz = uz + two * u4 * yz;
+  const Vec g2 = gx * gx + gy * gy + gz * gz;
+  const Vec g = root(g2 > tiny ? g2 : tiny);
+  const Vec disc = g2 - four * u4 * f;
+  const Vec deep = g + root(disc >= zero ? disc : zero);
+  const Vec d = (disc >= zero ? two * f : f) / (disc >= zero ? deep : g);
+  const Vec inv_g = one / g;
+  const Vec nx = gx * inv_g;
+  const Vec ny = gy * inv_g;
+  const Vec nz = gz * inv_g;
+  const Vec u2 = ux * ux + uy * uy + uz * uz - four * u0 * u4;
+  const Vec scale = root(u2 > tiny ? u2 : tiny);
+  const Vec rx = yx - d * nx - ax;
+  const Vec ry = yy - d * ny - ay;
+  const Vec rz = yz - d * nz - az;
+  const Vec reach = root(rx * rx + ry * ry + rz * rz) / (w > zero ? support : one);
+  const auto ok = (w > zero) & (g2 > tiny);
+  vec(out.distance) = ok ? d : zero;
+  vec(out.nx) = ok ? nx : zero;
+  vec(out.ny) = ok ? ny : zero;
+  vec(out.nz) = ok ? nz : zero;
+  vec(out.curvature) = ok ? two * u4 / scale : zero;
+  vec(out.reach) = ok ? reach : zero;
 }
 
 inline Vec load(const float* p) {
@@ -150,7 +177,28 @@ inline Vec load(const float* p) {
   return v;
 }
 
-inline void extend(const CornerField& f, int y, int z, float cell, Extension& out) {
+typedef int IntVec __attribute__((vector_size(32)));  // NOLINT(modernize-use-using)
+
+/// A bit for every lane where a comparison holds.
+inline std::uint8_t lanes(const IntVec& holds) {
+  const IntVec bits = holds & IntVec{1, 2, 4, 8, 16, 32, 64, 128};
+  int out = 0;
+  for (int l = 0; l < kLanes; ++l) out |= bits[l];
+  return static_cast<std::uint8_t>(out);
+}
+
+/// A channel of three rows' corners side by side: the middle ones, and sum and difference of the outer ones.
+struct Triple {
+  Vec middle, sum, difference;
+};
+
+inline Triple triple(const float* p) {
+  const Vec low = load(p - 1);
+  const Vec high = load(p + 1);
+  return {load(p), low + high, high - low};
+}
+
+inline Extension extend(const CornerField& f, int y, int z, float cell, float near) {
   const Vec zero = splat(0.0F);
   Vec s = zero;
   Vec w = zero;
@@ -162,33 +210,36 @@ inline void extend(const CornerField& f, int y, int z, float cell, Extension& ou
   Vec oz = zero;
   for (int dz = -1; dz <= 1; ++dz) {
     for (int dy = -1; dy <= 1; ++dy) {
-      for (int dx = -1; dx <= 1; ++dx) {
-        const int m = (dx != 0) + (dy != 0) + (dz != 0);
-        if (m == 0) continue;
-        const int at = (z + 1 + dz) * CornerField::kPlane + (y + 1 + dy) * CornerField::kRow + 1 + dx;
-        const Vec ax = load(&f.nx[at]);
-        const Vec ay = load(&f.ny[at]);
-        const Vec az = load(&f.nz[at]);
-        // Vector from the neighbour to the corner; the neighbour's plane there.
-        const Vec plane = load(&f.distance[at]) - cell * (ax * static_cast<float>(dx) + ay * static_cast<float>(dy) +
-                                                          az * static_cast<float>(dz));
-        const Vec k = load(&f.trusted[at]) * splat(1.0F / static_cast<float>(m * m));
-        s += k * plane;
-        w += k;
-        nx += k * ax;
-        ny += k * ay;
-        nz += k * az;
-        ox += k * static_cast<float>(dx);
-        oy += k * static_cast<float>(dy);
-        oz += k * static_cast<float>(dz);
-      }
+      if (f.any[(z + 1 + dz) * CornerField::kRows + y + 1 + dy] == 0) continue;
+      // Weights of the row's middle and outer corners; nothing is trusted in the field where it is zero.
+      const int m = (dy != 0) + (dz != 0);
+      const Vec inner = splat(m == 0 ? 0.0F : 1.0F / static_cast<float>(m * m));
+      const Vec outer = splat(1.0F / static_cast<float>((m + 1) * (m + 1)));
+      const int at = (z + 1 + dz) * CornerField::kPlane + (y + 1 + dy) * CornerField::kRow + 1;
+      const Triple t = triple(&f.trusted[at]);
+      const Triple d = triple(&f.distance[at]);
+      const Triple ax = triple(&f.nx[at]);
+      const Triple ay = triple(&f.ny[at]);
+      const Triple az = triple(&f.nz[at]);
+      const Vec row_t = inner * t.middle + outer * t.sum;
+      const Vec row_y = inner * ay.middle + outer * ay.sum;
+      const Vec row_z = inner * az.middle + outer * az.sum;
+      const Vec along = outer * ax.difference + row_y * static_cast<float>(dy) + row_z * static_cast<float>(dz);
+      // The neighbours' planes at the corner.
+      s += inner * d.middle + outer * d.sum - cell * along;
+      w += row_t;
+      nx += inner * ax.middle + outer * ax.sum;
+      ny += row_y;
+      nz += row_z;
+      ox += outer * t.difference;
+      oy += row_t * static_cast<float>(dy);
+      oz += row_t * static_cast<float>(dz);
     }
   }
   const Vec any = w > zero ? w : splat(1.0F);
   const Vec n2 = nx * nx + ny * ny + nz * nz;
   const Vec along = ox * nx + oy * ny + oz * nz;
   const Vec n2_or_one = n2 > zero ? n2 : splat(1.0F);
-  vec(out.distance) = s;
-  vec(out.weight) = w;
-  vec(out.aside) = (ox * ox + oy * oy + oz * oz - along * along / n2_or_one) / (any * any);
+  const Vec aside = (ox * ox + oy * oy + oz * oz - along * along / n2_or_one) / (any * any);
+  return {lanes(s >= zero), lanes(w > zero), lanes((w > zero) & (aside <= splat(near)))};
 }

@@ -1,5 +1,6 @@
 #include "project/shared_corners.h"
 
+#include <algorithm>
 #include <bit>
 #include <utility>
 
@@ -9,7 +10,9 @@ bool allocate_values(const Window& window, int level, Projected& points, int beg
   std::uint32_t near = 0;
   for (int z = begin; z < end; ++z) near += static_cast<std::uint32_t>(std::popcount(points.near.words[z]));
   if (near == 0) return false;
-  points.values[window.brick_of(level, begin)].allocate(near, window.channels());
+  CornerValues& values = points.values[window.brick_of(level, begin)];
+  values.allocate(near, window.channels());
+  std::fill(values.data.begin(), values.data.end(), 0.0F);
   return true;
 }
 
@@ -27,10 +30,11 @@ void copy_shared(Window& window, int level, const Tile& tile, int begin, int end
       if (!from->seen.test(o)) continue;
       leaf.seen.set(offset);
       leaf.good.assign(offset, from->good.test(o));
+      leaf.positive.assign(offset, from->positive.test(o));
       const CornerValues& source = from->values[window.brick_of(level - 1, o >> 6)];
       const std::uint32_t at = from->value_index(o, window.brick_layers(level - 1));
       const std::uint32_t to = leaf.value_index(offset, window.brick_layers(level));
-      for (int c = 0; c < window.channels(); ++c) values.channel(c)[to] = source.channel(c)[at];
+      std::copy_n(source.of(at), window.channels(), values.of(to));
     }
   }
 }

@@ -10,19 +10,8 @@ namespace lamina {
 namespace {
 
 struct Entry {
-  std::uint32_t tile, sample;
-};
-
-/// Samples per piece of work; fixed, so that the order does not depend on the number of threads.
-constexpr std::size_t kPiece = 1u << 14;
-
-/// Samples fetched ahead of their turn.
-constexpr std::size_t kPrefetch = 24;
-
-struct Piece {
-  const ActiveBucket* bucket;
-  std::size_t begin, end;
-  std::uint32_t base;  ///< index of the bucket's first sample in the batch
+  std::uint32_t tile;
+  std::uint32_t clump;
 };
 
 std::int32_t ceil_cell(double x) {
@@ -71,38 +60,44 @@ class TileTable {
   std::vector<std::uint32_t> numbers_;
 };
 
-void bin_piece(const Lattice& lattice, int level, const Piece& piece, std::int32_t first, std::int32_t end,
-               std::span<const Block> tiles, const TileTable& table, float margin, double shift,
-               std::vector<Entry>& out) {
-  const double inv = 1.0 / lattice.cell_size(level);
-  const LocalSamples& s = piece.bucket->samples;
-  for (std::size_t i = piece.begin; i < piece.end; ++i) {
-    if (piece.bucket->support[i] <= 0) continue;
-    const double reach = (static_cast<double>(piece.bucket->support[i]) + static_cast<double>(margin)) * inv;
-    const double z = s.z[i] * inv - shift;
-    const std::int32_t z0 = std::max(ceil_cell(z - reach), first);
-    const std::int32_t z1 = std::min(floor_cell(z + reach), end - 1);
+/// Lattice points of an axis that a clump reaches.
+struct Points {
+  std::int32_t first, last;
+};
+
+Points points_of(const Clump& c, int axis, const Reach& reach, double inv) {
+  const double low = (double{static_cast<double>(c.low[axis])} - static_cast<double>(reach.margin)) * inv;
+  const double high = (double{static_cast<double>(c.high[axis])} + static_cast<double>(reach.margin)) * inv;
+  return {ceil_cell(low - static_cast<double>(reach.shift)), floor_cell(high - static_cast<double>(reach.shift))};
+}
+
+void bin_bucket(const Lattice& lattice, const Reach& reach, const ClumpedBucket& bucket, std::span<const Block> tiles,
+                const TileTable& table, std::vector<Entry>& out) {
+  const double inv = 1.0 / lattice.cell_size(reach.level);
+  for (std::uint32_t i = 0; i < bucket.clumps.size(); ++i) {
+    const Clump& c = bucket.clumps[i];
+    const Points z = points_of(c, 2, reach, inv);
+    const std::int32_t z0 = std::max(z.first, reach.first);
+    const std::int32_t z1 = std::min(z.last, reach.end - 1);
     if (z0 > z1) continue;
-    const double x = s.x[i] * inv - shift;
-    const double y = s.y[i] * inv - shift;
-    const std::int32_t x0 = ceil_cell(x - reach) >> 3;
-    const std::int32_t x1 = floor_cell(x + reach) >> 3;
-    const std::int32_t y0 = ceil_cell(y - reach) >> 3;
-    const std::int32_t y1 = floor_cell(y + reach) >> 3;
+    const Points x = points_of(c, 0, reach, inv);
+    const Points y = points_of(c, 1, reach, inv);
+    const Block low{x.first >> 3, y.first >> 3, z0 >> 3};
+    const Block high{x.last >> 3, y.last >> 3, z1 >> 3};
     // A support far larger than a tile reaches more places than there are tiles.
-    if ((double{1} + x1 - x0) * (double{1} + y1 - y0) > static_cast<double>(tiles.size())) {
-      for (std::size_t t = 0; t < tiles.size(); ++t) {
+    if ((double{1} + high.x - low.x) * (double{1} + high.y - low.y) > static_cast<double>(tiles.size())) {
+      for (std::uint32_t t = 0; t < tiles.size(); ++t) {
         const Block& b = tiles[t];
-        if (b.x < x0 || b.x > x1 || b.y < y0 || b.y > y1 || b.z < (z0 >> 3) || b.z > (z1 >> 3)) continue;
-        out.push_back({static_cast<std::uint32_t>(t), piece.base + static_cast<std::uint32_t>(i)});
+        if (b.x < low.x || b.x > high.x || b.y < low.y || b.y > high.y || b.z < low.z || b.z > high.z) continue;
+        out.push_back({t, i});
       }
       continue;
     }
-    for (std::int32_t bz = z0 >> 3; bz <= (z1 >> 3); ++bz) {
-      for (std::int32_t by = y0; by <= y1; ++by) {
-        for (std::int32_t bx = x0; bx <= x1; ++bx) {
+    for (std::int32_t bz = low.z; bz <= high.z; ++bz) {
+      for (std::int32_t by = low.y; by <= high.y; ++by) {
+        for (std::int32_t bx = low.x; bx <= high.x; ++bx) {
           const std::uint32_t tile = table.find({bx, by, bz});
-          if (tile != TileTable::kNone) out.push_back({tile, piece.base + static_cast<std::uint32_t>(i)});
+          if (tile != TileTable::kNone) out.push_back({tile, i});
         }
       }
     }
@@ -111,101 +106,128 @@ void bin_piece(const Lattice& lattice, int level, const Piece& piece, std::int32
 
 }  // namespace
 
-TileBins bin_samples(const Lattice& lattice, int level, const Batch& batch, std::int32_t first, std::int32_t end,
-                     std::span<const Block> tiles, float margin, double shift) {
-  std::vector<Piece> pieces;
-  std::uint32_t base = 0;
-  for (const auto& bucket : batch) {
-    const std::size_t n = bucket->samples.size();
-    for (std::size_t b = 0; b < n; b += kPiece) pieces.push_back({bucket.get(), b, std::min(n, b + kPiece), base});
-    base += static_cast<std::uint32_t>(n);
-  }
+TileRuns bin_clumps(const Lattice& lattice, const Reach& reach, const ClumpedBatch& batch,
+                    std::span<const Block> tiles) {
   const TileTable table(tiles);
-  std::vector<std::vector<Entry>> entries(pieces.size());
-  tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t p) {
-    bin_piece(lattice, level, pieces[p], first, end, tiles, table, margin, shift, entries[p]);
-  });
-  TileBins bins;
+  std::vector<std::vector<Entry>> entries(batch.size());
+  tbb::parallel_for(std::size_t{0}, batch.size(),
+                    [&](std::size_t b) { bin_bucket(lattice, reach, *batch[b], tiles, table, entries[b]); });
+  TileRuns bins;
   bins.begin.assign(tiles.size() + 1, 0);
-  for (const auto& piece : entries) {
-    for (const Entry& e : piece) ++bins.begin[e.tile + 1];
+  for (const auto& bucket : entries) {
+    for (const Entry& e : bucket) ++bins.begin[e.tile + 1];
   }
   for (std::size_t t = 0; t < tiles.size(); ++t) bins.begin[t + 1] += bins.begin[t];
-  bins.index.resize(bins.begin.back());
-  std::vector<std::uint64_t> cursor(bins.begin.begin(), bins.begin.end() - 1);
-  for (const auto& piece : entries) {
-    for (const Entry& e : piece) bins.index[cursor[e.tile]++] = e.sample;
+  bins.runs.resize(bins.begin.back());
+  std::vector<std::uint32_t> cursor(bins.begin.begin(), bins.begin.end() - 1);
+  for (std::size_t b = 0; b < batch.size(); ++b) {
+    for (const Entry& e : entries[b]) {
+      const Clump& c = batch[b]->clumps[e.clump];
+      bins.runs[cursor[e.tile]++] = {batch[b].get(), c.begin, c.end};
+    }
   }
   return bins;
 }
 
-void pack(const Batch& batch, const Lattice& lattice, PackedBatch& out) {
-  std::vector<std::size_t> base(batch.size() + 1, 0);
-  for (std::size_t b = 0; b < batch.size(); ++b) base[b + 1] = base[b] + batch[b]->samples.size();
-  out.attribute_count = batch.empty() ? 0 : batch.front()->samples.attributes.size();
-  out.samples.resize(base.back());
-  out.attributes.resize(base.back() * out.attribute_count);
-  tbb::parallel_for(std::size_t{0}, batch.size(), [&](std::size_t b) {
-    const ActiveBucket& bucket = *batch[b];
-    const LocalSamples& s = bucket.samples;
-    for (std::size_t i = 0; i < s.size(); ++i) {
-      const auto cell = static_cast<float>(lattice.cell_size(bucket.level[i]));
-      out.samples[base[b] + i] = {s.x[i],          s.y[i], s.z[i], s.nx[i], s.ny[i], s.nz[i], cell, bucket.support[i],
-                                  bucket.weight[i]};
-      for (std::size_t c = 0; c < out.attribute_count; ++c)
-        out.attributes[(base[b] + i) * out.attribute_count + c] = s.attributes[c][i];
-    }
-  });
+void RowSamples::gather(const Lattice& lattice, const Reach& reach, const Block& block, std::span<const Run> runs,
+                        float band) {
+  select(lattice, reach, block, runs);
+  place(lattice, reach.level, runs, band);
 }
 
-void RowSamples::gather(const Lattice& lattice, int level, const Block& block, const PackedBatch& batch,
-                        const std::uint32_t* index, std::size_t count, float band) {
-  const std::int32_t a = lattice.cell_size(level);
+void RowSamples::select(const Lattice& lattice, const Reach& reach, const Block& block, std::span<const Run> runs) {
+  constexpr std::size_t kPiece = 64;
+  const std::int32_t a = lattice.cell_size(reach.level);
   const float inv = 1.0F / static_cast<float>(a);
   // Differences are taken in integers: exact however far the tile lies from the origin.
-  const std::int64_t ox = std::int64_t{block.x} * 8 * a;
-  const std::int64_t oy = std::int64_t{block.y} * 8 * a;
-  const std::int64_t oz = std::int64_t{block.z} * 8 * a;
-  const std::size_t attributes = batch.attribute_count;
-  samples_.resize(count, attributes);
-  row_.resize(count);
-  row_begin_.assign(kRows * kRows + 1, 0);
-  max_support_ = 0;
-
-  // Rows by the very coordinates the sums use: what ranges() cuts off lies beyond the support in these, too.
-  const auto row_of = [inv](std::int64_t steps) {
-    return static_cast<int>(std::clamp(std::floor(static_cast<float>(steps) * inv) - static_cast<float>(kLow), 0.0F,
-                                       static_cast<float>(kRows - 1)));
+  const auto origin = [a](std::int32_t b) {
+    return static_cast<std::uint32_t>(b) * 8U * static_cast<std::uint32_t>(a);
   };
-  for (std::size_t k = 0; k < count; ++k) {
-    // Tiles of clouds in random order find their samples all over the batch, which no cache holds.
-    __builtin_prefetch(&batch.samples[index[std::min(k + kPrefetch, count - 1)]]);
-    const PackedSample& s = batch.samples[index[k]];
-    const int row = row_of(s.z - oz) * kRows + row_of(s.y - oy);
-    row_[k] = static_cast<std::uint16_t>(row);
-    ++row_begin_[static_cast<std::size_t>(row) + 1];
+  const std::uint32_t ox = origin(block.x);
+  const std::uint32_t oy = origin(block.y);
+  const std::uint32_t oz = origin(block.z);
+  // Points of the block: their middle, and how far they lie from it at most, rounding included.
+  const float margin = reach.margin * inv + 1e-4F;
+  const auto z_first = static_cast<float>(std::max(reach.first - block.z * 8, 0)) + reach.shift;
+  const auto z_last = static_cast<float>(std::min(reach.end - 1 - block.z * 8, 7)) + reach.shift;
+  const float middle = 3.5F + reach.shift;
+  const float half = 3.5F + margin;
+  const float z_middle = 0.5F * (z_first + z_last);
+  const float z_half = 0.5F * (z_last - z_first) + margin;
+
+  found_.resize(found_.capacity());
+  std::size_t n = 0;
+  struct Piece {
+    std::array<float, kPiece> x, y, z, support;
+    std::array<std::int32_t, kPiece> row, keep;
+  } p;
+  for (std::uint32_t r = 0; r < runs.size(); ++r) {
+    const ClumpedBucket& from = *runs[r].from;
+    for (std::size_t begin = runs[r].begin; begin < runs[r].end; begin += kPiece) {
+      const std::size_t count = std::min<std::size_t>(kPiece, runs[r].end - begin);
+      const std::int32_t* const px = from.x.data() + begin;
+      const std::int32_t* const py = from.y.data() + begin;
+      const std::int32_t* const pz = from.z.data() + begin;
+      const float* const ps = from.support.data() + begin;
+      for (std::size_t i = 0; i < count; ++i) {
+        const float x = static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(px[i]) - ox)) * inv;
+        const float y = static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(py[i]) - oy)) * inv;
+        const float z = static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(pz[i]) - oz)) * inv;
+        const float s = ps[i] * inv;
+        p.x[i] = x;
+        p.y[i] = y;
+        p.z[i] = z;
+        p.support[i] = s;
+        p.keep[i] = static_cast<int>(std::abs(x - middle) <= half + s) &
+                    static_cast<int>(std::abs(y - middle) <= half + s) &
+                    static_cast<int>(std::abs(z - z_middle) <= z_half + s);
+        // Rows by the very coordinates the sums use: what ranges() cuts off lies beyond the support in these, too.
+        constexpr float kLast = kRows - 1;
+        const float row_y = std::min(std::max(std::floor(y) - static_cast<float>(kLow), 0.0F), kLast);
+        const float row_z = std::min(std::max(std::floor(z) - static_cast<float>(kLow), 0.0F), kLast);
+        p.row[i] = static_cast<std::int32_t>(row_z) * kRows + static_cast<std::int32_t>(row_y);
+      }
+      if (n + count > found_.size()) found_.resize(2 * found_.size() + count);
+      for (std::size_t i = 0; i < count; ++i) {
+        found_[n] = {p.x[i], p.y[i], p.z[i], p.support[i], p.row[i], r, static_cast<std::uint32_t>(begin + i)};
+        n += static_cast<std::size_t>(p.keep[i]);
+      }
+    }
   }
+  found_.resize(n);
+}
+
+void RowSamples::place(const Lattice& lattice, int level, std::span<const Run> runs, float band) {
+  const float inv = 1.0F / static_cast<float>(lattice.cell_size(level));
+  const std::size_t attributes = runs.empty() ? 0 : runs.front().from->attributes.size();
+  samples_.resize(found_.size(), attributes);
+  row_begin_.assign(kRows * kRows + 1, 0);
+  for (const Found& f : found_) ++row_begin_[static_cast<std::size_t>(f.row) + 1];
   for (std::size_t r = 0; r < kRows * kRows; ++r) row_begin_[r + 1] += row_begin_[r];
   std::array<std::uint32_t, kRows * kRows> cursor{};
   std::copy_n(row_begin_.begin(), kRows * kRows, cursor.begin());
-  for (std::size_t k = 0; k < count; ++k) {
-    const PackedSample& s = batch.samples[index[k]];
-    const std::uint32_t to = cursor[row_[k]]++;
-    samples_.x[to] = static_cast<float>(s.x - ox) * inv;
-    samples_.y[to] = static_cast<float>(s.y - oy) * inv;
-    samples_.z[to] = static_cast<float>(s.z - oz) * inv;
-    samples_.nx[to] = s.nx;
-    samples_.ny[to] = s.ny;
-    samples_.nz[to] = s.nz;
-    const float support = s.support * inv;
-    const float reach = band * s.cell * inv;
-    samples_.support[to] = support;
-    samples_.inv_support2[to] = 1.0F / (support * support);
-    samples_.inv_band2[to] = 1.0F / (reach * reach);
-    samples_.weight[to] = s.weight;
-    const float* const own = batch.attributes.data() + index[k] * attributes;
-    for (std::size_t c = 0; c < attributes; ++c) samples_.attributes[c][to] = own[c];
-    max_support_ = std::max(max_support_, support);
+  max_support_ = 0;
+  for (const Found& f : found_) {
+    const std::uint32_t to = cursor[static_cast<std::size_t>(f.row)]++;
+    const ClumpedBucket& from = *runs[f.run].from;
+    samples_.x[to] = f.x;
+    samples_.y[to] = f.y;
+    samples_.z[to] = f.z;
+    samples_.nx[to] = from.nx[f.sample];
+    samples_.ny[to] = from.ny[f.sample];
+    samples_.nz[to] = from.nz[f.sample];
+    samples_.support[to] = f.support;
+    samples_.weight[to] = from.weight[f.sample];
+    samples_.inv_band2[to] = from.cell[f.sample];
+    for (std::size_t c = 0; c < attributes; ++c) samples_.attributes[c][to] = from.attributes[c][f.sample];
+    max_support_ = std::max(max_support_, f.support);
+  }
+  samples_.banded = false;
+  for (std::size_t k = 0; k < found_.size(); ++k) {
+    const float reach = band * samples_.inv_band2[k] * inv;
+    samples_.inv_support2[k] = 1.0F / (samples_.support[k] * samples_.support[k]);
+    samples_.inv_band2[k] = 1.0F / (reach * reach);
+    samples_.banded |= reach < samples_.support[k];
   }
 }
 

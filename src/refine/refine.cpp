@@ -16,15 +16,15 @@ namespace {
 /// Cells a sample reaches around its home. A radius is estimated too small by up to a fifth and a cell may be less than
 /// half of it, so gaps between samples are up to five cells wide: with two, they came out as holes.
 constexpr int kReachCells = 3;
-/// Cells around the home whose corners are projected; with two, nothing gained and half as many corners more.
+/// Cells around the home that finer samples' cells inherit closeness from, and whose centres are projected.
 constexpr int kCloseCells = 1;
 
-bits::Neighbourhood gather(const Window& window, int level, const Block& b, BlockMask CornerBlock::*mask) {
+bits::Neighbourhood gather(const CornerBlock& leaf, BlockMask CornerBlock::*mask, int hi) {
   bits::Neighbourhood n{};
-  for (int z = -1; z <= 1; ++z) {
-    for (int y = -1; y <= 1; ++y) {
-      for (int x = -1; x <= 1; ++x) {
-        const CornerBlock* block = window.probe(level, {b.x + x, b.y + y, b.z + z});
+  for (int z = -1; z <= hi; ++z) {
+    for (int y = -1; y <= hi; ++y) {
+      for (int x = -1; x <= hi; ++x) {
+        const CornerBlock* block = leaf.around[CornerBlock::towards(x, y, z)];
         n[z + 1][y + 1][x + 1] = block == nullptr ? nullptr : &(block->*mask);
       }
     }
@@ -46,55 +46,59 @@ LeafLayers leaf_layers(const Window& window, int level, std::int32_t slab, const
 
 template <typename Body>
 void for_tiles(Window& window, int level, std::int32_t slab, const Body& body) {
-  const std::vector<Tile> tiles = window.tiles(level, slab);
+  const Tiles tiles = window.tiles(level, slab);
   tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
     const LeafLayers layers = leaf_layers(window, level, slab, tiles[i].block);
     body(tiles[i], layers.begin, layers.end);
   });
 }
 
-/// Makes the blocks that cells within `reach` of marked layers [z - reach, z_end + reach) can fall into.
+/// The blocks around a tile that its marked cells, moved by up to [lo, hi]^3, come to lie in; `layers` has the layers
+/// they may come to lie in.
+void list_missing(const Tile& t, const BlockMask& m, std::pair<std::int32_t, std::int32_t> layers, int lo, int hi,
+                  std::vector<Block>& missing) {
+  std::array<std::uint64_t, 3> by_target{};  // layers that reach into the block below, this one, the one above
+  for (int z = 0; z < 8; ++z) {
+    if (m.words[z] == 0) continue;
+    const std::int32_t layer = t.block.z * 8 + z;
+    const std::int32_t from = std::max(layer + lo, layers.first);
+    const std::int32_t to = std::min(layer + hi, layers.second - 1);
+    if (from > to) continue;
+    for (std::int32_t bz = from >> 3; bz <= (to >> 3); ++bz) by_target[bz - t.block.z + 1] |= m.words[z];
+  }
+  for (int dz = -1; dz <= 1; ++dz) {
+    const std::uint64_t w = by_target[dz + 1];
+    if (w == 0) continue;
+    const bool left = lo < 0 && (w & bits::columns_below(-lo)) != 0;
+    const bool right = hi > 0 && (w & ~bits::columns_below(8 - hi)) != 0;
+    const bool down = lo < 0 && (w & ((std::uint64_t{1} << (8 * -lo)) - 1)) != 0;
+    const bool up = hi > 0 && (w >> (8 * (8 - hi))) != 0;
+    for (int dy = down ? -1 : 0; dy <= (up ? 1 : 0); ++dy) {
+      for (int dx = left ? -1 : 0; dx <= (right ? 1 : 0); ++dx) {
+        if (t.leaf->around[CornerBlock::towards(dx, dy, dz)] != nullptr) continue;
+        missing.push_back({t.block.x + dx, t.block.y + dy, t.block.z + dz});
+      }
+    }
+  }
+}
+
+/// Makes the blocks that the slab's part of the marked cells, moved by up to [lo, hi]^3, can fall into.
 void touch_around(Window& window, int level, std::int32_t slab, BlockMask CornerBlock::*mask, int lo, int hi) {
   const Lattice& lattice = window.lattice();
   const std::int32_t first = lattice.first_layer(level, slab);
   const std::int32_t end = first + lattice.layers(level);
   const std::int32_t slab_lo = lattice.slab_of_layer(level, first - hi);
   const std::int32_t slab_hi = lattice.slab_of_layer(level, end - 1 - lo);
-  std::vector<Block> wanted;
+  std::vector<Block> missing;
   std::int32_t done = std::numeric_limits<std::int32_t>::min();
   for (std::int32_t s = slab_lo; s <= slab_hi; ++s) {
     for (const Tile& t : window.tiles(level, s)) {
-      if (t.block.z <= done) continue;  // slabs share leaves at coarse levels
-      const BlockMask& m = t.leaf->*mask;
-      std::uint64_t low = 0;  // bits of layers that reach down into the slab's layers from above, and so on
-      std::array<std::uint64_t, 3> by_target{};
-      for (int z = 0; z < 8; ++z) {
-        if (m.words[z] == 0) continue;
-        const std::int32_t layer = t.block.z * 8 + z;
-        const std::int32_t from = std::max(layer + lo, first);
-        const std::int32_t to = std::min(layer + hi, end - 1);
-        if (from > to) continue;
-        for (std::int32_t bz = from >> 3; bz <= (to >> 3); ++bz) by_target[bz - t.block.z + 1] |= m.words[z];
-        low |= m.words[z];
-      }
-      if (low == 0) continue;
-      for (int dz = -1; dz <= 1; ++dz) {
-        const std::uint64_t w = by_target[dz + 1];
-        if (w == 0) continue;
-        const bool left = lo < 0 && (w & bits::columns_below(-lo)) != 0;
-        const bool right = hi > 0 && (w & ~bits::columns_below(8 - hi)) != 0;
-        const bool down = lo < 0 && (w & ((std::uint64_t{1} << (8 * -lo)) - 1)) != 0;
-        const bool up = hi > 0 && (w >> (8 * (8 - hi))) != 0;
-        for (int dy = down ? -1 : 0; dy <= (up ? 1 : 0); ++dy) {
-          for (int dx = left ? -1 : 0; dx <= (right ? 1 : 0); ++dx) {
-            wanted.push_back({t.block.x + dx, t.block.y + dy, t.block.z + dz});
-          }
-        }
-      }
+      // Slabs share leaves at coarse levels.
+      if (t.block.z > done) list_missing(t, t.leaf->*mask, {first, end}, lo, hi, missing);
     }
     done = (lattice.first_layer(level, s) + lattice.layers(level) - 1) >> 3;
   }
-  for (const Block& b : wanted) window.touch(level, b);
+  for (const Block& b : missing) window.touch(level, b);
 }
 
 Block parent_block(const Block& b) {
@@ -107,11 +111,18 @@ std::uint64_t from_parent(const BlockMask& parent, const Block& child, int z) {
 }
 
 void split_parents(Window& window, int level, std::int32_t slab) {
+  Block last{};
+  bool known = false;  // that `last` is there: neighbours mostly have the same parent
   for (const Tile& t : window.tiles(level, slab)) {
     const LeafLayers layers = leaf_layers(window, level, slab, t.block);
+    const Block parent = parent_block(t.block);
+    if (known && parent == last) continue;
     std::uint64_t any = 0;
     for (int z = layers.begin; z < layers.end; ++z) any |= t.leaf->touched.words[z] | t.leaf->split.words[z];
-    if (any != 0) window.touch(level + 1, parent_block(t.block));
+    if (any == 0) continue;
+    window.touch(level + 1, parent);
+    last = parent;
+    known = true;
   }
   for_tiles(window, level + 1, slab, [&](const Tile& t, int begin, int end) {
     for (int octant = 0; octant < 8; ++octant) {
@@ -137,45 +148,72 @@ void inherit(Window& window, int level, std::int32_t slab) {
   const int parent_level = level + 1;
   for (const Tile& t : window.tiles(parent_level, slab)) {
     const LeafLayers layers = leaf_layers(window, parent_level, slab, t.block);
+    std::array<std::uint64_t, 2> nodes{};  // of the lower and of the upper half's layers, one above the other
+    for (int z = layers.begin; z < layers.end; ++z) {
+      nodes[z >> 2] |= t.leaf->split.words[z] & t.leaf->reached.words[z];
+    }
     for (int octant = 0; octant < 8; ++octant) {
-      const Block child{t.block.x * 2 + (octant & 1), t.block.y * 2 + ((octant >> 1) & 1),
-                        t.block.z * 2 + (octant >> 2)};
-      std::uint64_t any = 0;
-      const int oz = (octant >> 2) * 4;
-      for (int z = std::max(layers.begin, oz); z < std::min(layers.end, oz + 4); ++z) {
-        const std::uint64_t w = t.leaf->split.words[z] & t.leaf->reached.words[z];
-        any |= bits::spread_quarter(w, octant & 1, (octant >> 1) & 1);
-      }
-      if (any != 0) window.touch(level, child);
+      const std::uint64_t quarter = std::uint64_t{0x0F0F0F0F} << (4 * (octant & 1) + 32 * ((octant >> 1) & 1));
+      if ((nodes[octant >> 2] & quarter) == 0) continue;
+      window.touch(level,
+                   {t.block.x * 2 + (octant & 1), t.block.y * 2 + ((octant >> 1) & 1), t.block.z * 2 + (octant >> 2)});
     }
   }
+  for_tiles(window, parent_level, slab, [&](const Tile& t, int begin, int end) {
+    std::uint64_t split = 0;
+    for (int z = begin; z < end; ++z) split |= t.leaf->split.words[z];
+    if (split != 0) close_cells(*t.leaf, begin, end, &t.leaf->close.words[begin]);
+  });
   for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
     const CornerBlock* parent = std::as_const(window).probe(parent_level, parent_block(t.block));
+    std::uint64_t any_above = 0;
     for (int z = begin; z < end; ++z) {
       const std::uint64_t nodes = parent == nullptr ? 0 : from_parent(parent->split, t.block, z);
       std::uint64_t reached = t.leaf->touched.words[z];
-      std::uint64_t close = t.leaf->close.words[z];
       if (parent != nullptr) {
         reached |= from_parent(parent->reached, t.block, z);
-        close |= from_parent(parent->close, t.block, z);
+        t.leaf->above.words[z] = from_parent(parent->close, t.block, z) & nodes;
+        any_above |= t.leaf->above.words[z];
       }
       t.leaf->reached.words[z] = reached & nodes;
-      t.leaf->close.words[z] = close & nodes;
       t.leaf->cells.words[z] = reached & nodes & ~t.leaf->split.words[z];
     }
+    t.leaf->inherits = t.leaf->inherits || any_above != 0;
   });
+}
+
+/// Whether cells of coarser samples' closeness touch the block's corners.
+bool inherits(const CornerBlock& leaf) {
+  for (int i = 0; i < 8; ++i) {
+    const CornerBlock* const block = leaf.around[CornerBlock::towards(-(i & 1), -((i >> 1) & 1), -(i >> 2))];
+    if (block != nullptr && block->inherits) return true;
+  }
+  return false;
 }
 
 }  // namespace
 
+void close_cells(const CornerBlock& leaf, int begin, int end, std::uint64_t* out) {
+  bits::dilate_layers<-kCloseCells, kCloseCells>(gather(leaf, &CornerBlock::home, 1), begin, end, out);
+  for (int z = begin; z < end; ++z) out[z - begin] |= leaf.above.words[z];
+}
+
 void mark_sample(Window& window, const Mark& mark) {
   const std::int32_t a = window.lattice().cell_size(mark.level);
   const Cell c{floor_div(mark.x, a), floor_div(mark.y, a), floor_div(mark.z, a)};
+  const auto set = [&](CornerBlock& block, BlockMask CornerBlock::*mask, int offset) {
+    const std::uint64_t bit = std::uint64_t{1} << (offset & 63);
+    std::atomic_ref<std::uint64_t> word((block.*mask).words[offset >> 6]);
+    if ((word.load(std::memory_order_relaxed) & bit) == 0) word.fetch_or(bit, std::memory_order_relaxed);
+  };
   CornerBlock& block = window.touch_shared(mark.level, block_of(c));
-  const int offset = offset_in_block(c);
-  const std::uint64_t bit = std::uint64_t{1} << (offset & 63);
-  std::atomic_ref<std::uint64_t> word(block.home.words[offset >> 6]);
-  if ((word.load(std::memory_order_relaxed) & bit) == 0) word.fetch_or(bit, std::memory_order_relaxed);
+  set(block, &CornerBlock::home, offset_in_block(c));
+  const auto upper = [a](std::int32_t v, std::int32_t cell) {
+    return std::int64_t{2} * (std::int64_t{v} - std::int64_t{cell} * a) >= a ? 1 : 0;
+  };
+  const Cell corner = c + Cell{upper(mark.x, c.x), upper(mark.y, c.y), upper(mark.z, c.z)};
+  const bool same = block_of(corner) == block_of(c);
+  set(same ? block : window.touch_shared(mark.level, block_of(corner)), &CornerBlock::nearest, offset_in_block(corner));
 }
 
 void refine_slab(Window& window, std::int32_t slab) {
@@ -183,11 +221,8 @@ void refine_slab(Window& window, std::int32_t slab) {
   for (int level = 0; level < levels; ++level) {
     touch_around(window, level, slab, &CornerBlock::home, -kReachCells, kReachCells);
     for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
-      const bits::Neighbourhood home = gather(window, level, t.block, &CornerBlock::home);
-      for (int z = begin; z < end; ++z) {
-        t.leaf->touched.words[z] = bits::dilate_layer(home, z, -kReachCells, kReachCells);
-        t.leaf->close.words[z] = bits::dilate_layer(home, z, -kCloseCells, kCloseCells);
-      }
+      const bits::Neighbourhood home = gather(*t.leaf, &CornerBlock::home, 1);
+      bits::dilate_layers<-kReachCells, kReachCells>(home, begin, end, &t.leaf->touched.words[begin]);
     });
   }
   for (int level = 0; level + 1 < levels; ++level) split_parents(window, level, slab);
@@ -204,13 +239,16 @@ void place_corners(Window& window, std::int32_t slab) {
   for (int level = 0; level < window.levels(); ++level) {
     touch_around(window, level, slab, &CornerBlock::cells, 0, 1);
     for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
-      const bits::Neighbourhood cells = gather(window, level, t.block, &CornerBlock::cells);
-      const bits::Neighbourhood close = gather(window, level, t.block, &CornerBlock::close);
-      for (int z = begin; z < end; ++z) {
-        const std::uint64_t corners = bits::dilate_layer(cells, z, 0, 1);
-        t.leaf->corners.words[z] = corners;
-        t.leaf->near.words[z] = corners == 0 ? 0 : corners & bits::dilate_layer(close, z, 0, 1);
+      const bits::Neighbourhood cells = gather(*t.leaf, &CornerBlock::cells, 0);
+      const bits::Neighbourhood nearest = gather(*t.leaf, &CornerBlock::nearest, 1);
+      bits::dilate_layers<0, 1>(cells, begin, end, &t.leaf->corners.words[begin]);
+      bits::dilate_layers<-1, 1>(nearest, begin, end, &t.leaf->near.words[begin]);
+      if (inherits(*t.leaf)) {
+        std::array<std::uint64_t, 8> above{};
+        bits::dilate_layers<0, 1>(gather(*t.leaf, &CornerBlock::above, 0), begin, end, above.data());
+        for (int z = begin; z < end; ++z) t.leaf->near.words[z] |= above[z - begin];
       }
+      for (int z = begin; z < end; ++z) t.leaf->near.words[z] &= t.leaf->corners.words[z];
     });
     if (level == 0) continue;
     // A corner that a finer level holds too is projected there; what it is there it is here.

@@ -12,7 +12,8 @@ struct Mark {
   std::uint8_t level;    ///< coarsest level whose cells are small enough for the sample
 };
 
-/// Notes the sample's home cell. Any order, several threads at once, slabs at will ahead of refine().
+/// Notes the sample's home cell and nearest corner. Any order, several threads at once, slabs at will ahead of
+/// refine().
 void mark_sample(Window& window, const Mark& mark);
 
 /// Fixes the octree of one slab: cells that samples reach, subdivision, taking part. Samples must be marked up to three
@@ -20,8 +21,13 @@ void mark_sample(Window& window, const Mark& mark);
 /// of that level's cells (METHOD 3.4 with a wider ball, taken as the cells it can meet).
 void refine_slab(Window& window, std::int32_t slab);
 
-/// Fixes the corners of one slab (its layers of corners, the first plane included) and of them the ones to project.
-/// The slab and the one below must be refined.
+/// Cells of the block's layers [begin, end) within one cell of the home of a sample of this or a coarser level, to
+/// `out` from its front. The slab must be refined.
+void close_cells(const CornerBlock& leaf, int begin, int end, std::uint64_t* out);
+
+/// Fixes the corners of one slab (its layers of corners, the first plane included) and of them the ones to project: the
+/// corner nearest to a sample and the 26 around it, and those of cells close to a sample of a coarser level. The slab
+/// and the one below must be refined.
 void place_corners(Window& window, std::int32_t slab);
 
 /// Leaf cells of a slab at a level.

@@ -8,7 +8,6 @@
 #include "lamina/error.h"
 #include "project/finish.h"
 #include "refine/refine.h"
-#include "surface/final_vertices.h"
 
 namespace lamina {
 namespace {
@@ -30,14 +29,12 @@ Pipeline::Pipeline(const SurfaceSettings& settings, const Resolved& resolved, co
                    SampleFeed& feed, std::size_t attributes, MeshSink& sink, SurfaceVolume* volume)
     : settings_(settings),
       resolved_(resolved),
-      frame_(frame),
       feed_(feed),
-      sink_(sink),
       volume_(volume),
       kernel_(select_kernel()),
       window_(resolved.lattice, static_cast<int>(attributes), extent),
       projector_(project_settings(settings), kernel_),
-      clusterer_(ClusterSettings{settings.cluster}),
+      output_(ClusterSettings{settings.cluster}, static_cast<float>(settings.chord), frame, sink),
       first_(resolved.lattice.slab_of(extent.z_min) - kReachSlabs),
       last_(resolved.lattice.slab_of(extent.z_max) + kReachSlabs),
       refined_(first_),
@@ -46,7 +43,7 @@ Pipeline::Pipeline(const SurfaceSettings& settings, const Resolved& resolved, co
       finished_(first_),
       numbered_(first_),
       triangulated_(first_),
-      written_(first_),
+      held_(first_),
       covered_(first_),
       leaf_cells_(static_cast<std::size_t>(resolved.lattice.levels), 0) {}
 
@@ -54,7 +51,7 @@ void Pipeline::mark(const ActiveBucket& bucket) {
   constexpr std::size_t kPiece = 4096;
   const std::size_t n = bucket.samples.size();
   const auto [low, high] = std::minmax_element(bucket.samples.z.begin(), bucket.samples.z.end());
-  for (covered_ = std::min(covered_, resolved_.lattice.slab_of(*low)); covered_ <= resolved_.lattice.slab_of(*high);
+  for (covered_ = std::min(covered_, resolved_.lattice.slab_of(*low)); covered_ <= resolved_.lattice.slab_of(*high) + 1;
        ++covered_) {
     window_.cover(covered_);
   }
@@ -92,7 +89,7 @@ void Pipeline::finish_to(std::int32_t slab) {
 void Pipeline::number_to(std::int32_t slab, Stopwatch& watch) {
   for (; numbered_ <= std::min(slab, last_); ++numbered_) {
     IsoSlab* below = iso_.empty() ? nullptr : iso_.back().get();
-    auto here = std::make_shared<IsoSlab>();
+    std::shared_ptr<IsoSlab> here = output_.spare();
     number_edges(window_, numbered_, below, *here);
     isovertices_ += here->vertices.size();
     if (volume_ != nullptr) watch.time("volume", [&] { volume_->add(window_, *here, numbered_); });
@@ -105,29 +102,20 @@ void Pipeline::number_to(std::int32_t slab, Stopwatch& watch) {
 void Pipeline::triangulate_to(std::int32_t slab) {
   IsoSlab nothing;
   for (; triangulated_ <= std::min(slab, last_); ++triangulated_) {
-    const auto at = static_cast<std::size_t>(triangulated_ - written_);
+    const auto at = static_cast<std::size_t>(triangulated_ - held_);
     IsoSlab& here = *iso_[at];
     triangulate(window_, triangulated_, here, at + 1 < iso_.size() ? *iso_[at + 1] : nothing, extracted_);
     separate_fans(at > 0 ? iso_[at - 1].get() : nullptr, here, extracted_);
     isotriangles_ += here.triangles.size();
-    if (at > 0) clusterer_.push(iso_[at - 1]);
+    if (at > 0) hand_over();
   }
-  if (triangulated_ > last_ && !iso_.empty()) {
-    clusterer_.push(iso_.back());
-    clusterer_.finish();
-  }
+  if (triangulated_ > last_ && !iso_.empty()) hand_over();
 }
 
-void Pipeline::write_finished() {
-  FinalSlab slab;
-  while (clusterer_.pop(slab)) {
-    const IsoSlab* next = iso_.size() > 1 ? iso_[1].get() : nullptr;
-    place_vertices(slab, *iso_.front(), next, frame_, static_cast<float>(settings_.chord), vertices_);
-    sink_.append_vertices(vertices_);
-    sink_.append_triangles(slab.triangles);
-    iso_.pop_front();
-    ++written_;
-  }
+void Pipeline::hand_over() {
+  output_.push(std::move(iso_.front()));
+  iso_.pop_front();
+  ++held_;
 }
 
 void Pipeline::retire() {
@@ -154,12 +142,13 @@ void Pipeline::run(const RunContext& run, Stopwatch& watch) {
     watch.time("finish", [&] { finish_to(top + 2); });
     watch.time("number", [&] { number_to(top + 1, watch); });
     watch.time("triangulate", [&] { triangulate_to(top); });
-    watch.time("cluster and write", [&] { write_finished(); });
+    watch.time("cluster and write", [&] { output_.start(); });
     retire();
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
     if (run.progress)
       run.progress({"surface", feed_.released(), resolved_.plan.samples, top - first_ + 1, last_ - first_ + 1});
   }
+  watch.time("cluster and write", [&] { output_.finish(); });
 }
 
 void Pipeline::report(SurfaceStats& stats) const {
@@ -175,7 +164,7 @@ void Pipeline::report(SurfaceStats& stats) const {
   stats.general_cells = extracted_.general_cells;
   stats.crossing_cells = extracted_.crossing_cells;
   stats.leaf_cells = leaf_cells_;
-  stats.clusters = clusterer_.counts();
+  stats.clusters = output_.counts();
 }
 
 }  // namespace lamina

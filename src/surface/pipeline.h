@@ -6,9 +6,9 @@
 
 #include "extract/extract.h"
 #include "feed/sample_feed.h"
-#include "lamina/cluster.h"
 #include "lamina/mesh_sink.h"
 #include "project/project.h"
+#include "surface/mesh_output.h"
 #include "surface/plan.h"
 #include "surface/stopwatch.h"
 #include "volume/surface_volume.h"
@@ -31,26 +31,24 @@ class Pipeline {
   void finish_to(std::int32_t slab);
   void number_to(std::int32_t slab, Stopwatch& watch);
   void triangulate_to(std::int32_t slab);
-  void write_finished();
+  void hand_over();
   void retire();
 
   const SurfaceSettings& settings_;
   const Resolved& resolved_;
-  const Frame& frame_;
   SampleFeed& feed_;
-  MeshSink& sink_;
   SurfaceVolume* volume_;  ///< null: none is asked for
   Kernel kernel_;
   Window window_;
   Projector projector_;
-  Clusterer clusterer_;
+  MeshOutput output_;
   std::int32_t first_, last_;  ///< slabs that can hold surface
 
   // Next slab of each stage.
-  std::int32_t refined_, placed_, projected_, finished_, numbered_, triangulated_, written_;
+  std::int32_t refined_, placed_, projected_, finished_, numbered_, triangulated_;
+  std::int32_t held_;  ///< first slab of iso_
   std::int32_t covered_;
-  std::deque<std::shared_ptr<IsoSlab>> iso_;  ///< slabs written_ .. numbered_ - 1
-  VertexBatch vertices_;
+  std::deque<std::shared_ptr<IsoSlab>> iso_;  ///< slabs held_ .. numbered_ - 1
   ExtractCounts extracted_;
   std::uint64_t isovertices_ = 0, isotriangles_ = 0;
   std::vector<std::uint64_t> leaf_cells_;

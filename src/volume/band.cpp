@@ -134,7 +134,7 @@ void Band::put(const Found& f) {
 void Band::collect_finer(const Window& window, std::int32_t slab, int level) {
   const int shift = settings_.level - level;
   const std::int32_t mask = (1 << shift) - 1;
-  const std::vector<Tile> tiles = window.tiles(level, slab);
+  const auto tiles = window.tiles(level, slab);
   std::vector<std::vector<Found>> found(tiles.size());
   const float per_voxel = 1.0F / static_cast<float>(lattice_.cell_size(settings_.level));
   const auto limit = static_cast<float>(settings_.band) + kBeyond;
@@ -164,7 +164,7 @@ void Band::collect_finer(const Window& window, std::int32_t slab, int level) {
 /// Where cells are coarser, voxels inside them are interpolated between their corners.
 void Band::collect_coarser(const Window& window, std::int32_t slab, int level) {
   const int shift = level - settings_.level, side = 1 << shift;
-  const std::vector<Tile> tiles = window.tiles(level, slab);
+  const auto tiles = window.tiles(level, slab);
   std::vector<std::vector<Found>> found(tiles.size());
   const float per_voxel = 1.0F / static_cast<float>(lattice_.cell_size(settings_.level));
   const auto limit = static_cast<float>(settings_.band) + kBeyond;

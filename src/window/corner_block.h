@@ -1,18 +1,19 @@
 // An 8^3 block of cells and of the corners at their lower ends: what a leaf of the window's trees holds. Masks tell
-// what exists, one structure-of-arrays block per slab holds the values of the corners that have any (DESIGN "Layout of
-// the tree").
+// what exists, one array per slab holds the values of the corners that have any.
 #pragma once
 #include <array>
 #include <bit>
 #include <cstdint>
 #include <memory>
+#include <new>
+#include <utility>
 #include <vector>
 
 namespace lamina {
 
 /// 512 bits, a 64-bit word per layer z; bit x + 8 y inside a word. OpenVDB's own linear order with its i axis as z:
-/// Coord(z, y, x), so that a slab is a run of words.
-struct BlockMask {
+/// Coord(z, y, x), so that a slab is a run of words. A cache line, whole.
+struct alignas(64) BlockMask {
   std::array<std::uint64_t, 8> words{};
 
   static constexpr int offset(int x, int y, int z) { return x + (y << 3) + (z << 6); }
@@ -39,16 +40,49 @@ struct BlockMask {
 /// support radius.
 enum Channel : int { kDistance = 0, kNormalX, kNormalY, kNormalZ, kCurvature, kReach, kFirstAttribute };
 
-/// Values of the `near` corners of one slab's layers inside a leaf, channel after channel, each in mask order.
-struct CornerValues {
-  std::vector<float> data;
-  std::uint32_t count = 0;  ///< corners
-  void allocate(std::uint32_t corners, int channels) {
-    count = corners;
-    data.assign(static_cast<std::size_t>(corners) * static_cast<std::size_t>(channels), 0.0F);
+/// Leaves what it allocates as it is, for values that are written next.
+template <typename T>
+struct RawAllocator : std::allocator<T> {
+  template <typename U>
+  struct rebind {
+    using other = RawAllocator<U>;
+  };
+  template <typename U>
+  void construct(U* at) noexcept {
+    ::new (static_cast<void*>(at)) U;
   }
-  [[nodiscard]] float* channel(int c) { return data.data() + static_cast<std::size_t>(c) * count; }
-  [[nodiscard]] const float* channel(int c) const { return data.data() + static_cast<std::size_t>(c) * count; }
+  template <typename U, typename... Args>
+  void construct(U* at, Args&&... args) {
+    ::new (static_cast<void*>(at)) U(std::forward<Args>(args)...);
+  }
+};
+
+/// Values of the `near` corners of one slab's layers inside a leaf: a record of channels per corner, in mask order.
+/// Stages ask for all of a corner, so that records touch fewer lines of the cache than an array per channel would.
+struct CornerValues {
+  std::vector<float, RawAllocator<float>> data;
+  std::uint32_t count = 0;  ///< corners
+  std::uint32_t channels = 0;
+
+  /// One channel of all corners.
+  template <typename T>
+  struct Strided {
+    T* first;
+    std::uint32_t stride;
+    T& operator[](std::size_t i) const { return first[i * stride]; }
+  };
+
+  /// Room for values yet to be written.
+  void allocate(std::uint32_t corners, int channel_count) {
+    count = corners;
+    channels = static_cast<std::uint32_t>(channel_count);
+    data.clear();
+    data.resize(std::size_t{count} * channels);
+  }
+  [[nodiscard]] float* of(std::uint32_t corner) { return data.data() + std::size_t{corner} * channels; }
+  [[nodiscard]] const float* of(std::uint32_t corner) const { return data.data() + std::size_t{corner} * channels; }
+  [[nodiscard]] Strided<float> channel(int c) { return {data.data() + c, channels}; }
+  [[nodiscard]] Strided<const float> channel(int c) const { return {data.data() + c, channels}; }
 };
 
 /// Numbers of the isovertices and surface corners of one layer, written by extraction. Tables are per slab
@@ -61,7 +95,7 @@ struct LayerNumbers {
 
 /// Points of a block that are projected, and what came of it.
 struct Projected {
-  BlockMask near;  ///< carry values (CornerValues): close enough to samples to be projected
+  BlockMask near;  ///< worth projecting, close enough to samples; once projected: carry values (CornerValues)
   BlockMask seen;  ///< subset of near: samples contributed; an edge with such an end is valid
   BlockMask good;  ///< subset of seen: own value is trusted; other corners are extended from good neighbours
   std::array<CornerValues, 8> values;  ///< by slab inside the leaf, Window::brick_of()
@@ -77,21 +111,33 @@ struct Projected {
 };
 
 struct CornerBlock : Projected {
+  /// The blocks around this one in its level, itself in the middle, null where there is none; kept by the window.
+  std::array<CornerBlock*, 27> around{};
+  static constexpr int towards(int dx, int dy, int dz) { return 13 + dx + 3 * dy + 9 * dz; }
+
+  // Layers in which extraction has something to look at, bit z for layer z: most leaves lie off the surface.
+  std::uint8_t busy_layers = 0;      ///< `busy` is not empty
+  std::uint8_t doubtful_layers = 0;  ///< an edge is in `crossing` and not in `accepted`
+  std::uint8_t surface_layers = 0;   ///< `surface` may hold corners: an accepted edge begins or ends there
+  bool inherits = false;             ///< `above` is not empty
+
   // Cells of the octree. A cell of this level exists when its parent is split (or at the coarsest level when touched).
   BlockMask home;     ///< cells that hold a sample of this level
   BlockMask touched;  ///< cells that a sample of this level reaches: within two cells of its home
-  BlockMask close;    ///< cells within one cell of the home of a sample of this or a coarser level
+  BlockMask close;    ///< where cells are split: within one cell of the home of a sample of this or a coarser level
+  BlockMask above;    ///< cells within one cell of the home of a sample of a coarser level
   BlockMask reached;  ///< cells that a sample of this or a coarser level reaches
   BlockMask split;    ///< subdivided cells
   BlockMask cells;    ///< leaf cells that take part: existing, not split, reached by a sample
 
   // Corners.
-  BlockMask corners;  ///< of the leaf cells in `cells`, of this level
-  BlockMask shared;   ///< subset of corners: held by a finer level too, whose value counts
+  BlockMask nearest;   ///< corners that lie nearest to a sample of this level
+  BlockMask corners;   ///< of the leaf cells in `cells`, of this level
+  BlockMask shared;    ///< subset of corners: held by a finer level too, whose value counts
+  BlockMask positive;  ///< sign (outside): once projected, of the seen corners' own distances; once finished, of all
   // Set when the slab is finished.
-  BlockMask positive;  ///< sign of every corner in `corners` (outside)
-  BlockMask valued;    ///< subset of corners: the sign rests on samples, its own or its neighbours'; others are a guess
-  BlockMask carried;   ///< corners with samples of their own, or with trusted neighbours on all sides
+  BlockMask valued;   ///< subset of corners: the sign rests on samples, its own or its neighbours'; others are a guess
+  BlockMask carried;  ///< corners with samples of their own, or with trusted neighbours on all sides
 
   // Minimal edges with a sign change, by axis, keyed by their lower corner; written by extraction.
   std::array<BlockMask, 3> crossing;

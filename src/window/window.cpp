@@ -32,6 +32,10 @@ using Lower = Upper::ChildNodeType;
 /// Inner nodes that had leaves, by origin: in order of the sweep.
 using Branches = std::set<openvdb::Coord>;
 
+bool before(const Tile& a, const Tile& b) {
+  return std::tie(a.block.y, a.block.x) < std::tie(b.block.y, b.block.x);
+}
+
 /// Removes the inner nodes that end at or below a layer of cells.
 template <typename Node>
 void retire_branches(CornerTree& tree, Branches& branches, std::int32_t end) {
@@ -44,9 +48,10 @@ void retire_branches(CornerTree& tree, Branches& branches, std::int32_t end) {
 }  // namespace
 
 struct Window::Trees {
-  /// The leaves of one layer of blocks: in order of creation, and by place for quick lookup.
+  /// The leaves of one layer of blocks: as a list, put in order when it is asked for, and by place for quick lookup.
   struct Layer {
     std::vector<Tile> tiles;
+    std::size_t ordered = 0;  ///< so many of the tiles are in canonical order
     std::vector<CornerBlock*> table;
   };
   struct Level {
@@ -57,6 +62,7 @@ struct Window::Trees {
     std::int32_t x0 = 0, y0 = 0, nx = 0, ny = 0;  ///< extent of the tables in blocks
   };
   std::vector<Level> levels;
+  std::vector<std::unique_ptr<CornerLeaf>> spare;  ///< retired leaves, used again: leaves come and go all the time
   std::mutex creation;
 
   /// Entry of the lookup table, null where the block lies outside of it.
@@ -74,6 +80,8 @@ struct Window::Trees {
   CornerBlock* find(int l, const Block& b) {
     Level& level = levels[l];
     if (CornerBlock** s = slot(level, b)) return *s;
+    // Every leaf has its layer.
+    if (b.z < level.z_base || b.z - level.z_base >= static_cast<std::int32_t>(level.layers.size())) return nullptr;
     CornerLeaf* leaf = level.tree.probeLeaf(leaf_origin(b));
     return leaf == nullptr ? nullptr : &leaf->block;
   }
@@ -93,10 +101,55 @@ struct Window::Trees {
   CornerBlock& create(int l, const Block& b) {
     Level& level = levels[l];
     cover(level, b.z);
-    CornerBlock& block = level.tree.touchLeaf(leaf_origin(b))->block;
+    CornerLeaf* leaf = new_leaf(leaf_origin(b));
+    level.tree.addLeaf(leaf);
+    CornerBlock& block = leaf->block;
     level.layers[b.z - level.z_base].tiles.push_back({b, &block});
+    introduce(l, b, block);
     if (CornerBlock** s = slot(level, b)) std::atomic_ref(*s).store(&block, std::memory_order_release);
     return block;
+  }
+
+  CornerLeaf* new_leaf(const openvdb::Coord& origin) {
+    if (spare.empty()) return new CornerLeaf(origin);
+    CornerLeaf* leaf = spare.back().release();
+    spare.pop_back();
+    leaf->setOrigin(origin);
+    std::destroy_at(&leaf->block);
+    std::construct_at(&leaf->block);
+    return leaf;
+  }
+
+  void retire(Level& level, const Tile& t) {
+    take_leave(*t.leaf);
+    for (CornerValues& v : t.leaf->values) v = {};
+    t.leaf->centres.reset();
+    spare.emplace_back(level.tree.stealNode<CornerLeaf>(leaf_origin(t.block), false, false));
+  }
+
+  /// Stages look at a leaf's neighbours far more often than leaves come and go.
+  void introduce(int l, const Block& b, CornerBlock& block) {
+    for (int i = 0; i < 27; ++i) {
+      CornerBlock* other = i == 13 ? &block : find(l, {b.x + i % 3 - 1, b.y + i / 3 % 3 - 1, b.z + i / 9 - 1});
+      block.around[i] = other;
+      if (other != nullptr) other->around[26 - i] = &block;
+    }
+  }
+
+  /// Of the neighbours only those above outlive a layer.
+  static void take_leave(const CornerBlock& block) {
+    for (int i = 18; i < 27; ++i) {
+      if (block.around[i] != nullptr) block.around[i]->around[26 - i] = nullptr;
+    }
+  }
+
+  static std::span<const Tile> in_order(Layer& layer) {
+    if (layer.ordered == layer.tiles.size()) return layer.tiles;
+    const auto added = layer.tiles.begin() + static_cast<std::ptrdiff_t>(layer.ordered);
+    std::sort(added, layer.tiles.end(), before);
+    std::inplace_merge(layer.tiles.begin(), added, layer.tiles.end(), before);
+    layer.ordered = layer.tiles.size();
+    return layer.tiles;
   }
 };
 
@@ -148,20 +201,20 @@ CornerBlock& Window::touch_shared(int level, const Block& b) {
   return touch(level, b);
 }
 
-std::vector<Tile> Window::tiles(int level, std::int32_t slab) const {
+Tiles Window::tiles(int level, std::int32_t slab) const {
   const std::int32_t first = lattice_.first_layer(level, slab);
   const std::int32_t last = first + lattice_.layers(level) - 1;
-  const Trees::Level& l = trees_->levels[level];
-  std::vector<Tile> out;
-  for (std::int32_t z = std::max(first >> 3, l.z_base); z <= (last >> 3); ++z) {
-    const std::int32_t i = z - l.z_base;
-    if (i >= static_cast<std::int32_t>(l.layers.size())) break;
-    const auto begin = out.insert(out.end(), l.layers[i].tiles.begin(), l.layers[i].tiles.end());
-    std::sort(begin, out.end(), [](const Tile& a, const Tile& b) {
-      return std::tie(a.block.y, a.block.x) < std::tie(b.block.y, b.block.x);
-    });
+  Trees::Level& l = trees_->levels[level];
+  const std::int32_t z_end = std::min(last >> 3, l.z_base + static_cast<std::int32_t>(l.layers.size()) - 1);
+  const std::int32_t z_begin = std::max(first >> 3, l.z_base);
+  if (z_begin > z_end) return Tiles(std::span<const Tile>{});
+  if (z_begin == z_end) return Tiles(Trees::in_order(l.layers[z_begin - l.z_base]));
+  std::vector<Tile> joined;
+  for (std::int32_t z = z_begin; z <= z_end; ++z) {
+    const std::span<const Tile> layer = Trees::in_order(l.layers[z - l.z_base]);
+    joined.insert(joined.end(), layer.begin(), layer.end());
   }
-  return out;
+  return Tiles(std::move(joined));
 }
 
 void Window::retire_values(std::int32_t slab) {
@@ -181,7 +234,7 @@ void Window::retire_below(std::int32_t slab) {
     while (!level.layers.empty() && level.z_base * 8 + 8 <= first) {
       for (const Tile& t : level.layers.front().tiles) {
         const openvdb::Coord origin = leaf_origin(t.block);
-        delete level.tree.stealNode<CornerLeaf>(origin, false, false);
+        trees_->retire(level, t);
         level.lower.insert(origin & ~(static_cast<std::int32_t>(Lower::DIM) - 1));
         level.upper.insert(origin & ~(static_cast<std::int32_t>(Upper::DIM) - 1));
       }
@@ -204,7 +257,7 @@ std::size_t Window::leaf_count() const {
 }
 
 std::size_t Window::memory() const {
-  std::size_t bytes = 0;
+  std::size_t bytes = trees_->spare.size() * sizeof(CornerLeaf);
   for (const auto& level : trees_->levels) {
     const std::vector<openvdb::Index32> nodes = level.tree.nodeCount();
     bytes += nodes[Lower::LEVEL] * sizeof(Lower) + nodes[Upper::LEVEL] * sizeof(Upper);

@@ -3,6 +3,7 @@
 #include <compare>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "lamina/lattice.h"
@@ -27,6 +28,19 @@ constexpr int offset_in_block(const Cell& c) {
 struct Tile {
   Block block;
   CornerBlock* leaf = nullptr;
+};
+
+/// Tiles of a slab in canonical order (z, y, x): a view of the window's own list where one layer of leaves holds them
+/// all, as it nearly always does. Valid until a leaf of the level is added or removed.
+class Tiles : public std::span<const Tile> {
+ public:
+  explicit Tiles(std::span<const Tile> layer) : std::span<const Tile>(layer) {}
+  explicit Tiles(std::vector<Tile> joined) : std::span<const Tile>(joined), joined_(std::move(joined)) {}
+  Tiles(const Tiles&) = delete;
+  Tiles& operator=(const Tiles&) = delete;
+
+ private:
+  std::vector<Tile> joined_;
 };
 
 /// Cross-section of the cloud in fixed-point steps, inclusive.
@@ -59,8 +73,8 @@ class Window {
   void cover(std::int32_t slab);
   /// touch() from several threads at once (all of them through this function, nobody probing), in covered slabs.
   CornerBlock& touch_shared(int level, const Block& b);
-  /// The level's leaves that hold layers of a slab, in canonical order (z, y, x).
-  [[nodiscard]] std::vector<Tile> tiles(int level, std::int32_t slab) const;
+  /// The level's leaves that hold layers of a slab. One thread at a time.
+  [[nodiscard]] Tiles tiles(int level, std::int32_t slab) const;
   /// Frees the values of a slab's corners; masks stay.
   void retire_values(std::int32_t slab);
   /// Frees every leaf whose last layer lies below the slab.

@@ -84,12 +84,10 @@ void extend(benchmark::State& state, const Kernel& kernel) {
   field->ny.fill(0.6F);
   field->nz.fill(0.8F);
   field->trusted.fill(1);
-  Lanes sum{};
-  Lanes weight{};
+  field->any.fill(1);
   for ([[maybe_unused]] auto iteration : state) {
-    kernel.extend(*field, 3, 4, 1.0F, sum, weight);
-    benchmark::DoNotOptimize(&sum);
-    benchmark::DoNotOptimize(&weight);
+    const Extension out = kernel.extend(*field, 3, 4, 1.0F, 0.09F);
+    benchmark::DoNotOptimize(&out);
     benchmark::ClobberMemory();
   }
   state.SetItemsProcessed(static_cast<std::int64_t>(state.iterations()) * kLanes);
@@ -112,19 +110,20 @@ void find_samples(benchmark::State& state, const Scene& scene, bool gather) {
     for (std::int32_t slab = replay->first(); slab <= replay->last(); ++slab) {
       const std::int64_t height = lattice.slab_height();
       for (const auto& numbers : replay->feed().batches(slab * height, (slab + 1) * height, 0)) {
-        const Batch batch = replay->feed().load(numbers);
-        PackedBatch packed;
-        if (gather) pack(batch, lattice, packed);
+        ClumpedBatch batch;
+        for (const auto& bucket : replay->feed().load(numbers)) {
+          batch.push_back(std::make_shared<const ClumpedBucket>(clump(*bucket, lattice)));
+        }
         for (int level = 0; level < window.levels(); ++level) {
-          const std::vector<Tile> tiles = window.tiles(level, slab);
+          const Tiles tiles = window.tiles(level, slab);
           std::vector<Block> blocks;
           for (const Tile& t : tiles) blocks.push_back(t.block);
           const std::int32_t first = lattice.first_layer(level, slab);
-          const TileBins bins = bin_samples(lattice, level, batch, first, first + lattice.layers(level), blocks, 0, 0);
-          found += bins.index.size();
-          for (std::size_t t = 0; gather && t < tiles.size(); ++t) {
-            rows.gather(lattice, level, tiles[t].block, packed, bins.index.data() + bins.begin[t],
-                        bins.begin[t + 1] - bins.begin[t], ProjectSettings{}.band);
+          const Reach reach{level, first, first + lattice.layers(level), 0, 0};
+          const TileRuns bins = bin_clumps(lattice, reach, batch, blocks);
+          for (std::size_t t = 0; t < tiles.size(); ++t) {
+            if (gather) rows.gather(lattice, reach, tiles[t].block, bins.of(t), ProjectSettings{}.band);
+            found += gather ? rows.samples().x.size() : bins.of(t).size();
           }
         }
       }

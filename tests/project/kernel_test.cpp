@@ -122,12 +122,33 @@ TEST(Kernel, SamplesOutOfReachChangeNothing) {
   }
 }
 
+TEST(Kernel, WithoutNarrowBandsWhatContributesIsNear) {
+  std::mt19937_64 random(4);
+  for (const Kernel& kernel : available_kernels()) {
+    TileSamples s = random_samples(random, 60, 3);
+    const Queries q{random_lanes(random, -1, 9), random_lanes(random, -1, 9), random_lanes(random, -1, 9)};
+    const std::vector<Lanes> banded = sums_of(kernel, s, {{0, 60}}, q);
+    s.banded = false;
+    const std::vector<Lanes> free = sums_of(kernel, s, {{0, 60}}, q);
+    int seen = 0;
+    for (int l = 0; l < kLanes; ++l) {
+      EXPECT_EQ(free[kNearest][l], banded[kSeen][l] > 0 ? 0.0F : 1e30F);
+      seen += banded[kSeen][l] > 0 ? 1 : 0;
+    }
+    EXPECT_GT(seen, 0);
+    for (std::size_t i = 0; i < free.size(); ++i) {
+      EXPECT_TRUE(i == kNearest || same_bits(free[i], banded[i])) << "sum " << i;
+    }
+  }
+}
+
 TEST(Kernel, AllKindsGiveTheSameBits) {
   const std::vector<Kernel> kernels = available_kernels();
   std::mt19937_64 random(3);
   for (int round = 0; round < 200; ++round) {
     const auto n = static_cast<std::size_t>(random() % 60);
-    const TileSamples s = random_samples(random, n, random() % 5);
+    TileSamples s = random_samples(random, n, random() % 5);
+    s.banded = random() % 2 == 0;
     const Queries q{random_lanes(random, -1, 9), random_lanes(random, -1, 9), random_lanes(random, -1, 9)};
     const auto middle = static_cast<std::uint32_t>(n == 0 ? 0 : random() % n);
     const std::vector<SampleRange> ranges{{0, middle}, {middle, static_cast<std::uint32_t>(n)}};

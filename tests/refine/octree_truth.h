@@ -1,6 +1,7 @@
 // The octree that samples ask for, by definition: cell by cell over all samples, in plain integers.
 #pragma once
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <map>
 #include <set>
@@ -22,7 +23,12 @@ class OctreeTruth {
     levels.resize(static_cast<std::size_t>(lattice.levels));
     for (const Mark& m : marks) {
       const std::int32_t a = lattice.cell_size(m.level);
-      samples_.push_back({m.level, {floor_div(m.x, a), floor_div(m.y, a), floor_div(m.z, a)}});
+      const auto nearest = [a](std::int32_t v) {
+        return static_cast<std::int32_t>(std::floor(static_cast<double>(v) / a + 0.5));
+      };
+      samples_.push_back({m.level,
+                          {floor_div(m.x, a), floor_div(m.y, a), floor_div(m.z, a)},
+                          {nearest(m.x), nearest(m.y), nearest(m.z)}});
     }
     const int top = lattice.levels - 1;
     for (const Sample& s : samples_) {
@@ -39,7 +45,8 @@ class OctreeTruth {
  private:
   struct Sample {
     int level;
-    Cell home;  ///< the cell of its level it lies in
+    Cell home;     ///< the cell of its level it lies in
+    Cell nearest;  ///< the corner of its level it lies nearest to
   };
   template <typename F>
   static void for_around(const Cell& c, int lo, int hi, const F& f) {
@@ -81,10 +88,13 @@ class OctreeTruth {
         if (levels[static_cast<std::size_t>(level) - 1].near.contains(fine)) here.near.insert(corner);
         continue;
       }
-      bool near = false;
+      bool near = std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {
+        return s.level == level && std::abs(s.nearest.x - corner.x) <= 1 && std::abs(s.nearest.y - corner.y) <= 1 &&
+               std::abs(s.nearest.z - corner.z) <= 1;
+      });
       for_around(corner, -1, 0, [&](const Cell& c) {
         near = near || (here.nodes.contains(c) && std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {
-                          return s.level >= level && reaches(s, level, c, 1);
+                          return s.level > level && reaches(s, level, c, 1);
                         }));
       });
       if (near) here.near.insert(corner);

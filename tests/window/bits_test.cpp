@@ -77,6 +77,35 @@ TEST(Bits, DilationOfANeighbourhood) {
   }
 }
 
+template <int kLo, int kHi>
+void expect_layers_like_each_layer(const Neighbourhood& n, int begin, int end) {
+  std::array<std::uint64_t, 10> out;
+  out.fill(77);
+  dilate_layers<kLo, kHi>(n, begin, end, out.data() + 1);
+  for (int z = begin; z < end; ++z) ASSERT_EQ(out[1 + z - begin], dilate_layer(n, z, kLo, kHi)) << kLo << ".." << kHi;
+  EXPECT_EQ(out[0], 77U);
+  EXPECT_EQ(out[1 + end - begin], 77U);
+}
+
+TEST(Bits, DilationOfAllLayersAtOnce) {
+  std::mt19937_64 random(4);
+  for (int round = 0; round < 300; ++round) {
+    std::array<BlockMask, 27> masks;
+    Neighbourhood n{};
+    for (int i = 0; i < 27; ++i) {
+      for (std::uint64_t& w : masks[i].words) w = random_word(random, 2 + random() % 8);
+      if (random() % 4 == 0) masks[i] = {};
+      if (random() % 4 != 0) n[i / 9][i / 3 % 3][i % 3] = &masks[i];
+    }
+    const int end = 1 + static_cast<int>(random() % 8);
+    const int begin = static_cast<int>(random() % static_cast<unsigned>(end));
+    expect_layers_like_each_layer<-3, 3>(n, begin, end);
+    expect_layers_like_each_layer<-1, 1>(n, begin, end);
+    expect_layers_like_each_layer<0, 1>(n, begin, end);
+    expect_layers_like_each_layer<-2, 3>(n, begin, end);
+  }
+}
+
 TEST(Bits, QuartersUpAndDown) {
   std::mt19937_64 random(3);
   for (int round = 0; round < 50; ++round) {

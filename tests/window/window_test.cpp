@@ -41,6 +41,14 @@ void expect_model(const Window& window, const Model& model, std::int32_t first, 
       const auto& [z, y, x] = key;
       RC_ASSERT(window.probe(level, {x, y, z}) == block);
       RC_ASSERT(block->cells.test(3));  // its content is its own
+      for (int dz = -1; dz <= 1; ++dz) {
+        for (int dy = -1; dy <= 1; ++dy) {
+          for (int dx = -1; dx <= 1; ++dx) {
+            const auto at = leaves.find({z + dz, y + dy, x + dx});
+            RC_ASSERT(block->around[CornerBlock::towards(dx, dy, dz)] == (at == leaves.end() ? nullptr : at->second));
+          }
+        }
+      }
     }
     for (std::int32_t s = first; s < end; ++s) {
       std::vector<Key> expected;

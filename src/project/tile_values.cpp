@@ -1,0 +1,146 @@
+#include "project/tile_values.h"
+
+#include <algorithm>
+#include <bit>
+#include <utility>
+
+namespace lamina {
+namespace {
+
+/// Whether the normals a point sees contradict each other.
+bool is_torn(const Lanes* sums, int lane) {
+  const float x = sums[kNx][lane];
+  const float y = sums[kNy][lane];
+  const float z = sums[kNz][lane];
+  return x * x + y * y + z * z < 0.25F * sums[kW][lane] * sums[kW][lane];
+}
+
+/// Whether a sample close enough contributed to a point.
+bool is_seen(const Lanes* sums, int lane) {
+  return sums[kW][lane] > 0 && sums[kNearest][lane] <= 1;
+}
+
+bool any_seen(const Lanes* sums) {
+  bool any = false;
+  for (int l = 0; l < kLanes; ++l) any = any || is_seen(sums, l);
+  return any;
+}
+
+/// A corner as the next finer level has it.
+struct Finer {
+  const CornerBlock* block;
+  int offset;
+};
+
+Finer finer_corner(const Window& window, int level, const Tile& tile, int z, int bit) {
+  const Cell fine{(tile.block.x * 8 + (bit & 7)) * 2, (tile.block.y * 8 + (bit >> 3)) * 2, (tile.block.z * 8 + z) * 2};
+  return {window.probe(level - 1, block_of(fine)), offset_in_block(fine)};
+}
+
+/// Bits of a layer's shared corners, from the finer level.
+void take_shared(const Window& window, int level, const Work& work, int z) {
+  CornerBlock& leaf = *work.tile.leaf;
+  for (std::uint64_t w = leaf.shared.words[z] & leaf.near.words[z]; w != 0; w &= w - 1) {
+    const Finer from = finer_corner(window, level, work.tile, z, std::countr_zero(w));
+    const std::uint64_t one = w & (~w + 1);
+    if (!from.block->seen.test(from.offset)) continue;
+    leaf.seen.words[z] |= one;
+    if (from.block->good.test(from.offset)) leaf.good.words[z] |= one;
+    if (from.block->positive.test(from.offset)) leaf.positive.words[z] |= one;
+  }
+}
+
+/// Copies a shared corner's values from the finer level to place `at`.
+void copy_values(const Window& window, int level, const Finer& from, CornerValues& to, std::uint32_t at) {
+  const CornerValues& source = from.block->values[window.brick_of(level - 1, from.offset >> 6)];
+  const std::uint32_t i = from.block->value_index(from.offset, window.brick_layers(level - 1));
+  std::copy_n(source.of(i), window.channels(), to.of(at));
+}
+
+}  // namespace
+
+Tally fit_tile(const Kernel& kernel, const ProjectSettings& settings, std::size_t channels, const TileState& state,
+               const std::vector<Query>& queries, TileFit& out) {
+  const std::size_t groups = state.points.size();
+  out.fits.resize(std::max(groups, out.fits.size()));
+  out.seen.assign(groups * kLanes, 0);
+  out.good.assign(groups * kLanes, 0);
+  Tally tally;
+  for (std::size_t g = 0; g < groups; ++g) {
+    const Lanes* sums = &state.sums[g * channels];
+    if (!any_seen(sums)) continue;
+    FitOutput& fit = out.fits[g];
+    kernel.fit(sums, fit_input(state, queries, g, settings.fit, shift_of(settings)), fit);
+    const int lanes = static_cast<int>(std::min<std::size_t>(kLanes, queries.size() - g * kLanes));
+    for (int l = 0; l < lanes; ++l) {
+      const bool has_normal = fit.nx[l] != 0 || fit.ny[l] != 0 || fit.nz[l] != 0;
+      const bool seen = is_seen(sums, l) && has_normal;
+      const bool good =
+          seen && fit.reach[l] <= settings.good_reach && sums[kSeen][l] >= static_cast<float>(settings.good_samples);
+      out.seen[g * kLanes + static_cast<std::size_t>(l)] = seen ? 1 : 0;
+      out.good[g * kLanes + static_cast<std::size_t>(l)] = good ? 1 : 0;
+      tally.seen += seen ? 1 : 0;
+      tally.good += good ? 1 : 0;
+      tally.torn += seen && is_torn(sums, l) ? 1 : 0;
+    }
+  }
+  return tally;
+}
+
+void store_values(Window& window, int level, const Work& work, const std::vector<Query>& queries,
+                  const TileState& state, const TileFit& fit) {
+  Projected& points = *work.points;
+  CornerBlock& leaf = *work.tile.leaf;
+  const bool corners = work.points == work.tile.leaf;
+  const std::size_t channels = kSums + static_cast<std::size_t>(window.attributes());
+  for (int z = work.begin; z < work.end; ++z) {
+    points.seen.words[z] = points.good.words[z] = 0;
+    if (corners) leaf.positive.words[z] = 0;
+  }
+  for (std::size_t i = 0; i < queries.size(); ++i) {
+    if (fit.seen[i] == 0) continue;
+    const Query& q = queries[i];
+    const std::uint64_t one = std::uint64_t{1} << (q.x + 8 * q.y);
+    points.seen.words[q.z] |= one;
+    if (fit.good[i] != 0) points.good.words[q.z] |= one;
+    if (corners && fit.fits[i / kLanes].distance[static_cast<int>(i % kLanes)] >= 0) leaf.positive.words[q.z] |= one;
+  }
+  std::uint32_t count = 0;
+  for (int z = work.begin; z < work.end; ++z) {
+    if (corners && level > 0) take_shared(window, level, work, z);
+    points.near.words[z] = points.seen.words[z];
+    count += static_cast<std::uint32_t>(std::popcount(points.seen.words[z]));
+  }
+  CornerValues& values = points.values[window.brick_of(level, work.begin)];
+  values.allocate(count, window.channels());
+  const auto cell = static_cast<float>(window.lattice().cell_size(level));
+  std::uint32_t at = 0;
+  std::size_t next = 0;  // query
+  for (int z = work.begin; z < work.end; ++z) {
+    const std::uint64_t shared = corners ? leaf.shared.words[z] : 0;
+    for (std::uint64_t w = points.seen.words[z]; w != 0; w &= w - 1, ++at) {
+      const int bit = std::countr_zero(w);
+      if (((shared >> bit) & 1U) != 0) {
+        copy_values(window, level, finer_corner(window, level, work.tile, z, bit), values, at);
+        continue;
+      }
+      while (fit.seen[next] == 0) ++next;
+      const std::size_t g = next / kLanes;
+      const int l = static_cast<int>(next % kLanes);
+      ++next;
+      const FitOutput& out = fit.fits[g];
+      const Lanes* sums = &state.sums[g * channels];
+      float* const v = values.of(at);
+      v[kDistance] = out.distance[l] * cell;
+      v[kNormalX] = out.nx[l];
+      v[kNormalY] = out.ny[l];
+      v[kNormalZ] = out.nz[l];
+      v[kCurvature] = out.curvature[l] / cell;
+      v[kReach] = out.reach[l];
+      const float inv = 1.0F / sums[kW][l];
+      for (int c = 0; c < window.attributes(); ++c) v[kFirstAttribute + c] = sums[kSums + c][l] * inv;
+    }
+  }
+}
+
+}  // namespace lamina
