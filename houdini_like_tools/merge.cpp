@@ -1,4 +1,4 @@
-// lamina merge: several clouds or meshes in one file.
+// lamina merge: several clouds, meshes or volumes in one file.
 #include "lamina/merge.h"
 
 #include <fmt/format.h>
@@ -11,6 +11,7 @@
 #include "console.h"
 #include "inputs.h"
 #include "lamina/error.h"
+#include "lamina/volume_merge.h"
 #include "text.h"
 #include "tool.h"
 
@@ -57,6 +58,18 @@ void merge_triangles(const MergeOptions& o, const std::vector<PointInput>& input
                            count_text(merged.triangles.size()), inputs.size()));
 }
 
+void merge_grids(const MergeOptions& o, const std::vector<PointInput>& inputs, const RunContext& context) {
+  std::vector<std::string> names;
+  for (const PointInput& input : inputs) {
+    if (input.posed) throw Error(ExitCode::usage, input.path + ": is a volume; only points are moved by a pose");
+    names.push_back(input.path);
+  }
+  const VolumeMergeStats stats = merge_volumes(names, o.output, context);
+  const std::string points = stats.points > 0 ? ", " + count_text(stats.points) + " points" : std::string();
+  context.info(
+      fmt::format("{} grids, {} voxels{}, {}", stats.grids, count_text(stats.voxels), points, bytes_text(stats.bytes)));
+}
+
 void run_merge(const MergeOptions& o) {
   const RunContext context = make_context(o.run);
   const auto word = [](FileContent content) {
@@ -74,14 +87,14 @@ void run_merge(const MergeOptions& o) {
   }
   if (std::count_if(inputs.begin(), inputs.end(), [](const PointInput& i) { return i.path == "-"; }) > 1)
     throw Error(ExitCode::usage, "two inputs name standard input; give one of them a file");
-  if (first == FileContent::volume) throw Error(ExitCode::usage, inputs.front().path + ": volumes cannot be merged");
+  if (first == FileContent::volume) return merge_grids(o, inputs, context);
   first == FileContent::points ? merge_points(o, inputs, context) : merge_triangles(o, inputs, context);
 }
 
 }  // namespace
 
 void add_merge(CLI::App& app) {
-  auto* tool = app.add_subcommand("merge", "Put several clouds, or several meshes, into one file");
+  auto* tool = app.add_subcommand("merge", "Put several clouds, meshes or volumes into one file");
   auto o = std::make_shared<MergeOptions>();
   tool->add_option_function<std::vector<std::string>>(
           "INPUT",

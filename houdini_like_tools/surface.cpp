@@ -13,6 +13,7 @@
 #include "inputs.h"
 #include "lamina/error.h"
 #include "result_file.h"
+#include "text.h"
 #include "tool.h"
 
 namespace lamina::tools {
@@ -65,6 +66,13 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
                      {"crossing_cells", s.crossing_cells},
                      {"general_cells", s.general_cells},
                      {"rejected_loops", s.rejected_loops}};
+  if (settings.volume.wanted()) {
+    j["volume"] = {{"files", s.volume.files},
+                   {"voxelsize", s.volume.voxel},
+                   {"voxels", s.volume.voxels},
+                   {"points", s.volume.points},
+                   {"bytes", s.volume.bytes}};
+  }
   j["clusters"] = {{"seen", s.clusters.corners},
                    {"collapsed", s.clusters.collapsed},
                    {"patches", s.clusters.patches},
@@ -107,6 +115,11 @@ void run_surface(const SurfaceOptions& o) {
                              stats.vertices, stats.triangles, stats.wall,
                              static_cast<double>(stats.samples_read) / stats.cpu * 1e-6,
                              static_cast<double>(stats.peak_memory) * 1e-6));
+    const VolumeExportStats& v = stats.volume;
+    if (v.files.size() == 1) context.info(fmt::format("{}: {}", v.files[0], bytes_text(v.bytes)));
+    if (v.files.size() > 1)
+      context.info(
+          fmt::format("{} ... {}: {} files, {}", v.files.front(), v.files.back(), v.files.size(), bytes_text(v.bytes)));
   }
   if (stats_file) stats_file->write(to_json(stats, settings).dump(2) + "\n");
 }
@@ -114,6 +127,38 @@ void run_surface(const SurfaceOptions& o) {
 template <typename T>
 CLI::CheckedTransformer words(const std::map<std::string, T>& map) {
   return CLI::CheckedTransformer(map, CLI::ignore_case);
+}
+
+void add_volume_options(CLI::App& tool, VolumeExport& v) {
+  const std::string volume = "Volume";
+  tool.add_option("--vdb", v.path, "write the signed distance as an OpenVDB level set, grid surface, too")
+      ->type_name("OUT.vdb")
+      ->group(volume);
+  tool.add_option("--vdb-grids", v.grids,
+                  "further grids: N, Cd, weight, curvature, any attribute; auto: Cd with colours")
+      ->delimiter(',')
+      ->expected(1, -1)
+      ->option_text("NAME,... [auto]")
+      ->group(volume);
+  tool.add_option("--vdb-precision", v.half, "numbers of 16 or 32 bits")
+      ->transform(words<bool>({{"half", true}, {"float", false}}))
+      ->option_text("half|float [half]")
+      ->group(volume);
+  tool.add_option("--vdb-band", v.band, "half width of the band, voxels")->capture_default_str()->group(volume);
+  tool.add_option("--vdb-voxelsize", v.voxel,
+                  "edge of a voxel: the octree's nearest cell size is taken; 0: most cells'")
+      ->capture_default_str()
+      ->group(volume);
+  tool.add_flag("--vdb-levels", v.levels, "one grid per level of the octree, surface_L0 the finest, for inspection")
+      ->group(volume);
+  tool.add_option_function<std::string>(
+          "--vdb-split", [&v](const std::string& text) { v.split = parse_bytes(text); },
+          "begin a new file, OUT.0001.vdb ..., after so many bytes of voxels in memory")
+      ->type_name("SIZE")
+      ->group(volume);
+  tool.add_option("--vdb-points", v.points, "write the projected corners as an OpenVDB points grid (P, N, Cd, pscale)")
+      ->type_name("OUT.vdb")
+      ->group(volume);
 }
 
 }  // namespace
@@ -138,7 +183,7 @@ void add_surface(CLI::App& app) {
       ->group(samples);
   tool->add_option("--frame", s.frame, "pca: sweep along the dominant axis; axis: along the longest input axis")
       ->transform(words<FrameMode>({{"pca", FrameMode::pca}, {"axis", FrameMode::axis}}))
-      ->option_text("pca|axis [pca]")
+      ->option_text("pca|axis [pca; axis with --vdb]")
       ->group(samples);
   tool->add_option("--bad-samples", s.bad_samples, "non-finite, no normal, radius <= 0: leave out, or refuse the file")
       ->transform(words<BadSamples>({{"drop", BadSamples::drop}, {"refuse", BadSamples::refuse}}))
@@ -185,6 +230,8 @@ void add_surface(CLI::App& app) {
   tool->add_option("--chord", s.chord, "outward shift of clustered vertices, times curvature and cell squared")
       ->capture_default_str()
       ->group(mesh);
+
+  add_volume_options(*tool, s.volume);
 
   tool->add_option("--window", s.window, "slabs each stage advances at once")->capture_default_str()->group("Run");
   auto* dry =

@@ -9,6 +9,7 @@
 #include "lamina/cluster.h"
 #include "lamina/length.h"
 #include "lamina/run.h"
+#include "lamina/volume_export.h"
 
 namespace lamina {
 
@@ -26,7 +27,7 @@ struct SurfaceSettings {
   std::string columns;                   ///< of text files (PointSettings::columns)
   std::string output;                    ///< mesh file (PLY); "-" is standard output
 
-  FrameMode frame = FrameMode::pca;
+  std::optional<FrameMode> frame;  ///< unset: pca, or axis where grids are asked for (they have the input's axes then)
   BadSamples bad_samples = BadSamples::drop;  ///< non-finite, without a normal, with a radius <= 0
   double radius_scale = 1;                    ///< > 0: multiplies every sample's radius, given or estimated
   std::uint32_t density = 16;  ///< samples a counting cell must hold to give a radius (paper, section 3.1), >= 2
@@ -44,6 +45,7 @@ struct SurfaceSettings {
   double chord = 0.17;   ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
   int window = 1;        ///< slabs that each stage advances at once, >= 1: more is faster on many cores, takes memory
   bool dry_run = false;  ///< plan only: reads the input, writes nothing
+  VolumeExport volume;   ///< grids to write beside the mesh
 };
 
 /// What the settings came to for this cloud. Lengths in the input's units.
@@ -89,6 +91,7 @@ struct SurfaceStats {
   std::uint64_t isovertices = 0, isotriangles = 0, rejected_loops = 0, general_cells = 0, crossing_cells = 0;
   std::vector<std::uint64_t> leaf_cells;  ///< by level, finest first
   ClusterCounts clusters;
+  VolumeExportStats volume;  ///< where grids were asked for
   std::vector<StageTime> stages;
   double wall = 0, cpu = 0;
   std::uint64_t peak_memory = 0;  ///< bytes, of the process

@@ -35,6 +35,11 @@ void OutputFile::write(std::string_view bytes) {
   if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) fail("cannot be written to its end");
 }
 
+void OutputFile::commit(const std::string& name) {
+  path_ = name;
+  commit();
+}
+
 void OutputFile::commit() {
   if (file_ == stdout) {
     if (std::fflush(stdout) != 0) fail("cannot be written to its end");

@@ -17,6 +17,8 @@ class OutputFile {
   OutputFile& operator=(const OutputFile&) = delete;
   void write(std::string_view bytes);
   void commit();
+  /// The same under another name of the same folder.
+  void commit(const std::string& name);
 
  private:
   [[noreturn]] void fail(const char* what) const;

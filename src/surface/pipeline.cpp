@@ -29,10 +29,11 @@ ProjectSettings project_settings(const SurfaceSettings& s) {
 }  // namespace
 
 Pipeline::Pipeline(const SurfaceSettings& settings, const Resolved& resolved, const Frame& frame, const Extent& extent,
-                   SampleFeed& feed, std::size_t attributes, MeshSink& sink)
+                   SampleFeed& feed, std::size_t attributes, MeshSink& sink, SurfaceVolume* volume)
     : settings_(settings),
       resolved_(resolved),
       feed_(feed),
+      volume_(volume),
       kernel_(select_kernel()),
       window_(resolved.lattice, static_cast<int>(attributes), extent),
       projector_(project_settings(settings), kernel_),
@@ -90,12 +91,13 @@ void Pipeline::finish_to(std::int32_t slab) {
   }
 }
 
-void Pipeline::number_to(std::int32_t slab) {
+void Pipeline::number_to(std::int32_t slab, Stopwatch& watch) {
   for (; numbered_ <= std::min(slab, last_); ++numbered_) {
     IsoSlab* below = iso_.empty() ? nullptr : iso_.back().get();
     std::shared_ptr<IsoSlab> here = output_.spare();
     number_edges(window_, numbered_, below, *here);
     isovertices_ += here->vertices.size();
+    if (volume_ != nullptr) watch.time("volume", [&] { volume_->add(window_, *here, numbered_); });
     iso_.push_back(std::move(here));
     // Corners of the next slab are extended from this one's values, but no farther back.
     if (numbered_ > first_) window_.retire_values(numbered_ - 1);
@@ -143,7 +145,7 @@ void Pipeline::run(const RunContext& run, Stopwatch& watch) {
     watch.time("refine", [&] { refine_to(top + 3); });
     watch.time("project", [&] { project_to(top + 3); });
     watch.time("finish", [&] { finish_to(top + 2); });
-    watch.time("number", [&] { number_to(top + 1); });
+    watch.time("number", [&] { number_to(top + 1, watch); });
     watch.time("triangulate", [&] { triangulate_to(top); });
     watch.time("cluster and write", [&] { output_.start(); });
     note_disk();

@@ -11,6 +11,7 @@
 #include "surface/mesh_output.h"
 #include "surface/plan.h"
 #include "surface/stopwatch.h"
+#include "volume/surface_volume.h"
 #include "window/window.h"
 
 namespace lamina {
@@ -19,7 +20,7 @@ namespace lamina {
 class Pipeline {
  public:
   Pipeline(const SurfaceSettings& settings, const Resolved& resolved, const Frame& frame, const Extent& extent,
-           SampleFeed& feed, std::size_t attributes, MeshSink& sink);
+           SampleFeed& feed, std::size_t attributes, MeshSink& sink, SurfaceVolume* volume = nullptr);
   void run(const RunContext& run, Stopwatch& watch);
   void report(SurfaceStats& stats) const;
 
@@ -28,7 +29,7 @@ class Pipeline {
   void refine_to(std::int32_t slab);
   void project_to(std::int32_t slab);
   void finish_to(std::int32_t slab);
-  void number_to(std::int32_t slab);
+  void number_to(std::int32_t slab, Stopwatch& watch);
   void triangulate_to(std::int32_t slab);
   void hand_over();
   void retire();
@@ -37,6 +38,7 @@ class Pipeline {
   const SurfaceSettings& settings_;
   const Resolved& resolved_;
   SampleFeed& feed_;
+  SurfaceVolume* volume_;  ///< null: none is asked for
   Kernel kernel_;
   Window window_;
   Projector projector_;

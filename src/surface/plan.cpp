@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "lamina/error.h"
+#include "volume/surface_volume.h"
 
 namespace lamina {
 namespace {
@@ -117,6 +118,7 @@ void check_settings(const SurfaceSettings& s) {
   require(s.boundary >= 0, "--boundary", "0 (no limit) or positive, in influence radii");
   require(s.chord >= 0 && s.chord <= 1, "--chord", "in 0..1");
   require(s.window >= 1 && s.window <= 1024, "--window", "in 1..1024");
+  check_volume_export(s.volume);
   require(!s.input.empty(), "the input", "a point file");
   require(s.dry_run || !s.output.empty(), "--output", "given");
 }
@@ -176,6 +178,11 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
 
   out.lattice.cell = static_cast<std::int32_t>(std::lrint(levels.finest));
   out.lattice.levels = levels.count;
+  if (!out.feed.fixed_cell) {
+    const double ratio = s.cell.value * (out.feed.cell_follows_support ? s.blend : 1.0);
+    const double above_finest = std::log2(kMainCell * ratio * survey.median / out.lattice.cell);
+    out.main_level = static_cast<int>(std::clamp(std::lround(above_finest), 0L, static_cast<long>(levels.count) - 1));
+  }
   out.radii.min_samples = s.density;
   set_counting_cells(s, survey, out);
 

@@ -15,6 +15,7 @@ struct Resolved {
   FeedSettings feed;
   RadiiSettings radii;
   SurfacePlan plan;
+  int main_level = 0;  ///< of most cells
 };
 
 /// Throws Error(usage) for settings out of range. Called before the input is opened.

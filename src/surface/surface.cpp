@@ -22,6 +22,7 @@
 #include "surface/plan.h"
 #include "surface/stopwatch.h"
 #include "surface/survey.h"
+#include "volume/surface_volume.h"
 
 namespace lamina {
 namespace {
@@ -67,16 +68,29 @@ std::vector<std::string> input_names(const SurfaceSettings& settings) {
   return names;
 }
 
+/// Volume tools like a lattice aligned with the input's axes.
+FrameMode frame_mode(const SurfaceSettings& settings) {
+  return settings.frame.value_or(settings.volume.wanted() ? FrameMode::axis : FrameMode::pca);
+}
+
 /// A mesh in the place of its points would cost the user the scan.
 void require_two_files(const SurfaceSettings& settings) {
   std::error_code ignored;
+  const std::vector<PointInput> inputs = expand_inputs(input_names(settings));
+  const auto is_input = [&](const std::string& name) {
+    return std::filesystem::is_regular_file(name, ignored) &&
+           std::any_of(inputs.begin(), inputs.end(),
+                       [&](const PointInput& input) { return std::filesystem::equivalent(input.path, name, ignored); });
+  };
+  for (const std::string& grids : {settings.volume.path, settings.volume.points}) {
+    if (grids.empty()) continue;
+    if (grids == settings.output || is_input(grids))
+      throw Error(ExitCode::usage, fmt::format("{}: is named twice; give the grids a file of their own", grids));
+  }
   if (settings.output == "-" || settings.output.empty()) return;
-  if (!std::filesystem::is_regular_file(settings.output, ignored)) return;
-  for (const PointInput& input : expand_inputs(input_names(settings))) {
-    if (std::filesystem::equivalent(input.path, settings.output, ignored)) {
-      throw Error(ExitCode::usage,
-                  fmt::format("{}: is input and output; give the mesh another name with --output", settings.output));
-    }
+  if (is_input(settings.output)) {
+    throw Error(ExitCode::usage,
+                fmt::format("{}: is input and output; give the mesh another name with --output", settings.output));
   }
 }
 
@@ -195,7 +209,7 @@ Ingested read_input(PointSource& source, const SurfaceSettings& settings, const 
   require_samples(source.info());
   std::optional<Ingested> ingested;
   const auto fill = [&](const Survey& survey) {
-    frame = choose_frame(survey, settings.frame);
+    frame = choose_frame(survey, frame_mode(settings));
     watch.time("store", [&] { ingested.emplace(ingest(source, survey, frame, settings.radius_scale, tmp, run)); });
   };
   std::optional<Survey> survey;
@@ -288,7 +302,11 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
     out.double_positions = needs_double(census, resolved.plan.finest_cell);
     MeshSink sink(out);
     SampleFeed feed(ingested->store, resolved.lattice, resolved.feed, resolved.radii, info.has_radius);
-    Pipeline pipeline(settings, resolved, frame, ingested->extent, feed, info.attributes.size(), sink);
+    std::optional<SurfaceVolume> volume;
+    if (settings.volume.wanted())
+      volume.emplace(settings.volume, frame, resolved.lattice, resolved.main_level, info.attributes, tmp);
+    Pipeline pipeline(settings, resolved, frame, ingested->extent, feed, info.attributes.size(), sink,
+                      volume ? &*volume : nullptr);
     pipeline.run(run, watch);
     pipeline.report(stats);
     warn_of_contradictions(stats, input_name(settings), run);
@@ -302,6 +320,11 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
                   fmt::format("{}: no surface came out of {} samples; they lie too far apart for their radii, or on no "
                               "surface at all (try --blend or --particlescale above 1)",
                               input_name(settings), resolved.plan.samples));
+    }
+    if (volume) {
+      watch.time("volume", [&] { volume->finish(/*open=*/stats.rejected_loops > 0); });
+      volume->commit();
+      stats.volume = volume->stats();
     }
     watch.time("commit", [&] { sink.commit(); });
     stats.vertices = sink.vertices();

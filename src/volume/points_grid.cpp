@@ -11,6 +11,7 @@
 
 #include "attributes/ply_type.h"
 #include "lamina/error.h"
+#include "volume/full_range.h"
 
 namespace lamina::volume {
 namespace {
@@ -21,18 +22,6 @@ using points::AttributeWriteHandle;
 using points::PointDataGrid;
 using points::PointDataTree;
 using points::TypedAttributeArray;
-
-/// Full range of a colour's type: what is 1 in `Cd`.
-float full_range(ScalarType type) {
-  switch (type) {
-    case ScalarType::uint8:
-      return 255;
-    case ScalarType::uint16:
-      return 65535;
-    default:
-      return 1;
-  }
-}
 
 bool is_real(ScalarType type) {
   return type == ScalarType::float32 || type == ScalarType::float64;
@@ -135,6 +124,20 @@ std::vector<PointColumn> point_columns(const PointArrays& points) {
       throw Error(ExitCode::usage, fmt::format("two attributes are called {}; rename one", c.name));
   }
   return columns;
+}
+
+double point_voxel(const SampleBatch& s, double wanted) {
+  // OpenVDB takes smaller voxels for a singular transform.
+  constexpr double kSmallest = 0x1p-16;
+  if (wanted > 0) return std::max(kSmallest, std::exp2(std::floor(std::log2(wanted))));
+  double diagonal = 0;
+  for (const auto* axis : {&s.x, &s.y, &s.z}) {
+    const auto [low, high] = std::minmax_element(axis->begin(), axis->end());
+    diagonal = std::hypot(diagonal, *high - *low);
+  }
+  if (!(diagonal > 0)) return 1;
+  const double edge = diagonal * std::sqrt(8 / static_cast<double>(s.size()));
+  return std::max(kSmallest, std::exp2(std::round(std::log2(edge) - 0.5)));
 }
 
 math::Transform::Ptr point_transform(const PointArrays& points, double voxel) {

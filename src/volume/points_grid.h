@@ -26,6 +26,10 @@ struct PointColumn {
 /// What the arrays become; P is not among them. Throws Error(usage) for a name given twice.
 std::vector<PointColumn> point_columns(const PointArrays& points);
 
+/// The voxel's edge: a power of two, so that floats stay what they are; with `wanted` 0 some eight points a voxel were
+/// they spread over a surface.
+double point_voxel(const SampleBatch& samples, double wanted);
+
 /// A transform of a power-of-two voxel, offset by whole voxels where the numbers of voxels would not fit.
 openvdb::math::Transform::Ptr point_transform(const PointArrays& points, double voxel);
 

@@ -7,6 +7,7 @@
 
 #include "attributes/ply_type.h"
 #include "lamina/error.h"
+#include "volume/full_range.h"
 #include "volume/points_grid.h"
 #include "volume/vdb_file.h"
 
@@ -108,10 +109,6 @@ std::optional<ScalarType> type_from(const PointDataGrid& grid, const std::string
   return text == nullptr ? std::nullopt : ply_type(text->value());
 }
 
-float full_range(ScalarType type) {
-  return type == ScalarType::uint8 ? 255.0F : type == ScalarType::uint16 ? 65535.0F : 1.0F;
-}
-
 /// Decides which arrays are read and where they go. The cloud's arrays must not move any more afterwards.
 std::vector<Target> plan(const PointDataGrid& grid, const Leaf& leaf, PointVolume& out) {
   const auto& descriptor = leaf.attributeSet().descriptor();
@@ -138,7 +135,7 @@ std::vector<Target> plan(const PointDataGrid& grid, const Leaf& leaf, PointVolum
       const bool real = type == "float" || type == "double" || type == "vec3s" || type == "vec3d";
       const ScalarType as = type_from(grid, name).value_or(real ? ScalarType::float32 : ScalarType::int32);
       const bool colour = vector && name == "Cd", alpha = name == "Alpha";
-      const float scale = colour || alpha ? full_range(as) : 1.0F;
+      const float scale = colour || alpha ? volume::full_range(as) : 1.0F;
       targets.push_back({name, {}, scale, scale > 1});
       static const std::array<const char*, 3> kColour{"red", "green", "blue"}, kAxis{"_x", "_y", "_z"};
       for (std::size_t k = 0; k < (vector ? 3U : 1U); ++k) {

@@ -1,13 +1,12 @@
 #include "volume/vdb_bytes.h"
 
-#include <fmt/format.h>
 #include <openvdb/io/Archive.h>
 
 #include <algorithm>
-#include <cstdint>
 #include <sstream>
-#include <string_view>
 #include <utility>
+
+#include "volume/content_tag.h"
 
 namespace lamina::volume {
 namespace {
@@ -17,24 +16,13 @@ struct Archive : openvdb::io::Archive {
   using openvdb::io::Archive::write;
 };
 
-/// FNV-1a, 64 bits.
-std::uint64_t hash(std::string_view bytes, std::uint64_t h) {
-  for (const char c : bytes) h = (h ^ static_cast<std::uint8_t>(c)) * 0x100000001b3ULL;
-  return h;
-}
-
-/// The file's tag, a UUID in text, stands behind magic number, three version numbers and a flag.
-constexpr std::size_t kTagAt = 8 + 3 * 4 + 1;
-constexpr std::size_t kTagSize = 36;
-
 void tag_by_contents(std::string& bytes) {
-  char* const tag = bytes.data() + kTagAt;
-  std::fill_n(tag, kTagSize, '0');
-  const std::uint64_t a = hash(bytes, 0xcbf29ce484222325ULL), b = hash(bytes, a);
-  // Version 8 of RFC 9562: the maker's own scheme.
-  const std::string text = fmt::format("{:08x}-{:04x}-8{:03x}-a{:03x}-{:012x}", a >> 32, (a >> 16) & 0xFFFF, a & 0xFFF,
-                                       b >> 52, b & 0xFFFFFFFFFFFFULL);
-  std::copy(text.begin(), text.end(), tag);
+  char* const at = bytes.data() + kTagAt;
+  std::fill_n(at, kTagSize, '0');
+  ContentTag tag;
+  tag.add(bytes);
+  const std::string text = tag.text();
+  std::copy(text.begin(), text.end(), at);
 }
 
 }  // namespace

@@ -32,21 +32,6 @@ void check(const PointArrays& points, const PointVolumeSettings& settings) {
   }
 }
 
-/// A power of two, so that floats stay what they are; some eight points a voxel were they spread over a surface.
-double choose_voxel(const SampleBatch& s, double wanted) {
-  // OpenVDB takes smaller voxels for a singular transform.
-  constexpr double kSmallest = 0x1p-16;
-  if (wanted > 0) return std::max(kSmallest, std::exp2(std::floor(std::log2(wanted))));
-  double diagonal = 0;
-  for (const auto* axis : {&s.x, &s.y, &s.z}) {
-    const auto [low, high] = std::minmax_element(axis->begin(), axis->end());
-    diagonal = std::hypot(diagonal, *high - *low);
-  }
-  if (!(diagonal > 0)) return 1;
-  const double edge = diagonal * std::sqrt(8 / static_cast<double>(s.size()));
-  return std::max(kSmallest, std::exp2(std::round(std::log2(edge) - 0.5)));
-}
-
 }  // namespace
 
 PointVolumeStats write_point_volume(const PointArrays& points, const PointVolumeSettings& settings,
@@ -56,7 +41,7 @@ PointVolumeStats write_point_volume(const PointArrays& points, const PointVolume
   PointVolumeStats stats;
   meshes::with_threads(run.threads, [&] {
     const auto columns = volume::point_columns(points);
-    stats.voxel = choose_voxel(points.samples, settings.voxel);
+    stats.voxel = volume::point_voxel(points.samples, settings.voxel);
     const auto grid = volume::point_grid(points, columns, volume::point_transform(points, stats.voxel));
     volume::label(*grid, settings.name, false);
     stats.points = points.samples.size();

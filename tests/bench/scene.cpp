@@ -62,7 +62,7 @@ Scene make_scene(const std::string& shape, std::uint64_t count, bool colours, co
   s.source = scattered(shape, count, colours);
   s.settings.input = shape;
   s.survey = survey_input(*s.source, s.settings.bad_samples, {});
-  s.frame = choose_frame(s.survey, s.settings.frame);
+  s.frame = choose_frame(s.survey, s.settings.frame.value_or(FrameMode::pca));
   s.ingested = std::make_unique<Ingested>(ingest(*s.source, s.survey, s.frame, 1, folder, {}));
   s.resolved = resolve_plan(s.settings, s.frame, s.ingested->store, s.ingested->extent, false,
                             s.source->info().attributes.size());

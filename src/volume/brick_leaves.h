@@ -1,0 +1,46 @@
+// From bricks of the band to the leaves of the grids.
+#pragma once
+#include <openvdb/openvdb.h>
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "lamina/attributes.h"
+#include "lamina/frame.h"
+#include "volume/band.h"
+#include "volume/grid_frame.h"
+#include "volume/streamed_vdb.h"
+
+namespace lamina::volume {
+
+/// A grid beside the distances: from the normals, or from channels of the window.
+struct ExtraGrid {
+  enum class Kind { normal, vector, scalar, weight };
+  std::string name;
+  Kind kind = Kind::scalar;
+  std::array<int, 3> channels{};  ///< index into BandSettings::channels; one for scalars
+  float scale = 1;                ///< values are multiplied by this
+};
+
+/// The grids called for, and the channels they need. Throws Error(usage) naming one that nobody knows.
+std::vector<ExtraGrid> resolve_grids(const std::vector<std::string>& names, const AttributeLayout& layout, double step,
+                                     std::vector<int>& channels);
+
+struct BrickLeaves {
+  bool any = false;
+  std::vector<PackedLeaf> leaves;  ///< the distances', then one for each extra grid
+};
+
+struct LeafMaker {
+  const Band& band;
+  const GridFrame& grid;
+  const std::vector<ExtraGrid>& extras;
+  const Eigen::Matrix3d& rotation;  ///< of the frame
+  float background = 1;             ///< world units
+  bool half = true;
+
+  [[nodiscard]] BrickLeaves operator()(const Brick& brick) const;
+};
+
+}  // namespace lamina::volume
