@@ -1,97 +1,56 @@
-// lamina render: a picture of a mesh or a point cloud.
+// lamina render: a picture of a mesh, a point cloud or a level set.
 #include "lamina/render.h"
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 
 #include "console.h"
 #include "inputs.h"
-#include "lamina/error.h"
-#include "lamina/info.h"
-#include "lamina/points.h"
+#include "model.h"
 #include "numbers.h"
-#include "text.h"
 #include "tool.h"
 
 namespace lamina::tools {
 namespace {
 
-constexpr std::size_t kBatch = std::size_t{1} << 20;  // points held at a time
-
 struct RenderOptions {
   std::string input, output;
   RenderSettings settings;
+  ModelOptions model;
   RunOptions run;
 };
 
-/// Every batch of the file, with progress.
-template <class Take>
-void for_batches(PointSource& source, std::string_view stage, const RunContext& context, const Take& take) {
-  SampleBatch batch;
-  const std::uint64_t total = source.info().count;
-  for (std::uint64_t first = 0; first < total; first += batch.size()) {
-    if (context.cancelled()) throw Error(ExitCode::internal, "cancelled");
-    source.read(first, kBatch, batch);
-    take(batch);
-    if (context.progress) context.progress({stage, first + batch.size(), total, 0, 0});
-  }
-}
-
-void draw_points(Renderer& renderer, const RenderOptions& o, const RunContext& context) {
-  const auto source = open_points(o.input, o.run.tmp_dir);
-  if (source->info().count == 0) throw Error(ExitCode::empty, fmt::format("{}: no points to draw", o.input));
-  for_batches(*source, "frame", context, [&](const SampleBatch& batch) { renderer.frame(batch); });
-  for_batches(*source, "draw", context,
-              [&](const SampleBatch& batch) { renderer.draw(batch, source->info().attributes); });
-  context.info(fmt::format("drew {} points", count_text(source->info().count)));
-}
-
-/// A mesh file's vertices, where it has nothing but vertices.
-SampleBatch as_points(TriangleMesh& mesh) {
-  SampleBatch points;
-  for (const auto& p : mesh.positions) {
-    points.x.push_back(p[0]);
-    points.y.push_back(p[1]);
-    points.z.push_back(p[2]);
-  }
-  for (const auto& n : mesh.normals) {
-    points.nx.push_back(n[0]);
-    points.ny.push_back(n[1]);
-    points.nz.push_back(n[2]);
-  }
-  points.attributes = std::move(mesh.attributes);
-  return points;
-}
-
-void draw_mesh(Renderer& renderer, const RenderOptions& o, const RunContext& context) {
-  TriangleMesh mesh = read_mesh(o.input);
-  if (mesh.positions.empty()) throw Error(ExitCode::empty, fmt::format("{}: no vertices to draw", o.input));
-  renderer.frame(mesh);
-  if (mesh.triangles.empty()) {
-    const SampleBatch points = as_points(mesh);
-    renderer.draw(points, mesh.layout);
-    context.info(fmt::format("drew {} vertices; there are no faces", count_text(points.size())));
-    return;
-  }
-  renderer.draw(mesh);
-  context.info(fmt::format("drew {} triangles", count_text(mesh.triangles.size())));
-  if (o.settings.mark_boundary) context.info(fmt::format("marked {} boundary edges", renderer.boundary_edges()));
+/// OUT.png, or OUT.0001.png ... where there are several.
+std::string frame_name(const std::string& output, int frame, int frames) {
+  if (frames == 1) return output;
+  std::filesystem::path name(output);
+  const std::string ending = name.extension().string();
+  return name.replace_extension(fmt::format("{:04d}{}", frame + 1, ending.empty() ? ".png" : ending)).string();
 }
 
 void run_render(const RenderOptions& o) {
   const RunContext context = make_context(o.run);
-  Renderer renderer(o.settings, context);
-  if (content_of(o.input, o.run.tmp_dir) == FileContent::points) {
-    draw_points(renderer, o, context);
-  } else {
-    draw_mesh(renderer, o, context);
+  const RenderSettings& s = o.settings;
+  ModelOptions options = o.model;
+  options.as_triangles = s.flat || s.wire || s.mark_boundary;
+  Renderer renderer(s, context);
+  const std::unique_ptr<Model> model = open_model(o.input, options, context);
+  model->frame(renderer);
+  bool blank = true;
+  for (int frame = 0; frame < s.frames; ++frame) {
+    if (frame > 0) renderer.turn(frame);
+    model->draw(renderer);
+    blank = blank && renderer.blank();
+    write_png(renderer.finish(), frame_name(o.output, frame, s.frames));
+    if (s.frames > 1 && context.progress)
+      context.progress({"turn", static_cast<std::uint64_t>(frame) + 1, static_cast<std::uint64_t>(s.frames), 0, 0});
   }
-  if (renderer.blank())
-    context.warn(o.input + ": nothing of it is in the picture; is the zoom's place inside the model?");
-  write_png(renderer.finish(), o.output);
+  if (blank) context.warn(o.input + ": nothing of it is in the picture; is the zoom's place inside the model?");
+  context.info("drew " + model->what());
+  if (s.mark_boundary) context.info(fmt::format("marked {} boundary edges", renderer.boundary_edges()));
 }
 
 void add_camera_options(CLI::App& tool, RenderSettings& s) {
@@ -104,6 +63,11 @@ void add_camera_options(CLI::App& tool, RenderSettings& s) {
       ->group("Camera");
   tool.add_option("--views", s.views, "Views from around the up axis, side by side")
       ->check(CLI::Range(1, 16))
+      ->type_name("N")
+      ->capture_default_str()
+      ->group("Camera");
+  tool.add_option("--frames", s.frames, "A turntable: so many pictures of one turn, OUT.0001.png ...")
+      ->check(CLI::Range(1, 9999))
       ->type_name("N")
       ->capture_default_str()
       ->group("Camera");
@@ -131,7 +95,7 @@ void add_look_options(CLI::App& tool, RenderSettings& s) {
       ->type_name("auto|none|normals")
       ->group("Look");
   tool.add_flag("--flat", s.flat, "One shade per triangle instead of interpolated normals")->group("Look");
-  tool.add_flag("--wire", s.wire, "Lines along the triangles' edges")->group("Look");
+  tool.add_flag("--wireframe,--wire", s.wire, "Lines along the triangles' edges")->group("Look");
   tool.add_flag("--mark-boundary", s.mark_boundary, "Edges of only one triangle in red, over everything")
       ->group("Look");
   tool.add_option("--point-radius", s.point_radius,
@@ -142,13 +106,45 @@ void add_look_options(CLI::App& tool, RenderSettings& s) {
       ->group("Look");
 }
 
+void add_paint_options(CLI::App& tool, PaintOptions& paint) {
+  tool.add_option("--paint", paint.what,
+                  "A mesh's values as colours, blue to red: distance from --reference, or any attribute's name")
+      ->type_name("distance|NAME")
+      ->group("Look");
+  tool.add_option("--reference", paint.reference, "The mesh from which --paint distance measures")
+      ->type_name("MESH")
+      ->group("Look");
+  add_numbers(tool, "--paint-range", ',', 2, "LOW,HIGH",
+              "Values of the first and the last colour [0, or the least, and what 99 % do not exceed]",
+              [&paint](const auto& v) {
+                if (!(v[1] > v[0])) throw CLI::ValidationError("--paint-range", "HIGH must be above LOW");
+                paint.range = PaintRange{v[0], v[1]};
+              })
+      ->group("Look");
+}
+
+void check_together(const RenderOptions& o) {
+  const PaintOptions& paint = o.model.paint;
+  if (paint.what == "distance" && paint.reference.empty())
+    throw CLI::ValidationError("--paint", "distance wants --reference, the mesh to measure from");
+  if (paint.what != "distance" && !paint.reference.empty())
+    throw CLI::ValidationError("--reference", "goes with --paint distance");
+  if (paint.what.empty() && paint.range) throw CLI::ValidationError("--paint-range", "goes with --paint");
+  if (!paint.what.empty() && o.settings.colour != ColourMode::automatic)
+    throw CLI::ValidationError("--paint", "and --colour exclude each other");
+  if (o.settings.frames > 1 && o.output == "-")
+    throw CLI::ValidationError("--frames", "several pictures do not go to standard output; name a file");
+}
+
 }  // namespace
 
 void add_render(CLI::App& app) {
-  CLI::App* tool = app.add_subcommand("render", "Draw a picture of a mesh or a point cloud");
+  CLI::App* tool = app.add_subcommand("render", "Draw a picture of a mesh, a point cloud or a volume");
   auto o = std::make_shared<RenderOptions>();
-  tool->add_option("INPUT", o->input,
-                   "Mesh (.ply .obj .off .stl, each also as .gz) or points (.ply, - for standard input)")
+  tool->add_option(
+          "INPUT", o->input,
+          "Mesh (.ply .obj .off .stl, each also as .gz), points (- for standard input), or volume (.vdb: level set "
+          "or points)")
       ->required()
       ->type_name("");
   tool->add_option("-o,--output", o->output, "Picture to write: PNG, - for standard output")
@@ -173,11 +169,20 @@ void add_render(CLI::App& app) {
       ->group("Picture");
   add_camera_options(*tool, o->settings);
   add_look_options(*tool, o->settings);
+  add_paint_options(*tool, o->model.paint);
+  tool->add_option("--grid", o->model.grid, "Name of the grid to draw, of a .vdb [its level set, else its points]")
+      ->type_name("NAME")
+      ->group("Look");
   add_run_options(*tool, o->run);
   add_examples(*tool,
                "  lamina render mesh.ply --size 200x200 -o mesh.png\n"
-               "  lamina render scan.ply --size 200x200 --up z -o scan.png");
-  tool->callback([o] { run_render(*o); });
+               "  lamina render scan.ply --size 200x200 --up z -o scan.png\n"
+               "  lamina render mesh.vdb --size 200x200 -o mesh_volume.png\n"
+               "  lamina render mesh.ply --size 200x200 --paint distance --reference other.obj -o distance.png");
+  tool->callback([o] {
+    check_together(*o);
+    run_render(*o);
+  });
 }
 
 }  // namespace lamina::tools

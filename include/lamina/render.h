@@ -1,4 +1,5 @@
-// Pictures of meshes and point clouds, drawn in software: to look at a result on a machine without a screen.
+// Pictures of meshes, point clouds and level sets, drawn in software: to look at a result on a machine without a
+// screen.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -11,6 +12,7 @@
 #include "lamina/mesh.h"
 #include "lamina/run.h"
 #include "lamina/sample.h"
+#include "lamina/volume_level_set.h"
 
 namespace lamina {
 
@@ -43,6 +45,7 @@ struct RenderSettings {
   double elevation = 20;            ///< degrees above the horizon, -90 to 90
   int up = 1;                       ///< axis that points up: 0, 1, 2; the front is +z for 0 and 1, -y for 2
   std::optional<Zoom> zoom;         ///< otherwise everything framed is in the picture
+  int frames = 1;                   ///< 1 to 9999 pictures of one turn around the up axis at one scale: Renderer::turn
   ColourMode colour = ColourMode::automatic;
   bool flat = false;           ///< one shade per triangle instead of interpolated normals
   bool wire = false;           ///< dark lines along the triangles' edges
@@ -59,14 +62,23 @@ class Renderer {
   Renderer(const Renderer&) = delete;
   Renderer& operator=(const Renderer&) = delete;
 
-  /// Makes room in the picture for the vertices or points; those that are not finite are left out here and in drawing.
+  /// Makes room in the picture for the vertices, points or surface; what is not finite is left out here and in drawing.
   void frame(const TriangleMesh& mesh);
   void frame(const SampleBatch& points);
+  void frame(const LevelSet& level_set);
+
+  /// Begins picture `frame` of RenderSettings::frames, 0 first: it is empty again, the camera stands 360/frames degrees
+  /// further around for each frame. Throws Error(usage) when there is no such frame.
+  void turn(int frame);
 
   /// Draws triangles; a mesh without normals gets them from its triangles.
   void draw(const TriangleMesh& mesh);
   /// Draws points as discs across their normals, or facing the viewer where they have none.
   void draw(const SampleBatch& points, const AttributeLayout& layout);
+  /// Casts a ray per sample at the surface, where the distance is 0; smooth, in the colours of the file's grid `Cd`.
+  /// The band's rim is not drawn where the level set is open. Triangles' lines, flat shading and boundary edges need a
+  /// mesh: see mesh_level_set().
+  void draw(const LevelSet& level_set);
 
   /// Boundary edges drawn so far (per mesh, not per view); 0 unless RenderSettings::mark_boundary.
   [[nodiscard]] std::uint64_t boundary_edges() const;

@@ -1,5 +1,6 @@
 // Samples of a picture: what is nearest at each, and averaging them into pixels.
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -34,6 +35,10 @@ class Canvas {
   void set(int x, int y, float depth, const Rgb& colour) {
     depth_[index(x, y)] = depth;
     colour_[index(x, y)] = {encode(colour[0]), encode(colour[1]), encode(colour[2]), 1};
+  }
+  void clear() {
+    std::fill(depth_.begin(), depth_.end(), -kOverEverything);
+    std::fill(colour_.begin(), colour_.end(), std::array<std::uint8_t, 4>{});
   }
   /// Nothing was drawn yet.
   [[nodiscard]] bool blank() const;

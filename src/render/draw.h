@@ -1,12 +1,14 @@
 // Drawing one mesh or one batch of points into one view of the canvas.
 #pragma once
 #include <array>
+#include <functional>
 #include <vector>
 
 #include "lamina/attributes.h"
 #include "lamina/mesh.h"
 #include "lamina/render.h"
 #include "lamina/sample.h"
+#include "lamina/volume_level_set.h"
 #include "render/boundary.h"
 #include "render/canvas.h"
 #include "render/view.h"
@@ -27,5 +29,11 @@ void draw_edges(const TriangleMesh& mesh, const std::vector<Edge>& edges, const 
 /// `radius` in input units serves points that have none of their own.
 void draw_points(const SampleBatch& points, const AttributeLayout& layout, double radius,
                  const RenderSettings& settings, const View& view, Canvas& canvas);
+
+/// World positions of voxels next to the surface.
+void visit_surface(const LevelSet& level_set, const std::function<void(const std::array<double, 3>&)>& visit);
+
+/// One ray per sample, by OpenVDB's level set ray intersector; shaded by the distances' gradient.
+void draw_level_set(const LevelSet& level_set, const RenderSettings& settings, const View& view, Canvas& canvas);
 
 }  // namespace lamina::render_detail

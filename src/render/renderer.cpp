@@ -27,6 +27,7 @@ void check(const RenderSettings& s) {
          "the picture's sides must be 1 to 16384 pixels");
   demand(s.supersample >= 1 && s.supersample <= 8, "samples per pixel must be 1 to 8");
   demand(s.views >= 1 && s.views <= 16, "the number of views must be 1 to 16");
+  demand(s.frames >= 1 && s.frames <= 9999, "the number of frames must be 1 to 9999");
   demand(s.up >= 0 && s.up <= 2, "the up axis must be x, y or z");
   demand(std::isfinite(s.azimuth), "the azimuth must be finite");
   demand(std::abs(s.elevation) <= 90, "the elevation must be -90 to 90 degrees");
@@ -68,26 +69,26 @@ struct Renderer::Impl {
         context(c),
         canvas(make_canvas(s, c)),
         views(make_views(s)),
-        extents(views.size()),
+        framing(framing_views(s)),
+        extents(framing.size()),
         arena(c.threads > 0 ? c.threads : tbb::task_arena::automatic) {}
 
-  template <class PointAt>
-  void frame(std::size_t count, const PointAt& point_at) {
+  // `visit` calls its argument for every place to show.
+  template <class Visit>
+  void frame(const Visit& visit) {
     arena.execute([&] {
-      tbb::parallel_for(std::size_t{0}, views.size(), [&](std::size_t v) {
-        for (std::size_t i = 0; i < count; ++i) {
-          const std::array<double, 3> p = point_at(i);
-          if (finite(p)) extents[v].add(views[v], p);
-        }
+      tbb::parallel_for(std::size_t{0}, framing.size(), [&](std::size_t v) {
+        visit([&, v](const std::array<double, 3>& p) {
+          if (finite(p)) extents[v].add(framing[v], p);
+        });
       });
     });
-    framed += count;
     fitted = false;
   }
 
   template <class DrawView>
   void draw(const DrawView& draw_view) {
-    if (!fitted) fit_views(settings, extents, views);
+    if (!fitted) fit_views(settings, framing, extents, views);
     fitted = true;
     for (const View& view : views) {
       if (context.cancelled()) throw Error(ExitCode::internal, "cancelled");
@@ -109,7 +110,8 @@ struct Renderer::Impl {
   RunContext context;
   Canvas canvas;
   std::vector<View> views;
-  std::vector<Extent> extents;  ///< one per view
+  std::vector<View> framing;    ///< begins with `views` as they stand in the first frame
+  std::vector<Extent> extents;  ///< one per framing view
   tbb::task_arena arena;
   std::uint64_t framed = 0;
   std::uint64_t boundary = 0;
@@ -122,11 +124,29 @@ Renderer::Renderer(const RenderSettings& settings, const RunContext& context)
 Renderer::~Renderer() = default;
 
 void Renderer::frame(const TriangleMesh& mesh) {
-  impl_->frame(mesh.positions.size(), [&](std::size_t i) { return mesh.positions[i]; });
+  impl_->frame([&](const auto& add) { std::for_each(mesh.positions.begin(), mesh.positions.end(), add); });
+  impl_->framed += mesh.positions.size();
 }
 
 void Renderer::frame(const SampleBatch& points) {
-  impl_->frame(points.size(), [&](std::size_t i) { return std::array{points.x[i], points.y[i], points.z[i]}; });
+  impl_->frame([&](const auto& add) {
+    for (std::size_t i = 0; i < points.size(); ++i) add(std::array{points.x[i], points.y[i], points.z[i]});
+  });
+  impl_->framed += points.size();
+}
+
+void Renderer::frame(const LevelSet& level_set) {
+  impl_->frame([&](const auto& add) { visit_surface(level_set, add); });
+}
+
+void Renderer::turn(int frame) {
+  const RenderSettings& s = impl_->settings;
+  if (frame < 0 || frame >= s.frames)
+    throw Error(ExitCode::usage, fmt::format("cannot draw frame {}: there are {}", frame, s.frames));
+  impl_->views = make_views(s, 360.0 * frame / s.frames);
+  impl_->fitted = false;
+  impl_->boundary = 0;
+  impl_->canvas.clear();
 }
 
 void Renderer::draw(const TriangleMesh& mesh) {
@@ -149,6 +169,10 @@ void Renderer::draw(const SampleBatch& points, const AttributeLayout& layout) {
   impl_->draw([&](const View& view) {
     draw_points(points, layout, impl_->point_radius(view), impl_->settings, view, impl_->canvas);
   });
+}
+
+void Renderer::draw(const LevelSet& level_set) {
+  impl_->draw([&](const View& view) { draw_level_set(level_set, impl_->settings, view, impl_->canvas); });
 }
 
 std::uint64_t Renderer::boundary_edges() const {

@@ -1,7 +1,9 @@
 // Where the camera stands: directions, scale, and the part of the picture it fills.
 #pragma once
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -45,16 +47,25 @@ class Extent {
   [[nodiscard]] bool empty() const { return low_[0] > high_[0]; }
   [[nodiscard]] double size(int axis) const { return empty() ? 0 : high_[axis] - low_[axis]; }
   [[nodiscard]] Eigen::Vector3d middle(const View& view) const;
+  /// How far it reaches along an axis from where a place lies on it.
+  [[nodiscard]] double reach(int axis, double place) const {
+    return empty() ? 0 : std::max(std::abs(high_[axis] - place), std::abs(place - low_[axis]));
+  }
 
  private:
   Eigen::Vector3d low_ = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
   Eigen::Vector3d high_ = Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity());
 };
 
-/// The views of a picture with their directions and tiles; centre and scale are still to be fitted.
-std::vector<View> make_views(const RenderSettings& settings);
+/// The views of a picture with their directions and tiles; centre and scale are still to be fitted. `turned`: degrees
+/// that the camera has gone around.
+std::vector<View> make_views(const RenderSettings& settings, double turned = 0);
 
-/// Fits the views to the extents at one common scale, or to the settings' zoom.
-void fit_views(const RenderSettings& settings, const std::vector<Extent>& extents, std::vector<View>& views);
+/// The views that must see everything: the picture's own, first; of a turn also enough of the others.
+std::vector<View> framing_views(const RenderSettings& settings);
+
+/// Fits the views to the extents of framing_views() at one common scale, or to the settings' zoom.
+void fit_views(const RenderSettings& settings, const std::vector<View>& framing, const std::vector<Extent>& extents,
+               std::vector<View>& views);
 
 }  // namespace lamina::render_detail

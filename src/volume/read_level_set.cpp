@@ -83,6 +83,10 @@ LevelSet read_level_set(const std::string& path, const std::string& name) {
   data->path = path;
   data->open = volume::is_open(*grid);
   data->grid = as_float(grid);
+  for (const GridBase::Ptr& other : file.grids) {
+    if (other->getName() == "Cd" && other->transform().isLinear())
+      data->colours = openvdb::gridPtrCast<openvdb::Vec3SGrid>(other);
+  }
   if (!(data->grid->background() > 0)) {
     throw Error(ExitCode::unreadable, fmt::format("{}: grid {} is no level set: outside its band stands {}, not the "
                                                   "band's width",
