@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <malloc.h>
 
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -12,6 +13,7 @@
 #include "console.h"
 #include "inputs.h"
 #include "lamina/error.h"
+#include "model.h"
 #include "result_file.h"
 #include "text.h"
 #include "tool.h"
@@ -23,7 +25,7 @@ struct SurfaceOptions {
   std::vector<std::string> inputs;
   SurfaceSettings settings;
   RunOptions run;
-  std::string stats;
+  std::string stats, preview;
 };
 
 nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& settings) {
@@ -90,6 +92,22 @@ void return_large_arrays() {
 #endif
 }
 
+/// A picture of the mesh file: of its triangles where they can be held, of its vertices where they cannot.
+void draw_preview(const SurfaceOptions& o, const std::string& mesh, const RunContext& context) {
+  // Positions become doubles, and normals, projected vertices and lists of triangles come on top.
+  constexpr std::uintmax_t kBytesPerByte = 4;
+  constexpr std::uintmax_t kUnasked = std::uintmax_t{1} << 30;  // where no limit was given
+  const std::uintmax_t most = context.max_memory > 0 ? context.max_memory : kUnasked;
+  const bool whole = std::filesystem::file_size(mesh) <= most / kBytesPerByte;
+  Renderer renderer({}, context);
+  const std::unique_ptr<Model> model = whole ? open_model(mesh, {}, context) : open_vertices(mesh, context);
+  model->frame(renderer);
+  model->draw(renderer);
+  write_png(renderer.finish(), o.preview);
+  context.info(fmt::format("{}: drew {}{}", o.preview, model->what(),
+                           whole ? "" : ", the vertices: the mesh is too large to be held for a picture"));
+}
+
 void run_surface(const SurfaceOptions& o) {
   return_large_arrays();
   SurfaceSettings settings = o.settings;
@@ -100,6 +118,8 @@ void run_surface(const SurfaceOptions& o) {
   if (o.stats == "-" && settings.output == "-") {
     throw Error(ExitCode::usage, "--stats and --output both name standard output; give one of them a file");
   }
+  if (!o.preview.empty() && settings.output == "-")
+    throw Error(ExitCode::usage, "--preview draws the mesh file; give --output one");
   RunContext context = make_context(o.run);
   // The plan is what a dry run is for: a result, not a message.
   if (settings.dry_run && o.stats != "-") {
@@ -121,6 +141,7 @@ void run_surface(const SurfaceOptions& o) {
       context.info(
           fmt::format("{} ... {}: {} files, {}", v.files.front(), v.files.back(), v.files.size(), bytes_text(v.bytes)));
   }
+  if (!o.preview.empty() && !settings.dry_run) draw_preview(o, settings.output, context);
   if (stats_file) stats_file->write(to_json(stats, settings).dump(2) + "\n");
 }
 
@@ -237,6 +258,9 @@ void add_surface(CLI::App& app) {
   auto* dry =
       tool->add_flag("--dry-run", s.dry_run, "print levels, slabs, expected memory, disk and time; write nothing")
           ->group("Run");
+  tool->add_option("--preview", o->preview, "draw the finished mesh; one too large to be held as its vertices")
+      ->type_name("OUT.png")
+      ->group("Run");
   tool->add_option("--stats", o->stats, "write counts, times and memory to this JSON file, - for standard output")
       ->type_name("FILE.json")
       ->group("Run");
