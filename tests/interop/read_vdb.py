@@ -11,7 +11,7 @@ def check(path, centre, radius):
     """Distances, signs and the transform of a sphere's level set."""
     grid = vdb.read(path, "surface")
     assert grid.gridClass == vdb.GridClass.LEVEL_SET, grid.gridClass
-    voxel = grid.voxelSize()[0]
+    voxel = grid.transform.voxelSize()[0]
     origin = grid.transform.indexToWorld((0, 0, 0))
     along = grid.transform.indexToWorld((1, 0, 0))
     edge = math.dist(origin, along)
@@ -49,7 +49,7 @@ colours = vdb.read(f"{folder}/sphere.vdb", "Cd").getConstAccessor()
 normals = vdb.read(f"{folder}/sphere.vdb", "N").getConstAccessor()
 worst_colour = worst_angle = 0.0
 for item in distances.citerOnValues():
-    if item.min != item.max or abs(item.value) > 0.5 * distances.voxelSize()[0]:
+    if item.min != item.max or abs(item.value) > 0.5 * distances.transform.voxelSize()[0]:
         continue
     world = distances.transform.indexToWorld(item.min)
     length = math.dist(world, (0, 0, 0))
