@@ -312,5 +312,50 @@ TEST(Render, StopsWhenCancelled) {
   EXPECT_THROW(render(test::sphere(1, 8), {}, context), Error);
 }
 
+TEST(Render, ATurnKeepsItsScaleAndItsAxis) {
+  // A post far from a thin base's middle swings round; its height never changes and nothing leaves the picture.
+  TriangleMesh mesh = test::square(0.2, 0, {200, 200, 200});
+  for (auto& p : mesh.positions) p = {p[0] + 3, p[1], p[2]};
+  mesh.positions.push_back({-1, 0, 0});
+  mesh.triangles.push_back({0, 3, 4});
+  for (std::size_t i = 0; i < mesh.layout.size(); ++i) mesh.attributes[i].push_back(200);
+  RenderSettings s = front(160, 120);
+  s.frames = 36;
+  Renderer renderer(s, {});
+  renderer.frame(mesh);
+  std::vector<int> widths, heights;
+  for (int frame = 0; frame < s.frames; ++frame) {
+    renderer.turn(frame);
+    renderer.draw(mesh);
+    const Image image = renderer.finish();
+    const Pixel background = image.at(80, 119);
+    int left = image.width, right = -1, top = image.height, bottom = -1;
+    for (int y = 0; y < image.height; ++y) {
+      for (int x = 0; x < image.width; ++x) {
+        if (image.at(x, y) == background) continue;
+        left = std::min(left, x), right = std::max(right, x), top = std::min(top, y), bottom = std::max(bottom, y);
+      }
+    }
+    if (frame % 18 == 9) continue;  // edge on
+    EXPECT_GE(left, 1) << frame;
+    EXPECT_LE(right, 158) << frame;
+    heights.push_back(bottom - top);
+    widths.push_back(right - left);
+  }
+  EXPECT_LE(*std::max_element(heights.begin(), heights.end()) - *std::min_element(heights.begin(), heights.end()), 1);
+  EXPECT_LT(*std::min_element(widths.begin(), widths.end()), widths[0] / 2);
+  EXPECT_NEAR(widths[0], 0.94 * 160, 3);
+  EXPECT_THROW(renderer.turn(36), Error);
+  // A picture of the turn has the camera where its azimuth says.
+  s.zoom = RenderSettings::Zoom{{1, 0, 0}, 2};
+  Renderer turned(s, {});
+  turned.frame(mesh);
+  turned.turn(9);
+  turned.draw(mesh);
+  s.frames = 1;
+  s.azimuth = 90;
+  EXPECT_EQ(turned.finish().pixels, render(mesh, s).pixels);
+}
+
 }  // namespace
 }  // namespace lamina

@@ -69,6 +69,62 @@ TEST_F(RenderTool, AnswersBadOptions) {
   EXPECT_THAT(run_lamina({"render", mesh_, "-o", picture_, "--sise", "4x4"}).err, HasSubstr("did you mean '--size'?"));
 }
 
+TEST_F(RenderTool, DrawsVolumes) {
+  const std::string volume = folder_ / "sphere.vdb", points = folder_ / "points.vdb";
+  ASSERT_EQ(run_lamina({"convert", mesh_, "-o", volume, "--voxelsize", "0.1"}).code, 0);
+  ASSERT_EQ(run_lamina({"convert", cloud_, "-o", points}).code, 0);
+  const auto level_set = run_lamina({"render", volume, "-o", picture_, "--size", "48x48"});
+  EXPECT_EQ(level_set.code, 0) << level_set.err;
+  EXPECT_THAT(level_set.err, HasSubstr("drew level set surface, voxels of 0.1"));
+  const auto lines = run_lamina({"render", volume, "-o", picture_, "--size", "48x48", "--wireframe"});
+  EXPECT_THAT(lines.err, HasSubstr("triangles"));
+  EXPECT_THAT(run_lamina({"render", points, "-o", picture_, "--size", "48x48"}).err, HasSubstr("drew 3 points"));
+  const std::string fog = folder_ / "fog.vdb";
+  ASSERT_EQ(run_lamina({"convert", volume, "--fog", "-o", fog}).code, 0);
+  const auto refused = run_lamina({"render", fog, "-o", folder_ / "fog.png"});
+  EXPECT_EQ(refused.code, 3);
+  EXPECT_THAT(refused.err, HasSubstr("density (a fog volume)"));
+  EXPECT_EQ(run_lamina({"render", volume, "--grid", "none", "-o", picture_}).code, 3);
+}
+
+TEST_F(RenderTool, WritesTheFramesOfATurn) {
+  const auto outcome = run_lamina({"render", mesh_, "-o", picture_, "--size", "16x16", "--frames", "3", "--quiet"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  for (const char* name : {"out.0001.png", "out.0002.png", "out.0003.png"})
+    EXPECT_EQ(test::read_text(folder_ / name).substr(1, 3), "PNG");
+  EXPECT_FALSE(std::filesystem::exists(picture_));
+  EXPECT_EQ(run_lamina({"render", mesh_, "-o", "-", "--frames", "3"}).code, 2);
+}
+
+TEST_F(RenderTool, PaintsDistancesAndAttributes) {
+  const std::string truth = folder_ / "truth.ply";
+  write_mesh(test::sphere(0.75, 60), truth);
+  const auto distance = run_lamina({"render", mesh_, "-o", picture_, "--size", "32x32", "--paint", "distance",
+                                    "--reference", truth, "--paint-range", "0,0.5"});
+  EXPECT_EQ(distance.code, 0) << distance.err;
+  EXPECT_THAT(distance.err, HasSubstr("dark blue 0, turquoise 0.125, yellow-green 0.25"));
+  EXPECT_THAT(distance.err, HasSubstr("values lie between 0.25"));
+  TriangleMesh with_quality = test::sphere(1, 12);
+  with_quality.layout = {{"quality", ScalarType::float32}};
+  with_quality.attributes = {std::vector<float>(with_quality.positions.size(), 2.5F)};
+  write_mesh(with_quality, mesh_);
+  EXPECT_THAT(run_lamina({"render", mesh_, "-o", picture_, "--paint", "quality"}).err,
+              HasSubstr("values lie between 2.5 and 2.5"));
+  const auto unknown = run_lamina({"render", mesh_, "-o", picture_, "--paint", "mauve"});
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("quality"));
+  for (const std::vector<std::string>& wrong : {std::vector<std::string>{"--paint", "distance"},
+                                                {"--reference", truth},
+                                                {"--paint-range", "1,0", "--paint", "quality"},
+                                                {"--paint-range", "0,1"},
+                                                {"--paint", "quality", "--colour", "none"}}) {
+    std::vector<std::string> words{"render", mesh_, "-o", folder_ / "wrong.png"};
+    words.insert(words.end(), wrong.begin(), wrong.end());
+    EXPECT_EQ(run_lamina(words).code, 2) << wrong[0];
+  }
+  EXPECT_EQ(run_lamina({"render", cloud_, "-o", picture_, "--paint", "quality"}).code, 2);
+}
+
 TEST_F(RenderTool, NamesInputThatCannotBeRead) {
   for (const std::string& input : {folder_ / "none.ply", folder_.path()}) {
     const auto outcome = run_lamina({"render", input, "-o", picture_});

@@ -91,6 +91,17 @@ TEST_F(SurfaceTool, ADryRunPrintsThePlanAndWritesNothing) {
   EXPECT_EQ(run_lamina({"surface", cloud_}).code, 2);
 }
 
+TEST_F(SurfaceTool, APreviewShowsTheMeshOrItsVertices) {
+  const std::string picture = folder_ / "preview.png";
+  const auto whole = run({"--preview", picture});
+  EXPECT_EQ(whole.code, 0) << whole.err;
+  EXPECT_THAT(whole.err, AllOf(HasSubstr(picture), HasSubstr("triangles")));
+  EXPECT_EQ(test::read_file(picture).substr(1, 3), "PNG");
+  const auto refused = run_lamina({"surface", cloud_, "-o", "-", "--preview", picture});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("--preview"));
+}
+
 TEST_F(SurfaceTool, PipesOnBothEnds) {
   ASSERT_EQ(run({"--quiet"}).code, 0);
   const std::string mesh = test::read_file(mesh_);
