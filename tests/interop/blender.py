@@ -54,16 +54,16 @@ fog.data.materials.append(smoke)
 
 scene = bpy.context.scene
 sun = bpy.data.objects.new("sun", bpy.data.lights.new("sun", "SUN"))
-sun.data.energy = 4
+sun.data.energy = 3
 sun.rotation_euler = (0.7, 0.3, 0.5)
 scene.collection.objects.link(sun)
 camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-camera.location = (0, -9, 2.5)
+camera.location = (0, -6.2, 1.8)
 camera.rotation_euler = (Vector() - camera.location).to_track_quat("-Z", "Y").to_euler()
 scene.collection.objects.link(camera)
 scene.camera = camera
 scene.world = bpy.data.worlds.new("sky")
-scene.world.color = (0.35, 0.38, 0.42)
+scene.world.color = (0.7, 0.72, 0.75)
 scene.render.engine = "CYCLES"
 scene.cycles.samples = 24
 scene.cycles.use_denoising = False
