@@ -20,7 +20,7 @@ using openvdb::Vec3d;
 using Ray = openvdb::math::Ray<double>;
 using Sampler = openvdb::tools::BoxSampler;
 
-constexpr double kStep = 0.25;       // voxels to go on after a crossing that is none
+constexpr double kStep = 0.25;       // voxels to look around a crossing, and to go on after one that is none
 constexpr double kDifference = 1.0;  // voxels to either side of a gradient's difference
 
 Vec3d to_vdb(const Eigen::Vector3d& v) {
@@ -48,11 +48,11 @@ class Caster {
   }
 
   // The first point of the surface along the ray, index space. Where the band ends, at the rim of an open surface,
-  // distances jump to the background's: a change of sign there is no surface.
+  // distances jump to the background's: a change of sign there, or between there and the band, is no surface.
   bool hit(Ray ray, Vec3d& at) const {
     double time = 0;
     while (intersector_.intersectsIS(ray, at, time)) {
-      if (!data_.open || known(at)) return true;
+      if (!data_.open || crosses(ray, time, at)) return true;
       ray.setMinTime(time + kStep);
       if (!(ray.t0() < ray.t1())) break;
     }
@@ -91,6 +91,16 @@ class Caster {
   }
 
  private:
+  // The distance changes its sign next to a place on the ray, in the band; `at` is where.
+  bool crosses(const Ray& ray, double time, Vec3d& at) const {
+    const Vec3d before = ray(time - kStep), behind = ray(time + kStep);
+    if (!known(before) || !known(behind)) return false;
+    const double first = Sampler::sample(values_, before), last = Sampler::sample(values_, behind);
+    if ((first < 0) == (last < 0)) return false;
+    at = before + first / (first - last) * (behind - before);
+    return true;
+  }
+
   // All eight voxels around the place are in the band.
   bool known(const Vec3d& at) const {
     const Coord corner = Coord::floor(at);
@@ -110,7 +120,8 @@ class Caster {
 
 void visit_surface(const LevelSet& level_set, const std::function<void(const std::array<double, 3>&)>& visit) {
   const FloatGrid& grid = *level_set.data().grid;
-  const double voxel = level_set.voxel();
+  const openvdb::Vec3d edges = grid.voxelSize();
+  const double voxel = std::max({edges[0], edges[1], edges[2]});
   for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
     for (auto value = leaf->cbeginValueOn(); value; ++value) {
       if (std::abs(static_cast<double>(*value)) > voxel) continue;

@@ -313,12 +313,9 @@ TEST(Render, StopsWhenCancelled) {
 }
 
 TEST(Render, ATurnKeepsItsScaleAndItsAxis) {
-  // A post far from a thin base's middle swings round; its height never changes and nothing leaves the picture.
-  TriangleMesh mesh = test::square(0.2, 0, {200, 200, 200});
-  for (auto& p : mesh.positions) p = {p[0] + 3, p[1], p[2]};
-  mesh.positions.push_back({-1, 0, 0});
-  mesh.triangles.push_back({0, 3, 4});
-  for (std::size_t i = 0; i < mesh.layout.size(); ++i) mesh.attributes[i].push_back(200);
+  // A board far from the origin: its height never changes, and nothing leaves the picture.
+  TriangleMesh mesh = test::square(1, 0, {200, 200, 200});
+  for (auto& p : mesh.positions) p = {1 + 4 * p[0], p[1], p[2]};
   RenderSettings s = front(160, 120);
   s.frames = 36;
   Renderer renderer(s, {});

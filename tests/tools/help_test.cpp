@@ -51,6 +51,7 @@ TEST(Help, EveryExampleOfEveryToolWorks) {
   write_points(folder / "plain.ply", rows, plain);
   sphere_mesh(folder / "mesh.ply");
   sphere_mesh(folder / "other.obj", 1.01);
+  ASSERT_EQ(run_lamina({"convert", folder / "mesh.ply", "--voxelsize", "0.05", "-o", folder / "mesh.vdb"}).code, 0);
   for (const std::string& tool : tools()) {
     const auto lines = examples(run_lamina({tool, "--help"}).out);
     EXPECT_FALSE(lines.empty()) << tool << " has no example";
