@@ -10,6 +10,7 @@
 #include "render/draw.h"
 #include "render/shade.h"
 #include "volume/level_set_data.h"
+#include "volume/vdb_file.h"
 
 namespace lamina::render_detail {
 namespace {
@@ -20,24 +21,89 @@ using openvdb::Vec3d;
 using Ray = openvdb::math::Ray<double>;
 using Sampler = openvdb::tools::BoxSampler;
 
-constexpr double kStep = 0.25;       // voxels to look around a crossing, and to go on after one that is none
 constexpr double kDifference = 1.0;  // voxels to either side of a gradient's difference
 
 Vec3d to_vdb(const Eigen::Vector3d& v) {
   return {v[0], v[1], v[2]};
 }
 
-// OpenVDB's ray intersector compares distances with the voxel's size and wants cubes. Rays are given in index space,
-// where any linear transform's voxels are cubes; the largest edge bounds the distances between neighbours.
-FloatGrid::ConstPtr in_index_space(const FloatGrid& grid) {
+// OpenVDB's ray intersector wants a level set of cubic voxels. Rays are given in index space, where any linear
+// transform's voxels are cubes.
+FloatGrid::ConstPtr in_index_space(const FloatGrid& grid, bool open) {
   const Vec3d edges = grid.voxelSize();
   const double largest = std::max({edges[0], edges[1], edges[2]});
   const auto moved = grid.copyReplacingTransform(openvdb::math::Transform::createLinearTransform(largest));
   openvdb::MetaMap labels(*moved);
+  labels.insertMeta(volume::kOpenMetadata, openvdb::BoolMetadata(open));
   labels.insertMeta(openvdb::GridBase::META_GRID_CLASS,
                     openvdb::StringMetadata(openvdb::GridBase::gridClassToString(openvdb::GRID_LEVEL_SET)));
   return moved->copyReplacingMetadata(labels);
 }
+
+// All eight voxels around a place are in the band.
+bool in_band(const FloatGrid::ConstAccessor& values, const Vec3d& at) {
+  const Coord corner = Coord::floor(at);
+  for (int i = 0; i < 8; ++i) {
+    if (!values.isValueOn(corner.offsetBy(i & 1, i >> 1 & 1, i >> 2))) return false;
+  }
+  return true;
+}
+
+// What LevelSetRayIntersector asks along a ray, in place of OpenVDB's LinearSearchImpl: that takes the band's rim,
+// where an open surface's distances jump to the background's, for surface, and misses surface behind it.
+class BandSearch {
+ public:
+  using RayT = Ray;
+  BandSearch(const FloatGrid& grid, const float& /*isovalue*/) : values_(grid.tree()), open_(volume::is_open(grid)) {
+    grid.tree().root().evalActiveBoundingBox(box_, false);
+  }
+  bool setIndexRay(const Ray& ray) {
+    ray_ = ray;
+    return ray_.clip(box_);
+  }
+  void getIndexPos(Vec3d& at) const { at = ray_(time_); }
+  [[nodiscard]] double getIndexTime() const { return time_; }
+
+ private:
+  template <typename TreeT, int NodeLevel>
+  friend struct openvdb::math::LevelSetHDDA;
+
+  struct Reading {
+    double time = 0, value = 0;
+    bool known = false;
+  };
+  Reading read(double time) const {
+    const Vec3d at = ray_(time);
+    if (open_ && !in_band(values_, at)) return {time, 0, false};
+    return {time, Sampler::sample(values_, at), true};
+  }
+  void setRange(double t0, double t1) { ray_.setTimes(t0, t1); }
+  [[nodiscard]] const Ray& ray() const { return ray_; }
+  template <typename NodeT>
+  bool hasNode(const Coord& at) {
+    return values_.probeConstNode<NodeT>(at) != nullptr;
+  }
+  void init(double time) { last_ = read(time); }
+  // The surface lies between the last reading and the one at `time`, where the ray leaves the voxel `at`.
+  bool operator()(const Coord& at, double time) {
+    if (!values_.isValueOn(at)) {
+      last_ = read(time);
+      return false;
+    }
+    const Reading next = read(time);
+    const bool crossing = last_.known && next.known && (last_.value < 0) != (next.value < 0);
+    if (crossing) time_ = last_.time + (time - last_.time) * last_.value / (last_.value - next.value);
+    last_ = next;
+    return crossing;
+  }
+
+  FloatGrid::ConstAccessor values_;
+  bool open_;
+  openvdb::CoordBBox box_;
+  Ray ray_;
+  Reading last_;
+  double time_ = 0;
+};
 
 // Casts rays on one thread: intersector and accessors remember the nodes they were in.
 class Caster {
@@ -47,16 +113,10 @@ class Caster {
     if (level_set.colours) colours_.emplace(level_set.colours->tree());
   }
 
-  // The first point of the surface along the ray, index space. Where the band ends, at the rim of an open surface,
-  // distances jump to the background's: a change of sign there, or between there and the band, is no surface.
-  bool hit(Ray ray, Vec3d& at) const {
+  // The first point of the surface along the ray, index space.
+  bool hit(const Ray& ray, Vec3d& at) const {
     double time = 0;
-    while (intersector_.intersectsIS(ray, at, time)) {
-      if (!data_.open || crosses(ray, time, at)) return true;
-      ray.setMinTime(time + kStep);
-      if (!(ray.t0() < ray.t1())) break;
-    }
-    return false;
+    return intersector_.intersectsIS(ray, at, time);
   }
 
   // The direction in which distances grow, in world coordinates; zero where there is none.
@@ -91,26 +151,9 @@ class Caster {
   }
 
  private:
-  // The distance changes its sign next to a place on the ray, in the band; `at` is where.
-  bool crosses(const Ray& ray, double time, Vec3d& at) const {
-    const Vec3d before = ray(time - kStep), behind = ray(time + kStep);
-    if (!known(before) || !known(behind)) return false;
-    const double first = Sampler::sample(values_, before), last = Sampler::sample(values_, behind);
-    if ((first < 0) == (last < 0)) return false;
-    at = before + first / (first - last) * (behind - before);
-    return true;
-  }
+  bool known(const Vec3d& at) const { return in_band(values_, at); }
 
-  // All eight voxels around the place are in the band.
-  bool known(const Vec3d& at) const {
-    const Coord corner = Coord::floor(at);
-    for (int i = 0; i < 8; ++i) {
-      if (!values_.isValueOn(corner.offsetBy(i & 1, i >> 1 & 1, i >> 2))) return false;
-    }
-    return true;
-  }
-
-  openvdb::tools::LevelSetRayIntersector<FloatGrid> intersector_;
+  openvdb::tools::LevelSetRayIntersector<FloatGrid, BandSearch> intersector_;
   FloatGrid::ConstAccessor values_;
   std::optional<openvdb::Vec3SGrid::ConstAccessor> colours_;
   const LevelSet::Data& data_;
@@ -133,7 +176,7 @@ void visit_surface(const LevelSet& level_set, const std::function<void(const std
 
 void draw_level_set(const LevelSet& level_set, const RenderSettings& settings, const View& view, Canvas& canvas) {
   const LevelSet::Data& data = level_set.data();
-  const FloatGrid::ConstPtr grid = in_index_space(*data.grid);
+  const FloatGrid::ConstPtr grid = in_index_space(*data.grid, data.open);
   const openvdb::math::Transform& transform = data.grid->transform();
   // Rays begin and end outside the sphere around the grid.
   const openvdb::CoordBBox box = data.grid->evalActiveVoxelBoundingBox();

@@ -167,7 +167,7 @@ TEST(DrawLevelSet, IsTheSameForAnyNumberOfThreads) {
     renderer.draw(level_set);
     return renderer.finish().pixels;
   };
-  EXPECT_EQ(picture(1), picture(3));
+  EXPECT_EQ(picture(1), picture(2));
 }
 
 }  // namespace
