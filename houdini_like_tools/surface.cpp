@@ -96,9 +96,10 @@ void return_large_arrays() {
 void draw_preview(const SurfaceOptions& o, const std::string& mesh, const RunContext& context) {
   // Positions become doubles, and normals, projected vertices and lists of triangles come on top.
   constexpr std::uintmax_t kBytesPerByte = 4;
+  constexpr std::uintmax_t kPicture = std::uintmax_t{48} << 20;
   constexpr std::uintmax_t kUnasked = std::uintmax_t{1} << 30;  // where no limit was given
   const std::uintmax_t most = context.max_memory > 0 ? context.max_memory : kUnasked;
-  const bool whole = std::filesystem::file_size(mesh) <= most / kBytesPerByte;
+  const bool whole = kPicture + kBytesPerByte * std::filesystem::file_size(mesh) <= most;
   Renderer renderer({}, context);
   const std::unique_ptr<Model> model = whole ? open_model(mesh, {}, context) : open_vertices(mesh, context);
   model->frame(renderer);
