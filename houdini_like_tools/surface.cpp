@@ -121,6 +121,10 @@ void run_surface(const SurfaceOptions& o) {
   }
   if (!o.preview.empty() && settings.output == "-")
     throw Error(ExitCode::usage, "--preview draws the mesh file; give --output one");
+  if (!o.preview.empty() && o.preview == settings.output)
+    throw Error(ExitCode::usage, "--preview and --output name the same file");
+  if (!o.preview.empty() && !settings.dry_run)
+    ResultFile(o.preview);  // refuses what cannot be written, before the work
   RunContext context = make_context(o.run);
   // The plan is what a dry run is for: a result, not a message.
   if (settings.dry_run && o.stats != "-") {

@@ -114,7 +114,7 @@ class Caster {
   }
 
   // The first point of the surface along the ray, index space.
-  bool hit(const Ray& ray, Vec3d& at) const {
+  bool hit(const Ray& ray, Vec3d& at) {
     double time = 0;
     return intersector_.intersectsIS(ray, at, time);
   }
@@ -196,7 +196,7 @@ void draw_level_set(const LevelSet& level_set, const RenderSettings& settings, c
   if (!(length > 0)) return;
   const Caster prototype(*grid, data);
   tbb::parallel_for(tbb::blocked_range<int>(0, view.tile.height), [&](const tbb::blocked_range<int>& rows) {
-    const Caster caster = prototype;
+    Caster caster = prototype;
     for (int row = rows.begin(); row < rows.end(); ++row) {
       for (int column = 0; column < view.tile.width; ++column) {
         const double right = (column + 0.5 - 0.5 * view.tile.width) / view.scale;

@@ -100,6 +100,10 @@ TEST_F(SurfaceTool, APreviewShowsTheMeshOrItsVertices) {
   const auto refused = run_lamina({"surface", cloud_, "-o", "-", "--preview", picture});
   EXPECT_EQ(refused.code, 2);
   EXPECT_THAT(refused.err, HasSubstr("--preview"));
+  const auto before = std::filesystem::last_write_time(mesh_);
+  for (const auto& [path, code] : {std::pair{folder_ / "no/such/picture.png", 4}, std::pair{mesh_, 2}})
+    EXPECT_EQ(run({"--preview", path}).code, code) << path;
+  EXPECT_EQ(std::filesystem::last_write_time(mesh_), before) << "known before the work began";
 }
 
 TEST_F(SurfaceTool, PipesOnBothEnds) {
@@ -273,9 +277,9 @@ TEST_F(SurfaceTool, NoRoomForTemporaryFilesOrTheOutput) {
 TEST_F(SurfaceTool, ASignalCancelsAndCleansUp) {
   test::write_cloud(test::sphere_cloud(400000), cloud_);
   for (const char* signal : {"INT", "TERM"}) {
-    const auto outcome = run_shell(
-        quoted(LAMINA_PROGRAM) + " surface " + quoted(cloud_) + " -o " + quoted(mesh_) + " --tmp-dir " + quoted(tmp_) +
-        " --cell 0.3R --threads 1 & job=$!; sleep 0.6; kill -" + signal + " $job; wait $job");
+    const auto outcome =
+        run_shell(quoted(LAMINA_PROGRAM) + " surface " + quoted(cloud_) + " -o " + quoted(mesh_) + " --tmp-dir " +
+                  quoted(tmp_) + " --cell 0.3R --threads 1 & job=$!; sleep 0.6; kill -" + signal + " $job; wait $job");
     EXPECT_EQ(outcome.code, 1) << outcome.err;
     EXPECT_THAT(outcome.err, HasSubstr("lamina: cancelled"));
     expect_nothing_left();
