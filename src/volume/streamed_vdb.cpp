@@ -128,7 +128,7 @@ void StreamedVdb::add(std::size_t grid, const PackedLeaf& leaf) {
   for (int k = 0; k < 3; ++k) r.place.leaf[static_cast<std::size_t>(k)] = leaf.origin[k] >> 3;
   r.place.faces = leaf.faces;
   r.size = static_cast<std::uint32_t>(leaf.bytes.size());
-  r.at = spool_.append({data, leaf.bytes.size()});
+  r.at = spool_.append({data, leaf.bytes.size()}, disk_);
   g.leaves.push_back(r);
   g.active += leaf.active;
   g.box.expand(leaf.box);
@@ -270,7 +270,8 @@ void StreamedVdb::write(std::ostream& os) {
 }
 
 void StreamedVdb::finish() {
-  spool_.flush();
+  spool_.flush(disk_);
+  spool_.check(disk_.drain());
   std::fstream file(beside_, std::ios::binary | std::ios::in | std::ios::out | std::ios::trunc);
   if (!file) fail("cannot be written");
   write(file);

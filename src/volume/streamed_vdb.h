@@ -50,6 +50,7 @@ class StreamedVdb {
   [[nodiscard]] openvdb::GridBase& grid(std::size_t number) { return *grids_[number].empty; }
 
  private:
+  static constexpr std::size_t kBuffersInFlight = 16;
   struct Record {
     LeafVotes place;
     std::uint32_t size = 0;
@@ -70,6 +71,7 @@ class StreamedVdb {
 
   std::string path_, beside_;
   TempFile spool_;
+  BackgroundWriter disk_{TempFile::kBufferBytes, kBuffersInFlight};  ///< ends before the file it writes to
   std::vector<Grid> grids_;
   std::uint64_t bytes_ = 0;
   bool staged_ = false;
