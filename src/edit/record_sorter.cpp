@@ -81,7 +81,7 @@ void RecordSorter::spill() {
   for (const std::uint32_t i : order_) {
     std::memcpy(record.data(), &keys_[i], kKeyBytes);
     std::memcpy(record.data() + kKeyBytes, records_.get() + std::size_t{i} * record_bytes_, record_bytes_);
-    file_.append(record);
+    file_.append(record, writer_);
   }
   run.end = file_.size();
   runs_.push_back(std::move(run));
@@ -106,7 +106,8 @@ void RecordSorter::drain(std::size_t batch, const Take& take) {
     for (const std::uint32_t i : order_) give(keys_[i], records_.get() + std::size_t{i} * record_bytes_);
   } else {
     if (held_ > 0) spill();
-    file_.flush();
+    file_.flush(writer_);
+    file_.check(writer_.drain());
     const std::size_t whole = kKeyBytes + record_bytes_;
     const std::size_t piece =
         std::max<std::size_t>(kLeastRecords, capacity_ * record_bytes_ / runs_.size() / whole) * whole;

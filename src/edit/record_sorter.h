@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "files/background_writer.h"
 #include "slab_store/temp_file.h"
 
 namespace lamina::edit {
@@ -41,6 +42,7 @@ class RecordSorter {
   std::vector<std::uint64_t> keys_;
   std::vector<std::uint32_t> order_;  ///< of the held records, once sorted
   TempFile file_;
+  BackgroundWriter writer_{TempFile::kBufferBytes, 4};  // ends before the file does
   std::vector<Run> runs_;
 };
 

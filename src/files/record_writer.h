@@ -55,4 +55,27 @@ class RecordWriter {
   BackgroundWriter::Buffer buffer_;
 };
 
+/// Records of a file that nothing else is written to. Must end before the file does.
+class SoleRecordWriter {
+ public:
+  explicit SoleRecordWriter(std::size_t record_bytes)
+      : background_(std::max(RecordWriter::kBytes, record_bytes), 4), records_(background_, record_bytes) {}
+
+  template <class Fill>
+  int append(int fd, std::size_t count, Fill fill) {
+    return records_.append(fd, count, std::move(fill));
+  }
+  /// Everything is in the file when this returns 0.
+  int flush(int fd) {
+    const int error = records_.flush(fd);
+    const int late = background_.drain();
+    return error != 0 ? error : late;
+  }
+  [[nodiscard]] std::uint64_t written() const { return records_.written(); }
+
+ private:
+  BackgroundWriter background_;
+  RecordWriter records_;
+};
+
 }  // namespace lamina

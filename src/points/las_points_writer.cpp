@@ -57,13 +57,13 @@ class LasPointsWriter final : public PointsWriter {
     for (std::size_t k = 0; k < 3; ++k) axes[k] = rows_ == 0 ? LasAxis{} : choose_steps(low_[k], high_[k]);
     const std::string header = layout_.header(axes, rows_);
     rows_out_.check(write_all(rows_out_.fd(), header.data(), header.size()));
-    RecordWriter records(layout_.record_bytes());
+    SoleRecordWriter records(layout_.record_bytes());
     write_rows(axes, records);
     rows_out_.publish(header, header.size() + records.written());
   }
 
  private:
-  void write_rows(const std::array<LasAxis, 3>& axes, RecordWriter& records) const {
+  void write_rows(const std::array<LasAxis, 3>& axes, SoleRecordWriter& records) const {
     constexpr std::size_t kBlock = 4096;
     const auto buffer = std::make_unique_for_overwrite<std::byte[]>(kBlock * codec_.row_bytes());
     SampleBatch batch;
@@ -87,7 +87,7 @@ class LasPointsWriter final : public PointsWriter {
   RowCodec codec_;
   StagedRows rows_out_;
   Descriptor waiting_;  ///< rows as they came
-  RecordWriter writer_;
+  SoleRecordWriter writer_;
   std::array<double, 3> low_{kInfinity, kInfinity, kInfinity}, high_{-kInfinity, -kInfinity, -kInfinity};
   bool committed_ = false;
 };

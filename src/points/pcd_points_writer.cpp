@@ -113,8 +113,8 @@ class PcdPointsWriter final : public PointsWriter {
         header_bytes_(header_of(stored_, 0, colours_.has_value()).size()),
         given_(columns),
         codec_(stored_),
-        writer_(codec_.row_bytes()),
-        rows_out_(path, settings.tmp_dir, settings.count.has_value()) {
+        rows_out_(path, settings.tmp_dir, settings.count.has_value()),
+        writer_(codec_.row_bytes()) {
     const std::string header = header_of(stored_, settings_.count.value_or(0), colours_.has_value());
     rows_out_.check(write_all(rows_out_.fd(), header.data(), header.size()));
   }
@@ -167,8 +167,8 @@ class PcdPointsWriter final : public PointsWriter {
   PointColumns stored_;
   std::size_t header_bytes_;
   RowCodec given_, codec_;
-  RecordWriter writer_;
   StagedRows rows_out_;
+  SoleRecordWriter writer_;
   SampleBatch packed_;
   bool committed_ = false;
 };

@@ -95,7 +95,7 @@ class PlyPointsWriter final : public PointsWriter {
   OutputFile output_;
   std::optional<Descriptor> pipe_;  ///< rows go there at once
   RowCodec codec_;
-  RecordWriter writer_;
+  SoleRecordWriter writer_;
   bool committed_ = false;
 };
 

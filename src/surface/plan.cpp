@@ -16,7 +16,7 @@ constexpr std::uint64_t kSurveySamples = 1u << 18;  ///< samples whose radii are
 /// The size of most cells in units of the largest the median radius allows: with 0.64 the radii of an evenly sampled
 /// surface (which scatter by 0.75 to 1.25 around their median) all ask for the same level.
 constexpr double kMainCell = 0.7;
-constexpr int kDefaultLevels = 4;
+constexpr int kLevelsAbove = 2;
 constexpr int kMaxLevels = 12;
 constexpr std::int32_t kMinSteps = 64;  ///< fixed-point steps a finest cell must have for exact enough positions
 constexpr double kMaxCells = 1 << 20;   ///< finest cells from the origin, the limit of the lattice's keys
@@ -34,12 +34,13 @@ struct Levels {
   int count;
 };
 
-/// Main cells follow the median radius; levels are added below for the 1 % smallest and above for the 1 % largest.
+/// Main cells follow the median radius; levels are added below for the 1 % smallest and above for the 1 % largest, two at
+/// least: a slab, as high as the coarsest cells, then holds four layers of main cells, whose leaves hold eight.
 Levels choose_levels(const SurfaceSettings& s, double ratio, const RadiusSurvey& radii) {
   const double main = kMainCell * ratio * radii.median;
   const int finer = std::max(0, static_cast<int>(std::ceil(std::log2(main / (ratio * radii.low)) - 1e-9)));
   const int coarser = std::max(0, static_cast<int>(std::floor(std::log2(ratio * radii.high / main))));
-  const int count = s.levels > 0 ? s.levels : std::clamp(finer + coarser + 1, kDefaultLevels, kMaxLevels);
+  const int count = s.levels > 0 ? s.levels : std::min(finer + std::max(coarser, kLevelsAbove) + 1, kMaxLevels);
   return {std::ldexp(main, -std::min(finer, count - 1)), count};
 }
 
@@ -145,7 +146,7 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
   out.feed.max_radius = static_cast<float>(max_radius);
   if (s.cell.unit == Length::Unit::world) {
     // A fixed cell: one level in use, whatever the radii.
-    levels = {s.cell.value / frame.step, s.levels > 0 ? s.levels : kDefaultLevels};
+    levels = {s.cell.value / frame.step, s.levels > 0 ? s.levels : kLevelsAbove + 1};
     out.feed.fixed_cell = true;
     out.feed.cell_ratio = 1;
   } else {
@@ -166,7 +167,7 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
     // Detail finer than the lattice can address: the finest level ends there.
     const int skip = static_cast<int>(std::ceil(std::log2(smallest / levels.finest)));
     levels.finest = std::ldexp(levels.finest, skip);
-    levels.count = std::max(s.levels > 0 ? s.levels : kDefaultLevels, levels.count - skip);
+    levels.count = std::max(s.levels > 0 ? s.levels : kLevelsAbove + 1, levels.count - skip);
   }
   // A lattice much coarser than the cloud adds nothing and would overflow the fixed-point range.
   constexpr double kMaxSlab = 1 << 28;
