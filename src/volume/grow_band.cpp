@@ -13,6 +13,7 @@ namespace lamina::volume {
 namespace {
 
 using Around = std::array<const Brick*, 27>;
+typedef float Float4 __attribute__((vector_size(16)));  // NOLINT(modernize-use-using): attributes on typedefs
 
 struct Offset {
   int x, y, z;
@@ -29,7 +30,47 @@ constexpr std::array<Offset, 27> make_offsets() {
   return out;
 }
 constexpr std::array<Offset, 27> kOffsets = make_offsets();
-constexpr std::uint32_t kMiddle = 13;
+
+/// A brick and a voxel's layer around it: ten voxels a side, the brick's begin at 1.
+constexpr int kSide = 10, kPlane = kSide * kSide, kVoxels = kPlane * kSide;
+constexpr int padded(int x, int y, int z) {
+  return x + 1 + kSide * (y + 1) + kPlane * (z + 1);
+}
+
+/// From a voxel to its neighbour, and the vector back.
+struct Way {
+  Float4 back;
+  float squared;
+  int step;
+};
+constexpr std::array<Way, 27> make_ways() {
+  std::array<Way, 27> out{};
+  for (std::size_t i = 0; i < 27; ++i) {
+    const Offset& o = kOffsets[i];
+    out[i].back = Float4{static_cast<float>(-o.x), static_cast<float>(-o.y), static_cast<float>(-o.z), 0};
+    out[i].squared = o.squared;
+    out[i].step = o.x + kSide * o.y + kPlane * o.z;
+  }
+  return out;
+}
+constexpr std::array<Way, 27> kWays = make_ways();
+
+/// Where the voxels lie in the bricks around.
+struct Source {
+  std::uint8_t brick;
+  std::uint16_t offset;
+};
+constexpr std::array<Source, kVoxels> make_sources() {
+  std::array<Source, kVoxels> out{};
+  for (int z = -1; z <= 8; ++z)
+    for (int y = -1; y <= 8; ++y)
+      for (int x = -1; x <= 8; ++x)
+        out[static_cast<std::size_t>(padded(x, y, z))] = {
+            static_cast<std::uint8_t>(((x + 8) >> 3) + 3 * ((y + 8) >> 3) + 9 * ((z + 8) >> 3)),
+            static_cast<std::uint16_t>(BlockMask::offset(x & 7, y & 7, z & 7))};
+  return out;
+}
+constexpr std::array<Source, kVoxels> kSources = make_sources();
 
 /// A voxel reaches another as far as the way to it leads along its normal: squared sideways distance below this. The
 /// best of 26 directions is off by 0.35 at most; a whole voxel sideways would let the band grow over a rim.
@@ -37,205 +78,195 @@ constexpr float kSideways = 0.75F;
 /// Repaired corners count within this distance of the surface, voxels.
 constexpr float kRepaired = 1;
 
-float sideways(const Offset& o, const std::array<float, 3>& n) {
-  const float along = n[0] * static_cast<float>(o.x) + n[1] * static_cast<float>(o.y) + n[2] * static_cast<float>(o.z);
-  return along > 0 ? o.squared - along * along : o.squared;
-}
+/// What neighbours say about one voxel, weighted.
+struct Sum {
+  float weight = 0;
+  Float4 total{};  ///< normal and distance
+  /// Who has said it, for the extra channels.
+  std::array<std::uint16_t, 27> from;
+  std::array<float, 27> share;
+  int count = 0;
 
-/// The offsets that a normal may reach, by the sixteenths its components lie in.
-class Reach {
- public:
-  Reach() {
-    for (int i = 0; i < 4096; ++i) {
-      std::array<float, 3> n{};
-      float squared = 0;
-      for (int k = 0; k < 3; ++k) {
-        n[k] = (static_cast<float>(i >> (4 * k) & 15) + 0.5F) / 8 - 1;
-        squared += n[k] * n[k];
-      }
-      for (float& c : n) c /= std::sqrt(squared);
-      // A component may differ by a sixteenth from the middle.
-      constexpr float kMargin = 0.3F;
-      for (std::uint32_t o = 0; o < 27; ++o)
-        if (o != kMiddle && sideways(kOffsets[o], n) < kSideways + kMargin) lists_[i] |= 1U << o;
-    }
-  }
-  [[nodiscard]] std::uint32_t of(const std::array<float, 3>& n) const {
-    int at = 0;
-    for (int k = 0; k < 3; ++k) at |= std::clamp(static_cast<int>((n[k] + 1) * 8), 0, 15) << (4 * k);
-    return lists_[at];
-  }
-
- private:
-  std::array<std::uint32_t, 4096> lists_{};
-};
-
-const Reach& reach() {
-  static const Reach table;
-  return table;
-}
-
-/// Weighted sums at the voxels of a brick.
-struct Sums {
-  std::array<float, 512> weight, distance;
-  std::array<std::array<float, 512>, 3> normal;
-  std::vector<float> extra;
-
-  void clear(int at, std::size_t channels) {
-    weight[at] = distance[at] = 0;
-    for (auto& n : normal) n[at] = 0;
-    extra.resize(std::max(extra.size(), 512 * channels));
-    for (std::size_t c = 0; c < channels; ++c) extra[c * 512 + at] = 0;
-  }
-  void add(int at, float w, float d, const std::array<float, 3>& n, const Brick& from, int from_at,
-           std::size_t channels) {
-    weight[at] += w;
-    distance[at] += w * d;
-    for (std::size_t k = 0; k < 3; ++k) normal[k][at] += w * n[k];
-    for (std::size_t c = 0; c < channels; ++c) extra[c * 512 + at] += w * from.extra[c * 512 + from_at];
+  void add(float w, const Float4& plane, int place) {
+    weight += w;
+    total += w * plane;
+    from[static_cast<std::size_t>(count)] = static_cast<std::uint16_t>(place);
+    share[static_cast<std::size_t>(count)] = w;
+    count += w > 0;
   }
   /// False where neighbours of two sheets that face each other say nothing together.
-  bool store(int at, float least, std::size_t channels, Brick& to) const {
-    const float squared = normal[0][at] * normal[0][at] + normal[1][at] * normal[1][at] + normal[2][at] * normal[2][at];
-    if (!(squared > least * least * weight[at] * weight[at])) return false;
-    const float inverse = 1 / weight[at], unit = Brick::kUnit / std::sqrt(squared);
-    to.distance[at] = distance[at] * inverse;
-    for (std::size_t k = 0; k < 3; ++k) to.normal[k][at] = static_cast<std::int16_t>(std::lrint(normal[k][at] * unit));
-    for (std::size_t c = 0; c < channels; ++c) to.extra[c * 512 + at] = extra[c * 512 + at] * inverse;
+  bool store(int at, float least, std::size_t channels, const Around& around, Brick& to) const {
+    const float squared = total[0] * total[0] + total[1] * total[1] + total[2] * total[2];
+    if (!(squared > least * least * weight * weight)) return false;
+    const float inverse = 1 / weight, unit = Brick::kUnit / std::sqrt(squared);
+    to.distance[at] = total[3] * inverse;
+    for (std::size_t k = 0; k < 3; ++k) to.normal[k][at] = packed_normal(total[static_cast<int>(k)] * unit);
+    for (std::size_t c = 0; c < channels; ++c) {
+      float extra = 0;
+      for (int i = 0; i < count; ++i) {
+        const Source& s = kSources[from[i]];
+        extra += share[i] * around[s.brick]->extra[c * 512 + s.offset];
+      }
+      to.extra[c * 512 + at] = extra * inverse;
+    }
     return true;
   }
 };
 
-bits::Neighbourhood masks(const Around& around, int round) {
-  bits::Neighbourhood n{};
-  for (int i = 0; i < 27; ++i) n[i / 9][i / 3 % 3][i % 3] = around[i] == nullptr ? nullptr : &around[i]->known[round];
-  return n;
-}
+/// One bit for each of the voxels around a brick: a row of ten along x.
+using Rows = std::array<std::uint32_t, kPlane>;  // [z + 1][y + 1], bit x + 1
 
-/// One step of one brick: from the voxels that are known, in a fixed order, to those beside them that are not.
+/// One step of one brick: from the voxels that the step before made known, in a fixed order, to those beside them that
+/// are not. What older voxels reach is known already, but for places between two sheets that face each other.
 class Step {
  public:
-  Step(const Around& around, int round, int begin, int end, const BandSettings& settings, Sums& sums)
+  Step(const Around& around, int round, int begin, int end, const BandSettings& settings, float farthest)
       : around_(around),
         round_(round),
         begin_(begin),
         end_(end),
         channels_(settings.channels.size()),
-        farthest_(static_cast<float>(settings.band) - 0.25F),
-        sums_(sums) {}
+        farthest_(farthest) {}
 
   void run(Brick& brick) {
-    const bits::Neighbourhood before = masks(around_, round_ - 1);
-    bool any = false;
-    for (int z = begin_; z < end_; ++z) {
-      wanted_.words[z] = bits::dilate_layer(before, z, -1, 1) & ~brick.known[round_ - 1].words[z];
-      any = any || wanted_.words[z] != 0;
-      for (std::uint64_t w = wanted_.words[z]; w != 0; w &= w - 1) sums_.clear(z * 64 + std::countr_zero(w), channels_);
-      brick.known[round_].words[z] = brick.known[round_ - 1].words[z];
-    }
-    if (!any) return;
-    for (int z = begin_; z < end_; ++z)
-      for (int y = 0; y < 8; ++y)
-        rows_[z + 2][y + 2] = static_cast<std::uint32_t>(wanted_.words[z] >> (8 * y) & 0xFF) << 2;
+    for (int z = begin_; z < end_; ++z) brick.known[round_].words[z] = brick.known[round_ - 1].words[z];
+    std::array<std::uint64_t, 8> wanted{};
+    bits::Neighbourhood fresh{};
+    std::uint64_t any = 0;
     for (int i = 0; i < 27; ++i)
-      if (around_[i] != nullptr) push_from(*around_[i], i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+      if (around_[i] != nullptr) fresh[i / 9][i / 3 % 3][i % 3] = &around_[i]->source[round_ - 1];
+    bits::dilate_layers<-1, 1>(fresh, begin_, end_, wanted.data() + begin_);
+    std::uint64_t doubtful = 0;
     for (int z = begin_; z < end_; ++z) {
-      for (std::uint64_t w = wanted_.words[z]; w != 0; w &= w - 1) {
-        const int at = z * 64 + std::countr_zero(w);
-        const bool reached = sums_.weight[at] > 0 && sums_.store(at, 0.5F, channels_, brick);
-        if (reached || (round_ == 1 && brick.repaired.test(at) && repair(at, brick)))
-          brick.known[round_].words[z] |= w & (~w + 1);
+      wanted[z] &= ~brick.known[round_ - 1].words[z];
+      any |= wanted[z];
+      doubtful |= wanted[z] & brick.contested.words[z];
+    }
+    if (any != 0) {
+      rows_ = rows_of(round_ - 1);
+      read_planes(rows_);
+      for (int r = 0; doubtful != 0 && r < round_ - 1; ++r) {
+        const Rows older = rows_of(r);
+        read_planes(older);
+        for (std::size_t i = 0; i < older.size(); ++i) older_[i] |= older[i];
+      }
+      for (int z = begin_; z < end_; ++z) {
+        for (std::uint64_t w = wanted[z]; w != 0; w &= w - 1) grow(z * 64 + std::countr_zero(w), brick);
       }
     }
+    if (round_ == 1) repair_gaps(brick);
   }
 
  private:
-  /// Whether any voxel wanted lies next to the neighbour in that direction.
-  [[nodiscard]] bool touches(int dx, int dy) const {
-    std::uint64_t w = ~std::uint64_t{0};
-    if (dx != 0) w &= dx < 0 ? 0x0101010101010101ULL : 0x8080808080808080ULL;
-    if (dy != 0) w &= dy < 0 ? 0x00000000000000FFULL : 0xFF00000000000000ULL;
-    for (int z = begin_; z < end_; ++z)
-      if ((wanted_.words[z] & w) != 0) return true;
-    return false;
+  [[nodiscard]] Rows rows_of(int round) const {
+    Rows rows{};
+    for (int i = 0; i < 27; ++i) {
+      if (around_[i] == nullptr) continue;
+      const BlockMask& source = around_[i]->source[round];
+      const int dx = i % 3 - 1, dy = i / 3 % 3 - 1, dz = i / 9 - 1;
+      const int y_begin = dy < 0 ? 7 : 0, y_end = dy > 0 ? 1 : 8;
+      for (int z = std::max(begin_ - 1, dz * 8); z < std::min(end_ + 1, dz * 8 + 8); ++z) {
+        const std::uint64_t w = source.words[z & 7];
+        if (w == 0) continue;
+        for (int y = y_begin; y < y_end; ++y) {
+          const auto row = static_cast<std::uint32_t>(w >> (8 * y) & 0xFF);
+          rows[static_cast<std::size_t>((z + 1) * kSide + y + 8 * dy + 1)] |=
+              dx == 0 ? row << 1 : (dx < 0 ? row >> 7 : (row & 1) << 9);
+        }
+      }
+    }
+    return rows;
   }
 
-  void push_from(const Brick& from, int dx, int dy, int dz) {
-    if (!touches(dx, dy)) return;
-    bits::Neighbourhood wanted{};
-    wanted[1 - dz][1 - dy][1 - dx] = &wanted_;
-    for (int z = std::max(begin_ - 1, dz * 8); z < std::min(end_ + 1, dz * 8 + 8); ++z) {
-      const int own_z = z - dz * 8;
-      std::uint64_t w = from.known[round_ - 1].words[own_z];
-      if (dx < 0) w &= 0x8080808080808080ULL;
-      if (dx > 0) w &= 0x0101010101010101ULL;
-      if (dy < 0) w &= 0xFF00000000000000ULL;
-      if (dy > 0) w &= 0x00000000000000FFULL;
-      if (w != 0) w &= bits::dilate_layer(wanted, own_z, -1, 1);
-      for (; w != 0; w &= w - 1) {
-        const int bit = std::countr_zero(w);
-        push(from, own_z * 64 + bit, (bit & 7) + dx * 8, (bit >> 3) + dy * 8, z);
+  /// Neighbouring voxels ask for the same planes: they are unpacked once.
+  void read_planes(const Rows& rows) {
+    constexpr float kScale = 1 / Brick::kUnit;
+    for (int r = begin_ * kSide; r < (end_ + 2) * kSide; ++r) {
+      for (std::uint32_t row = rows[static_cast<std::size_t>(r)]; row != 0; row &= row - 1) {
+        const auto place = static_cast<std::size_t>(r * kSide + std::countr_zero(row));
+        const Source& s = kSources[place];
+        const Brick& from = *around_[s.brick];
+        planes_[place] = Float4{static_cast<float>(from.normal[0][s.offset]) * kScale,
+                                static_cast<float>(from.normal[1][s.offset]) * kScale,
+                                static_cast<float>(from.normal[2][s.offset]) * kScale, from.distance[s.offset]};
       }
     }
   }
 
-  /// The offsets from a voxel, of this brick or beside it, that lead to voxels wanted.
-  [[nodiscard]] std::uint32_t wanted_beside(int x, int y, int z) const {
+  [[nodiscard]] static std::uint32_t beside(const Rows& rows, int x, int y, int z) {
     std::uint32_t out = 0;
-    for (int i = 0; i < 9; ++i) {
-      const std::uint32_t row = rows_[z + 1 + i / 3][y + 1 + i % 3];
-      out |= (row >> (x + 1) & 7U) << (3 * i);
-    }
+    for (int i = 0; i < 9; ++i)
+      out |= (rows[static_cast<std::size_t>((z + i / 3) * kSide + y + i % 3)] >> x & 7U) << (3 * i);
     return out;
   }
 
   /// Away from the surface only: what lies towards it is a hole in the data, not a part of the band.
-  void push(const Brick& from, int from_at, int x, int y, int z) {
-    const float d = from.distance[from_at];
-    if (!(std::abs(d) < farthest_)) return;
-    const std::uint32_t beside = wanted_beside(x, y, z);
-    if (beside == 0) return;
-    const float side = d < 0 ? -1.0F : 1.0F;
-    const std::array<float, 3> n{from.normal_at(0, from_at), from.normal_at(1, from_at), from.normal_at(2, from_at)};
-    const std::array<float, 3> away{side * n[0], side * n[1], side * n[2]};
-    for (std::uint32_t list = reach().of(away) & beside; list != 0; list &= list - 1) {
-      const Offset& o = kOffsets[static_cast<std::size_t>(std::countr_zero(list))];
-      const float off = sideways(o, away);
-      if (!(off < kSideways)) continue;
-      const int at = BlockMask::offset(x + o.x, y + o.y, z + o.z);
-      const float along = side * std::sqrt(o.squared - off);
-      const float w = (kSideways - off) * (kSideways - off);
-      sums_.add(at, w * w, d + along, n, from, from_at, channels_);
+  void grow(int at, Brick& brick) {
+    const int x = at & 7, y = at >> 3 & 7, z = at >> 6;
+    std::uint32_t list = beside(rows_, x, y, z);
+    if (brick.contested.test(at)) list |= beside(older_, x, y, z);
+    const int here = padded(x, y, z);
+    Sum sum;
+    for (; list != 0; list &= list - 1) {
+      const Way& way = kWays[static_cast<std::size_t>(std::countr_zero(list))];
+      const int place = here + way.step;
+      const Float4 plane = planes_[static_cast<std::size_t>(place)];
+      const Float4 product = plane * way.back;
+      const float up = product[0] + product[1] + product[2];
+      // Most neighbours have no say, and which do is hard to foresee: no branches.
+      const float near = kSideways - way.squared + up * up;
+      const float w = (up * plane[3] > 0 || (plane[3] == 0 && up > 0)) & (near > 0) ? near * near : 0.0F;
+      sum.add(w * w, plane + Float4{0, 0, 0, up}, place);
+    }
+    if (!(sum.weight > 0)) return;
+    if (sum.store(at, 0.5F, channels_, around_, brick)) {
+      know(at, brick);
+    } else {
+      brick.contested.set(at);
+    }
+  }
+
+  void know(int at, Brick& brick) const {
+    brick.known[round_].set(at);
+    if (std::abs(brick.distance[at]) < farthest_) brick.source[round_].set(at);
+  }
+
+  void repair_gaps(Brick& brick) {
+    for (int z = begin_; z < end_; ++z) {
+      for (std::uint64_t w = brick.repaired.words[z] & ~brick.known[1].words[z]; w != 0; w &= w - 1) {
+        const int at = z * 64 + std::countr_zero(w);
+        if (repair(at, brick)) know(at, brick);
+      }
     }
   }
 
   /// A gap between samples that extraction bridges. As corner_value() does it: the mean of all neighbours' planes,
   /// weights 1 / m^2.
-  bool repair(int at, Brick& brick) {
-    sums_.clear(at, channels_);
+  bool repair(int at, Brick& brick) const {
+    const int here = padded(at & 7, at >> 3 & 7, at >> 6);
+    Sum sum;
     for (const Offset& o : kOffsets) {
       if (o.squared == 0) continue;
-      const int x = (at & 7) + o.x, y = (at >> 3 & 7) + o.y, z = (at >> 6) + o.z;
-      const Brick* from = around_[(x >> 3) + 1 + 3 * ((y >> 3) + 1) + 9 * ((z >> 3) + 1)];
-      const int from_at = BlockMask::offset(x & 7, y & 7, z & 7);
-      if (from == nullptr || !from->known[0].test(from_at)) continue;
-      const std::array<float, 3> n{from->normal_at(0, from_at), from->normal_at(1, from_at),
-                                   from->normal_at(2, from_at)};
+      const int place = here + o.x + kSide * o.y + kPlane * o.z;
+      const Source& s = kSources[static_cast<std::size_t>(place)];
+      const Brick* from = around_[s.brick];
+      if (from == nullptr || !from->known[0].test(s.offset)) continue;
+      const std::array<float, 3> n{from->normal_at(0, s.offset), from->normal_at(1, s.offset),
+                                   from->normal_at(2, s.offset)};
       const float along =
           -(n[0] * static_cast<float>(o.x) + n[1] * static_cast<float>(o.y) + n[2] * static_cast<float>(o.z));
-      sums_.add(at, 1 / (o.squared * o.squared), from->distance[from_at] + along, n, *from, from_at, channels_);
+      sum.add(1 / (o.squared * o.squared), Float4{n[0], n[1], n[2], from->distance[s.offset] + along}, place);
     }
-    return sums_.weight[at] > 0 && std::abs(sums_.distance[at]) <= kRepaired * sums_.weight[at] &&
-           sums_.store(at, 1e-6F, channels_, brick);
+    return sum.weight > 0 && std::abs(sum.total[3]) <= kRepaired * sum.weight &&
+           sum.store(at, 1e-6F, channels_, around_, brick);
   }
 
   const Around& around_;
   int round_, begin_, end_;
   std::size_t channels_;
-  float farthest_;  ///< a step along the normal, half a voxel at least, leads out of the band from here
-  Sums& sums_;
-  BlockMask wanted_;
-  std::array<std::array<std::uint32_t, 12>, 12> rows_{};  ///< of wanted_, [z + 2][y + 2], bit x + 2
+  float farthest_;
+  Rows rows_{}, older_{};
+  std::array<Float4, kVoxels> planes_;  ///< written where a row has a bit
 };
 
 }  // namespace
@@ -253,12 +284,11 @@ void Band::grow(int round, std::int32_t begin, std::int32_t end) {
       jobs.push_back({brick.get(), std::max(0, begin - bz * 8), std::min(8, end - bz * 8)});
   }
   tbb::parallel_for(std::size_t{0}, jobs.size(), [&](std::size_t j) {
-    static thread_local Sums sums;
     const Job& job = jobs[j];
     const Block& b = job.brick->block;
     Around around;
     for (int i = 0; i < 27; ++i) around[i] = find({b.x + i % 3 - 1, b.y + i / 3 % 3 - 1, b.z + i / 9 - 1});
-    Step(around, round, job.begin, job.end, settings_, sums).run(*job.brick);
+    Step(around, round, job.begin, job.end, settings_, farthest_).run(*job.brick);
   });
 }
 
