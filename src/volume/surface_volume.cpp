@@ -152,8 +152,7 @@ void SurfaceVolume::Impl::emit(LevelGrid& level, bool end) {
     files.back()->finish();
     begin_file();
   }
-  const auto background = static_cast<float>(level.frame.voxel * settings.band);
-  const LeafMaker make{level.band, level.frame, extras, frame.rotation, background, half};
+  const LeafMaker make(level.band, level.frame, extras, frame.rotation, half);
   std::vector<BrickLeaves> leaves(bricks.size());
   tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t i) { leaves[i] = make(*bricks[i]); });
   for (const BrickLeaves& b : leaves) {
