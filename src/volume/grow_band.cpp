@@ -31,29 +31,56 @@ constexpr std::array<Offset, 27> make_offsets() {
 }
 constexpr std::array<Offset, 27> kOffsets = make_offsets();
 
+/// A voxel reaches another as far as the way to it leads along its normal: squared sideways distance below this. The
+/// best of 26 directions is off by 0.35 at most; a whole voxel sideways would let the band grow over a rim.
+constexpr float kSideways = 0.75F;
+/// Repaired corners count within this distance of the surface, voxels.
+constexpr float kRepaired = 1;
+
+/// The offsets that a normal may reach, by the sixteenths its components lie in.
+class Reach {
+ public:
+  Reach() {
+    for (int i = 0; i < 4096; ++i) {
+      std::array<float, 3> n{};
+      float squared = 0;
+      for (int k = 0; k < 3; ++k) {
+        n[k] = (static_cast<float>(i >> (4 * k) & 15) + 0.5F) / 8 - 1;
+        squared += n[k] * n[k];
+      }
+      for (float& c : n) c /= std::sqrt(squared);
+      // A component may differ by a sixteenth from the middle.
+      constexpr float kMargin = 0.3F;
+      for (std::uint32_t o = 0; o < 27; ++o) {
+        const Offset& to = kOffsets[o];
+        const float along =
+            n[0] * static_cast<float>(to.x) + n[1] * static_cast<float>(to.y) + n[2] * static_cast<float>(to.z);
+        const float off = along > 0 ? to.squared - along * along : to.squared;
+        if (to.squared > 0 && off < kSideways + kMargin) lists_[i] |= 1U << o;
+      }
+    }
+  }
+  /// Of a brick's normal, or the one against it.
+  [[nodiscard]] std::uint32_t of(int x, int y, int z, bool against) const {
+    const int turn = against ? -1 : 0;
+    const auto sixteenth = [turn](int n) { return ((n ^ turn) + 0x8000) >> 12; };
+    return lists_[static_cast<std::size_t>(sixteenth(x) | sixteenth(y) << 4 | sixteenth(z) << 8)];
+  }
+
+ private:
+  std::array<std::uint32_t, 4096> lists_{};
+};
+
+const Reach& reach() {
+  static const Reach table;
+  return table;
+}
+
 /// A brick and a voxel's layer around it: ten voxels a side, the brick's begin at 1.
 constexpr int kSide = 10, kPlane = kSide * kSide, kVoxels = kPlane * kSide;
 constexpr int padded(int x, int y, int z) {
   return x + 1 + kSide * (y + 1) + kPlane * (z + 1);
 }
-
-/// From a voxel to its neighbour, and the vector back.
-struct Way {
-  Float4 back;
-  float squared;
-  int step;
-};
-constexpr std::array<Way, 27> make_ways() {
-  std::array<Way, 27> out{};
-  for (std::size_t i = 0; i < 27; ++i) {
-    const Offset& o = kOffsets[i];
-    out[i].back = Float4{static_cast<float>(-o.x), static_cast<float>(-o.y), static_cast<float>(-o.z), 0};
-    out[i].squared = o.squared;
-    out[i].step = o.x + kSide * o.y + kPlane * o.z;
-  }
-  return out;
-}
-constexpr std::array<Way, 27> kWays = make_ways();
 
 /// Where the voxels lie in the bricks around.
 struct Source {
@@ -72,43 +99,32 @@ constexpr std::array<Source, kVoxels> make_sources() {
 }
 constexpr std::array<Source, kVoxels> kSources = make_sources();
 
-/// A voxel reaches another as far as the way to it leads along its normal: squared sideways distance below this. The
-/// best of 26 directions is off by 0.35 at most; a whole voxel sideways would let the band grow over a rim.
-constexpr float kSideways = 0.75F;
-/// Repaired corners count within this distance of the surface, voxels.
-constexpr float kRepaired = 1;
+/// Weighted sums at the voxels of a brick.
+struct Sums {
+  std::array<float, 512> weight;
+  std::array<Float4, 512> total;  ///< normal and distance
+  std::vector<float> extra;
 
-/// What neighbours say about one voxel, weighted.
-struct Sum {
-  float weight = 0;
-  Float4 total{};  ///< normal and distance
-  /// Who has said it, for the extra channels.
-  std::array<std::uint16_t, 27> from;
-  std::array<float, 27> share;
-  int count = 0;
-
-  void add(float w, const Float4& plane, int place) {
-    weight += w;
-    total += w * plane;
-    from[static_cast<std::size_t>(count)] = static_cast<std::uint16_t>(place);
-    share[static_cast<std::size_t>(count)] = w;
-    count += w > 0;
+  void clear(int at, std::size_t channels) {
+    weight[at] = 0;
+    total[at] = Float4{};
+    extra.resize(std::max(extra.size(), 512 * channels));
+    for (std::size_t c = 0; c < channels; ++c) extra[c * 512 + at] = 0;
+  }
+  void add(int at, float w, const Float4& plane, const Brick& from, int from_at, std::size_t channels) {
+    weight[at] += w;
+    total[at] += w * plane;
+    for (std::size_t c = 0; c < channels; ++c) extra[c * 512 + at] += w * from.extra[c * 512 + from_at];
   }
   /// False where neighbours of two sheets that face each other say nothing together.
-  bool store(int at, float least, std::size_t channels, const Around& around, Brick& to) const {
-    const float squared = total[0] * total[0] + total[1] * total[1] + total[2] * total[2];
-    if (!(squared > least * least * weight * weight)) return false;
-    const float inverse = 1 / weight, unit = Brick::kUnit / std::sqrt(squared);
-    to.distance[at] = total[3] * inverse;
-    for (std::size_t k = 0; k < 3; ++k) to.normal[k][at] = packed_normal(total[static_cast<int>(k)] * unit);
-    for (std::size_t c = 0; c < channels; ++c) {
-      float extra = 0;
-      for (int i = 0; i < count; ++i) {
-        const Source& s = kSources[from[i]];
-        extra += share[i] * around[s.brick]->extra[c * 512 + s.offset];
-      }
-      to.extra[c * 512 + at] = extra * inverse;
-    }
+  bool store(int at, float least, std::size_t channels, Brick& to) const {
+    const Float4 t = total[at], squares = t * t;
+    const float squared = squares[0] + squares[1] + squares[2];
+    if (!(squared > least * least * weight[at] * weight[at])) return false;
+    const float inverse = 1 / weight[at], unit = Brick::kUnit / std::sqrt(squared);
+    to.distance[at] = t[3] * inverse;
+    for (int k = 0; k < 3; ++k) to.normal[k][at] = packed_normal(t[k] * unit);
+    for (std::size_t c = 0; c < channels; ++c) to.extra[c * 512 + at] = extra[c * 512 + at] * inverse;
     return true;
   }
 };
@@ -120,44 +136,49 @@ using Rows = std::array<std::uint32_t, kPlane>;  // [z + 1][y + 1], bit x + 1
 /// are not. What older voxels reach is known already, but for places between two sheets that face each other.
 class Step {
  public:
-  Step(const Around& around, int round, int begin, int end, const BandSettings& settings, float farthest)
+  Step(const Around& around, int round, int begin, int end, const BandSettings& settings, float farthest, Sums& sums)
       : around_(around),
         round_(round),
         begin_(begin),
         end_(end),
         channels_(settings.channels.size()),
-        farthest_(farthest) {}
+        farthest_(farthest),
+        sums_(sums) {}
 
   void run(Brick& brick) {
     for (int z = begin_; z < end_; ++z) brick.known[round_].words[z] = brick.known[round_ - 1].words[z];
-    std::array<std::uint64_t, 8> wanted{};
+    BlockMask wanted, contested;
     bits::Neighbourhood fresh{};
-    std::uint64_t any = 0;
     for (int i = 0; i < 27; ++i)
       if (around_[i] != nullptr) fresh[i / 9][i / 3 % 3][i % 3] = &around_[i]->source[round_ - 1];
-    bits::dilate_layers<-1, 1>(fresh, begin_, end_, wanted.data() + begin_);
-    std::uint64_t doubtful = 0;
+    bits::dilate_layers<-1, 1>(fresh, begin_, end_, wanted.words.data() + begin_);
     for (int z = begin_; z < end_; ++z) {
-      wanted[z] &= ~brick.known[round_ - 1].words[z];
-      any |= wanted[z];
-      doubtful |= wanted[z] & brick.contested.words[z];
+      wanted.words[z] &= ~brick.known[round_ - 1].words[z];
+      contested.words[z] = wanted.words[z] & brick.contested.words[z];
     }
-    if (any != 0) {
-      rows_ = rows_of(round_ - 1);
-      read_planes(rows_);
-      for (int r = 0; doubtful != 0 && r < round_ - 1; ++r) {
-        const Rows older = rows_of(r);
-        read_planes(older);
-        for (std::size_t i = 0; i < older.size(); ++i) older_[i] |= older[i];
-      }
-      for (int z = begin_; z < end_; ++z) {
-        for (std::uint64_t w = wanted[z]; w != 0; w &= w - 1) grow(z * 64 + std::countr_zero(w), brick);
-      }
+    if (wanted.any()) {
+      for_each(wanted, [&](int at) { sums_.clear(at, channels_); });
+      push(rows_of(round_ - 1), wanted);
+      for (int r = 0; contested.any() && r < round_ - 1; ++r) push(rows_of(r), contested);
+      for_each(wanted, [&](int at) {
+        if (!(sums_.weight[at] > 0)) return;
+        if (sums_.store(at, 0.5F, channels_, brick)) {
+          know(at, brick);
+        } else {
+          brick.contested.set(at);
+        }
+      });
     }
     if (round_ == 1) repair_gaps(brick);
   }
 
  private:
+  template <class Visit>
+  void for_each(const BlockMask& mask, const Visit& visit) const {
+    for (int z = begin_; z < end_; ++z)
+      for (std::uint64_t w = mask.words[z]; w != 0; w &= w - 1) visit(z * 64 + std::countr_zero(w));
+  }
+
   [[nodiscard]] Rows rows_of(int round) const {
     Rows rows{};
     for (int i = 0; i < 27; ++i) {
@@ -178,51 +199,54 @@ class Step {
     return rows;
   }
 
-  /// Neighbouring voxels ask for the same planes: they are unpacked once.
-  void read_planes(const Rows& rows) {
-    constexpr float kScale = 1 / Brick::kUnit;
-    for (int r = begin_ * kSide; r < (end_ + 2) * kSide; ++r) {
-      for (std::uint32_t row = rows[static_cast<std::size_t>(r)]; row != 0; row &= row - 1) {
-        const auto place = static_cast<std::size_t>(r * kSide + std::countr_zero(row));
-        const Source& s = kSources[place];
-        const Brick& from = *around_[s.brick];
-        planes_[place] = Float4{static_cast<float>(from.normal[0][s.offset]) * kScale,
-                                static_cast<float>(from.normal[1][s.offset]) * kScale,
-                                static_cast<float>(from.normal[2][s.offset]) * kScale, from.distance[s.offset]};
+  void push(const Rows& sources, const BlockMask& wanted) {
+    // With another layer around, so that every source has neighbours.
+    constexpr int kWide = 12;
+    std::array<std::uint32_t, kWide * kWide> rows{}, near{};
+    for (int z = begin_; z < end_; ++z)
+      for (int y = 0; y < 8; ++y)
+        rows[static_cast<std::size_t>((z + 2) * kWide + y + 2)] =
+            static_cast<std::uint32_t>(wanted.words[z] >> (8 * y) & 0xFF) << 2;
+    for (std::size_t i = begin_ * kWide + 2 * kWide; i < static_cast<std::size_t>((end_ + 2) * kWide); ++i) {
+      const std::uint32_t row = rows[i] | rows[i - 1] | (i + 1 < rows.size() ? rows[i + 1] : 0);
+      near[i] = row >> 1 | row | row << 1;
+    }
+    for (int z = begin_ - 1; z <= end_; ++z) {
+      for (int y = -1; y <= 8; ++y) {
+        const auto r = static_cast<std::size_t>((z + 1) * kSide + y + 1);
+        const auto at = static_cast<std::size_t>((z + 2) * kWide + y + 2);
+        std::uint32_t row = sources[r] & (near[at - kWide] | near[at] | near[at + kWide]) >> 1;
+        for (; row != 0; row &= row - 1) {
+          const int x = std::countr_zero(row) - 1;
+          std::uint32_t beside = 0;
+          for (std::size_t i = 0; i < 9; ++i)
+            beside |= (rows[at + kWide * (i / 3) + i % 3 - kWide - 1] >> (x + 1) & 7U) << (3 * i);
+          push_one(kSources[r * kSide + static_cast<std::size_t>(x + 1)], beside, x, y, z);
+        }
       }
     }
   }
 
-  [[nodiscard]] static std::uint32_t beside(const Rows& rows, int x, int y, int z) {
-    std::uint32_t out = 0;
-    for (int i = 0; i < 9; ++i)
-      out |= (rows[static_cast<std::size_t>((z + i / 3) * kSide + y + i % 3)] >> x & 7U) << (3 * i);
-    return out;
-  }
-
   /// Away from the surface only: what lies towards it is a hole in the data, not a part of the band.
-  void grow(int at, Brick& brick) {
-    const int x = at & 7, y = at >> 3 & 7, z = at >> 6;
-    std::uint32_t list = beside(rows_, x, y, z);
-    if (brick.contested.test(at)) list |= beside(older_, x, y, z);
-    const int here = padded(x, y, z);
-    Sum sum;
+  void push_one(const Source& source, std::uint32_t beside, int x, int y, int z) {
+    const Brick& from = *around_[source.brick];
+    const int nx = from.normal[0][source.offset], ny = from.normal[1][source.offset],
+              nz = from.normal[2][source.offset];
+    const float d = from.distance[source.offset];
+    std::uint32_t list = beside & reach().of(nx, ny, nz, d < 0);
+    if (list == 0) return;
+    constexpr float kScale = 1 / Brick::kUnit;
+    const Float4 plane{static_cast<float>(nx) * kScale, static_cast<float>(ny) * kScale,
+                       static_cast<float>(nz) * kScale, d};
+    const int here = BlockMask::offset(x, y, z);
     for (; list != 0; list &= list - 1) {
-      const Way& way = kWays[static_cast<std::size_t>(std::countr_zero(list))];
-      const int place = here + way.step;
-      const Float4 plane = planes_[static_cast<std::size_t>(place)];
-      const Float4 product = plane * way.back;
-      const float up = product[0] + product[1] + product[2];
-      // Most neighbours have no say, and which do is hard to foresee: no branches.
-      const float near = kSideways - way.squared + up * up;
-      const float w = (up * plane[3] > 0 || (plane[3] == 0 && up > 0)) & (near > 0) ? near * near : 0.0F;
-      sum.add(w * w, plane + Float4{0, 0, 0, up}, place);
-    }
-    if (!(sum.weight > 0)) return;
-    if (sum.store(at, 0.5F, channels_, around_, brick)) {
-      know(at, brick);
-    } else {
-      brick.contested.set(at);
+      const Offset& o = kOffsets[static_cast<std::size_t>(std::countr_zero(list))];
+      const float up =
+          plane[0] * static_cast<float>(o.x) + plane[1] * static_cast<float>(o.y) + plane[2] * static_cast<float>(o.z);
+      const float near = kSideways - o.squared + up * up;
+      if (!(near > 0) || (d < 0 ? up >= 0 : up <= 0)) continue;
+      const float w = near * near;
+      sums_.add(here + o.x + 8 * o.y + 64 * o.z, w * w, plane + Float4{0, 0, 0, up}, from, source.offset, channels_);
     }
   }
 
@@ -242,9 +266,9 @@ class Step {
 
   /// A gap between samples that extraction bridges. As corner_value() does it: the mean of all neighbours' planes,
   /// weights 1 / m^2.
-  bool repair(int at, Brick& brick) const {
+  bool repair(int at, Brick& brick) {
     const int here = padded(at & 7, at >> 3 & 7, at >> 6);
-    Sum sum;
+    sums_.clear(at, channels_);
     for (const Offset& o : kOffsets) {
       if (o.squared == 0) continue;
       const int place = here + o.x + kSide * o.y + kPlane * o.z;
@@ -255,18 +279,18 @@ class Step {
                                    from->normal_at(2, s.offset)};
       const float along =
           -(n[0] * static_cast<float>(o.x) + n[1] * static_cast<float>(o.y) + n[2] * static_cast<float>(o.z));
-      sum.add(1 / (o.squared * o.squared), Float4{n[0], n[1], n[2], from->distance[s.offset] + along}, place);
+      sums_.add(at, 1 / (o.squared * o.squared), Float4{n[0], n[1], n[2], from->distance[s.offset] + along}, *from,
+                s.offset, channels_);
     }
-    return sum.weight > 0 && std::abs(sum.total[3]) <= kRepaired * sum.weight &&
-           sum.store(at, 1e-6F, channels_, around_, brick);
+    return sums_.weight[at] > 0 && std::abs(sums_.total[at][3]) <= kRepaired * sums_.weight[at] &&
+           sums_.store(at, 1e-6F, channels_, brick);
   }
 
   const Around& around_;
   int round_, begin_, end_;
   std::size_t channels_;
   float farthest_;
-  Rows rows_{}, older_{};
-  std::array<Float4, kVoxels> planes_;  ///< written where a row has a bit
+  Sums& sums_;
 };
 
 }  // namespace
@@ -284,11 +308,12 @@ void Band::grow(int round, std::int32_t begin, std::int32_t end) {
       jobs.push_back({brick.get(), std::max(0, begin - bz * 8), std::min(8, end - bz * 8)});
   }
   tbb::parallel_for(std::size_t{0}, jobs.size(), [&](std::size_t j) {
+    static thread_local Sums sums;
     const Job& job = jobs[j];
     const Block& b = job.brick->block;
     Around around;
     for (int i = 0; i < 27; ++i) around[i] = find({b.x + i % 3 - 1, b.y + i / 3 % 3 - 1, b.z + i / 9 - 1});
-    Step(around, round, job.begin, job.end, settings_, farthest_).run(*job.brick);
+    Step(around, round, job.begin, job.end, settings_, farthest_, sums).run(*job.brick);
   });
 }
 
