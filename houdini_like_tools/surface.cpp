@@ -212,7 +212,7 @@ void add_surface(CLI::App& app) {
   const std::string lattice = "Octree";
   add_length(*tool, "--cell", s.cell, "largest leaf cell: a length, or times the smallest r or R around")
       ->group(lattice);
-  tool->add_option("--levels", s.levels, "octree levels; 0: as the radii ask, at least 3")
+  tool->add_option("--levels", s.levels, "octree levels; 0: as the radii ask, at least 4")
       ->capture_default_str()
       ->group(lattice);
 

@@ -38,7 +38,7 @@ struct SurfaceSettings {
   bool diffuse = false;  ///< project cell centres, then corners by their cells (paper, section 3.3)
   Length cell{0.9,
               Length::Unit::influence_radius};  ///< largest leaf cell a radius allows; leaves are half to all of it
-  int levels = 0;                               ///< octree levels, 1..12; 0: as the radii ask, at least 3
+  int levels = 0;                               ///< octree levels, 1..12; 0: as the radii ask, at least 4
   double boundary = 0;  ///< isovertices whose corners' projections lie farther than this from the average of
                         ///< their samples (in R) are rejected; 0: no limit
   ClusterMode cluster = ClusterMode::preserving;

@@ -13,8 +13,8 @@ struct Mark {
   bool sparse = false;   ///< the level's cells are so small that gaps between such samples span several
 };
 
-/// Notes the sample's home cell and nearest corner; all corners of the home cell where samples are sparse. Any order, several threads at once, slabs at will ahead of
-/// refine().
+/// Notes the sample's home cell and nearest corner; all corners of the home cell where samples are sparse. Any order,
+/// several threads at once, slabs at will ahead of refine().
 void mark_sample(Window& window, const Mark& mark);
 
 /// Fixes the octree of one slab: cells that samples reach, subdivision, taking part. Samples must be marked up to three

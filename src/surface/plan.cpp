@@ -16,7 +16,9 @@ constexpr std::uint64_t kSurveySamples = 1u << 18;  ///< samples whose radii are
 /// The size of most cells in units of the largest the median radius allows: with 0.64 the radii of an evenly sampled
 /// surface (which scatter by 0.75 to 1.25 around their median) all ask for the same level.
 constexpr double kMainCell = 0.7;
-constexpr int kLevelsAbove = 2;
+constexpr int kDefaultLevels = 4;
+/// Expected memory from which on slabs are made half as high where the main cells are the finest.
+constexpr std::uint64_t kRoomy = 256u << 20;
 constexpr int kMaxLevels = 12;
 constexpr std::int32_t kMinSteps = 64;  ///< fixed-point steps a finest cell must have for exact enough positions
 constexpr double kMaxCells = 1 << 20;   ///< finest cells from the origin, the limit of the lattice's keys
@@ -34,13 +36,12 @@ struct Levels {
   int count;
 };
 
-/// Main cells follow the median radius; levels are added below for the 1 % smallest and above for the 1 % largest, two at
-/// least: a slab, as high as the coarsest cells, then holds four layers of main cells, whose leaves hold eight.
+/// Main cells follow the median radius; levels are added below for the 1 % smallest and above for the 1 % largest.
 Levels choose_levels(const SurfaceSettings& s, double ratio, const RadiusSurvey& radii) {
   const double main = kMainCell * ratio * radii.median;
   const int finer = std::max(0, static_cast<int>(std::ceil(std::log2(main / (ratio * radii.low)) - 1e-9)));
   const int coarser = std::max(0, static_cast<int>(std::floor(std::log2(ratio * radii.high / main))));
-  const int count = s.levels > 0 ? s.levels : std::min(finer + std::max(coarser, kLevelsAbove) + 1, kMaxLevels);
+  const int count = s.levels > 0 ? s.levels : std::clamp(finer + coarser + 1, kDefaultLevels, kMaxLevels);
   return {std::ldexp(main, -std::min(finer, count - 1)), count};
 }
 
@@ -124,8 +125,10 @@ void check_settings(const SurfaceSettings& s) {
   require(s.dry_run || !s.output.empty(), "--output", "given");
 }
 
-Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabStore& store, const Extent& bounds,
-                      bool given_radii, std::size_t attributes) {
+namespace {
+
+Resolved plan_once(const SurfaceSettings& s, const Frame& frame, const SlabStore& store, const Extent& bounds,
+                   bool given_radii, std::size_t attributes) {
   RadiusSurvey survey = survey_radii(store, kSurveySamples, s.density);
   if (!given_radii) {
     for (float* r : {&survey.low, &survey.median, &survey.high}) *r *= static_cast<float>(s.radius_scale);
@@ -146,7 +149,7 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
   out.feed.max_radius = static_cast<float>(max_radius);
   if (s.cell.unit == Length::Unit::world) {
     // A fixed cell: one level in use, whatever the radii.
-    levels = {s.cell.value / frame.step, s.levels > 0 ? s.levels : kLevelsAbove + 1};
+    levels = {s.cell.value / frame.step, s.levels > 0 ? s.levels : kDefaultLevels};
     out.feed.fixed_cell = true;
     out.feed.cell_ratio = 1;
   } else {
@@ -167,7 +170,7 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
     // Detail finer than the lattice can address: the finest level ends there.
     const int skip = static_cast<int>(std::ceil(std::log2(smallest / levels.finest)));
     levels.finest = std::ldexp(levels.finest, skip);
-    levels.count = std::max(s.levels > 0 ? s.levels : kLevelsAbove + 1, levels.count - skip);
+    levels.count = std::max(s.levels > 0 ? s.levels : kDefaultLevels, levels.count - skip);
   }
   // A lattice much coarser than the cloud adds nothing and would overflow the fixed-point range.
   constexpr double kMaxSlab = 1 << 28;
@@ -204,6 +207,21 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
   plan.buckets = store.buckets();
   plan.memory_bytes = expected_memory(s, out, store, attributes);
   plan.disk_bytes = expected_disk(store, expected_face_bytes(s, out, survey, store.total()));
+  return out;
+}
+
+}  // namespace
+
+Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabStore& store, const Extent& bounds,
+                      bool given_radii, std::size_t attributes) {
+  Resolved out = plan_once(s, frame, store, bounds, given_radii, attributes);
+  // Where most cells are of the finest level, the coarsest of the default levels only makes slabs higher: faster on
+  // small clouds, but twice the memory.
+  if (s.levels == 0 && out.lattice.levels == kDefaultLevels && out.main_level == 0 && out.plan.memory_bytes > kRoomy) {
+    SurfaceSettings lower = s;
+    lower.levels = kDefaultLevels - 1;
+    return plan_once(lower, frame, store, bounds, given_radii, attributes);
+  }
   return out;
 }
 

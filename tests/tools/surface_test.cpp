@@ -264,7 +264,7 @@ TEST_F(SurfaceTool, ASignalCancelsAndCleansUp) {
   for (const char* signal : {"INT", "TERM"}) {
     const auto outcome = run_shell(
         quoted(LAMINA_PROGRAM) + " surface " + quoted(cloud_) + " -o " + quoted(mesh_) + " --tmp-dir " + quoted(tmp_) +
-        " --steps 4 --blend 2 --threads 1 & job=$!; sleep 0.6; kill -" + signal + " $job; wait $job");
+        " --cell 0.3R --threads 1 & job=$!; sleep 0.6; kill -" + signal + " $job; wait $job");
     EXPECT_EQ(outcome.code, 1) << outcome.err;
     EXPECT_THAT(outcome.err, HasSubstr("lamina: cancelled"));
     expect_nothing_left();
