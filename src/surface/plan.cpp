@@ -231,7 +231,10 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
   Resolved out = plan_once(s, frame, store, bounds, given_radii, attributes);
   // Where most cells are of the finest level, the coarsest of the default levels only makes slabs higher: faster on
   // small clouds, but twice the memory.
-  if (s.levels == 0 && out.lattice.levels == kDefaultLevels && out.main_level == 0 && out.plan.memory_bytes > kRoomy) {
+  SurfaceSettings bare = s;  // the mesh must not depend on whether there is a volume beside it
+  bare.volume.path.clear();
+  if (s.levels == 0 && out.lattice.levels == kDefaultLevels && out.main_level == 0 &&
+      expected_memory(bare, out, store, attributes) > kRoomy) {
     SurfaceSettings lower = s;
     lower.levels = kDefaultLevels - 1;
     return plan_once(lower, frame, store, bounds, given_radii, attributes);
