@@ -33,8 +33,12 @@ def cases(size, threads, large, data):
         add("model", f"{scan} {millions} M", cloud(scan, millions))
     for millions in (1, 4, 16) + ((100,) if large else ()):
         add("scale", f"bumpy sphere {millions} M", cloud("bumpy-sphere", millions))
+    # The goals that were set for the program are for H = 1.
+    add("goal", f"{scan} 4 M, H = 1", cloud(scan, 4), "--blend", "1")
+    add("goal", "bumpy sphere 16 M, H = 1", cloud("bumpy-sphere", 16), "--blend", "1")
+    add("goal", f"{scan} 4 M, H = 1, --steps 4", cloud(scan, 4), "--blend", "1", "--steps", "4")
     for blend in (1, 1.2, 2, 4, 8):
-        add("blend", f"--blend {blend}", middle, *option("--blend", blend, 1.2))
+        add("blend", f"--blend {blend}", cloud("bumpy-sphere", 10), *option("--blend", blend, 1.2))
     for steps in (1, 4):
         add("steps", f"--steps {steps}", middle, *option("--steps", steps, 1))
     for fit in ("sphere", "plane"):

@@ -42,9 +42,9 @@ struct PointVolume {
   std::vector<std::string> skipped;  ///< attributes of other types: text, matrices, groups, arrays
 };
 
-/// Reads the points grid called `grid`, or the file's first. `P` in any precision or compression; `N`; `pscale` or
+/// Reads the points grid called `name`, or the file's first. `P` in any precision or compression; `N`; `pscale` or
 /// `radius`; `quality` or `confidence`; `Cd` becomes red, green, blue (in the type it was written from, else float
 /// 0..1); other vectors V become V_x, V_y, V_z. Throws Error(unreadable) naming the file and what is wrong.
-PointVolume read_point_volume(const std::string& path, const std::string& grid = {});
+PointVolume read_point_volume(const std::string& path, const std::string& name = {});
 
 }  // namespace lamina

@@ -240,7 +240,7 @@ void judge(const Census& c, const PointSourceInfo& source, BadSamples bad, const
 
 Survey survey_input(PointSource& source, BadSamples bad, const RunContext& run) {
   require_samples(source.info());
-  const Survey survey = survey_of(look_at_all(source, run));
+  Survey survey = survey_of(look_at_all(source, run));
   judge(survey, source.info(), bad, run);
   return survey;
 }

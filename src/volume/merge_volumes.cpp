@@ -95,7 +95,7 @@ bool merge_as(const GridBase::Ptr& to, const GridBase::Ptr& from) {
 }
 
 GridBase::Ptr merge_grids(const std::vector<Source>& sources) {
-  const GridBase::Ptr first = sources[0].grid;
+  GridBase::Ptr first = sources[0].grid;
   const bool level_set = first->isType<FloatGrid>() && first->getGridClass() == GRID_LEVEL_SET;
   for (std::size_t i = 1; i < sources.size(); ++i) {
     const GridBase::Ptr& next = sources[i].grid;
