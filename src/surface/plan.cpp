@@ -82,6 +82,19 @@ std::uint64_t expected_disk(const SlabStore& store, std::uint64_t faces) {
   return std::min(all + faces, std::max(all, faces) + all / store.files());
 }
 
+/// Of --vdb, from samples per slab and cells of surface per sample. Bricks of 8^3 voxels wait until the band around
+/// them is grown, three layers of them; a brick for some 25 cells of surface. Of those written a record remains, and
+/// another while the tiles' signs are found.
+double expected_volume_memory(const SurfaceSettings& s, const Resolved& r, double per_slab, double cells,
+                              std::uint64_t samples, std::size_t attributes) {
+  if (s.volume.path.empty()) return 0;
+  constexpr double kCellsPerBrick = 25, kPlanes = 24, kBrick = 6.7e3, kRecords = 60, kBuffers = 4e6;
+  const double extra = attributes > 0 ? 3 * 2048.0 * static_cast<double>(s.volume.grids.size()) : 0;
+  const double per_plane = per_slab * cells / r.lattice.layers(r.main_level);
+  const double bricks = std::min(per_plane * kPlanes, static_cast<double>(samples) * cells) / kCellsPerBrick;
+  return bricks * (kBrick + extra) + static_cast<double>(samples) * cells / kCellsPerBrick * kRecords + kBuffers;
+}
+
 std::uint64_t expected_memory(const SurfaceSettings& s, const Resolved& r, const SlabStore& store,
                               std::size_t attributes) {
   // The densest slab, from the store's own counts.
@@ -105,7 +118,8 @@ std::uint64_t expected_memory(const SurfaceSettings& s, const Resolved& r, const
   constexpr double kProgram = 60e6;
   // What the model leaves out goes with the window, too: counting cells, clustering, bins, and the allocator's gaps.
   constexpr double kRest = 2.0;
-  return static_cast<std::uint64_t>(kProgram + cached + kRest * window);
+  const double volume = expected_volume_memory(s, r, per_slab, cells, store.total(), attributes);
+  return static_cast<std::uint64_t>(kProgram + cached + kRest * window + volume);
 }
 
 }  // namespace
@@ -217,7 +231,10 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
   Resolved out = plan_once(s, frame, store, bounds, given_radii, attributes);
   // Where most cells are of the finest level, the coarsest of the default levels only makes slabs higher: faster on
   // small clouds, but twice the memory.
-  if (s.levels == 0 && out.lattice.levels == kDefaultLevels && out.main_level == 0 && out.plan.memory_bytes > kRoomy) {
+  SurfaceSettings bare = s;  // the mesh must not depend on whether there is a volume beside it
+  bare.volume.path.clear();
+  if (s.levels == 0 && out.lattice.levels == kDefaultLevels && out.main_level == 0 &&
+      expected_memory(bare, out, store, attributes) > kRoomy) {
     SurfaceSettings lower = s;
     lower.levels = kDefaultLevels - 1;
     return plan_once(lower, frame, store, bounds, given_radii, attributes);
@@ -233,6 +250,7 @@ double expected_cpu_seconds(const SurfaceSettings& s, const Resolved& r, std::si
   constexpr double kAttribute = 45e-9;
   constexpr double kSums = 300e-9;
   constexpr double kCell = 1190e-9;
+  constexpr double kVoxels = 150e-9;     // --vdb: for each voxel of the band's half width and two more
   constexpr double kStep = 0.75;         // a further projection step against the first
   constexpr double kSupport = 1 / 0.63;  // influence radius of a main cell, cells
   const double influence = s.blend * r.plan.radius_median;
@@ -244,7 +262,8 @@ double expected_cpu_seconds(const SurfaceSettings& s, const Resolved& r, std::si
   const double reach = std::max(1.0, influence / main_cell / kSupport);
   const double cells = 0.25 * r.plan.radius_median * r.plan.radius_median / (main_cell * main_cell);
   const double sums = kSums * reach * reach * (1 + kStep * (s.steps - 1)) * (s.diffuse ? 2 : 1);
-  const double per_sample = kSample + kAttribute * static_cast<double>(attributes) + sums + kCell * cells;
+  const double volume = s.volume.path.empty() ? 0 : kVoxels * (2 + s.volume.band);
+  const double per_sample = kSample + kAttribute * static_cast<double>(attributes) + sums + (kCell + volume) * cells;
   return static_cast<double>(r.plan.samples) * per_sample;
 }
 

@@ -18,7 +18,7 @@ constexpr std::int32_t kBatch = 8;  ///< planes worth a round
 constexpr float kBeyond = 1;        ///< voxels outside of the band that tell the side of its neighbours
 
 std::int16_t packed(float n) {
-  return static_cast<std::int16_t>(std::lrint(std::clamp(n, -1.0F, 1.0F) * Brick::kUnit));
+  return packed_normal(std::clamp(n, -1.0F, 1.0F) * Brick::kUnit);
 }
 
 /// What a corner's value says in a channel of the window; attributes lie behind.
@@ -38,7 +38,8 @@ struct Band::Found {
   std::vector<float> extra;
 };
 
-Band::Band(BandSettings settings, const Lattice& lattice) : settings_(std::move(settings)), lattice_(lattice) {
+Band::Band(BandSettings settings, const Lattice& lattice)
+    : settings_(std::move(settings)), lattice_(lattice), farthest_(static_cast<float>(settings_.band) - 0.25F) {
   settings_.rounds = std::clamp(settings_.rounds, 0, kMaxRounds);
 }
 
@@ -111,6 +112,7 @@ void Band::collect_level(const Window& window, std::int32_t slab) {
             base + static_cast<std::uint32_t>(std::popcount(near & ((std::uint64_t{1} << bit) - 1)));
         const float d = values.channel(kDistance)[i] * per_voxel;
         brick->known[0].set(at);
+        if (std::abs(d) < farthest_) brick->source[0].set(at);
         brick->distance[at] = d;
         for (int k = 0; k < 3; ++k) brick->normal[k][at] = packed(values.channel(kNormalX + k)[i]);
         for (std::size_t c = 0; c < settings_.channels.size(); ++c)
@@ -125,6 +127,7 @@ void Band::put(const Found& f) {
   const int at = offset_in_block(f.at);
   if (brick.known[0].test(at)) return;
   brick.known[0].set(at);
+  if (std::abs(f.distance) < farthest_) brick.source[0].set(at);
   brick.distance[at] = f.distance;
   for (std::size_t k = 0; k < 3; ++k) brick.normal[k][at] = packed(f.normal[k]);
   for (std::size_t c = 0; c < f.extra.size(); ++c) brick.extra[c * 512 + at] = f.extra[c];

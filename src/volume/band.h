@@ -27,6 +27,10 @@ struct Brick {
   Block block;
   /// By round: the projected voxels first, the whole band last.
   std::array<BlockMask, kMaxRounds + 1> known;
+  /// By round: the voxels new in it that the band grows from.
+  std::array<BlockMask, kMaxRounds> source;
+  /// Voxels that the planes around disagree on.
+  BlockMask contested;
   /// Corners that extraction gives a value from their trusted neighbours.
   BlockMask repaired;
   std::array<float, 512> distance;
@@ -38,6 +42,11 @@ struct Brick {
     return static_cast<float>(normal[static_cast<std::size_t>(axis)][static_cast<std::size_t>(offset)]) / kUnit;
   }
 };
+
+/// A component of a unit vector, as bricks hold it.
+inline std::int16_t packed_normal(float times_unit) {
+  return static_cast<std::int16_t>(static_cast<std::int32_t>(times_unit + (times_unit < 0 ? -0.5F : 0.5F)));
+}
 
 class Band {
  public:
@@ -66,6 +75,7 @@ class Band {
 
   BandSettings settings_;
   Lattice lattice_;
+  float farthest_;  ///< a step along the normal, half a voxel at least, leads out of the band from here
   std::map<std::int32_t, Layer> layers_;             ///< by block z
   std::int32_t known_end_ = 0;                       ///< planes below are collected
   std::array<std::int32_t, kMaxRounds + 1> done_{};  ///< planes below have had the round

@@ -10,13 +10,11 @@
 #include "lamina/error.h"
 #include "lamina/volume_export.h"
 #include "volume/full_range.h"
+#include "volume/pack_leaf.h"
 #include "window/bits.h"
 
 namespace lamina::volume {
 namespace {
-
-using FloatLeaf = openvdb::FloatTree::LeafNodeType;
-using VectorLeaf = openvdb::Vec3STree::LeafNodeType;
 
 /// A voxel's layer beside: one step along every axis.
 BlockMask dilated(const BlockMask& m) {
@@ -31,22 +29,20 @@ BlockMask dilated(const BlockMask& m) {
 }
 
 /// Voxels nobody knows take the side of the nearest that somebody does, outside first.
-BlockMask inside_of(const Brick& brick, const BlockMask& known) {
-  BlockMask inside, outside;
-  for (int z = 0; z < 8; ++z) {
-    for (std::uint64_t w = known.words[z]; w != 0; w &= w - 1) {
-      const int at = z * 64 + std::countr_zero(w);
-      (brick.distance[at] < 0 ? inside : outside).set(at);
-    }
-  }
+BlockMask inside_of(const BlockMask& negative, const BlockMask& known) {
+  BlockMask inside = negative, outside;
+  for (int z = 0; z < 8; ++z) outside.words[z] = known.words[z] & ~negative.words[z];
   if (!inside.any()) return inside;
-  for (int step = 0; step < 24 && inside.count() + outside.count() < 512; ++step) {
+  for (int step = 0; step < 24; ++step) {
+    std::uint64_t rest = 0;
     const BlockMask more = dilated(outside), less = dilated(inside);
     for (int z = 0; z < 8; ++z) {
       const std::uint64_t free = ~(inside.words[z] | outside.words[z]);
       outside.words[z] |= more.words[z] & free;
       inside.words[z] |= less.words[z] & free & ~more.words[z];
+      rest |= free;
     }
+    if (rest == 0) break;
   }
   return inside;
 }
@@ -99,64 +95,89 @@ std::vector<ExtraGrid> resolve_grids(const std::vector<std::string>& names, cons
   return out;
 }
 
+LeafMaker::LeafMaker(const Band& b, const GridFrame& g, const std::vector<ExtraGrid>& e, const Eigen::Matrix3d& r,
+                     bool h)
+    : band(b), grid(g), extras(e), rotation(r), half(h) {
+  const std::array<int, 3> stride{64, 8, 1};
+  std::array<int, 3> of{};  // in the leaf, of each lattice axis
+  for (std::size_t k = 0; k < 3; ++k) of[k] = stride[static_cast<std::size_t>(grid.axis_of[k])];
+  for (int at = 0; at < 512; ++at)
+    place[static_cast<std::size_t>(at)] =
+        static_cast<std::uint16_t>((at & 7) * of[0] + (at >> 3 & 7) * of[1] + (at >> 6) * of[2]);
+}
+
 BrickLeaves LeafMaker::operator()(const Brick& brick) const {
   BrickLeaves out;
   const BlockMask& known = band.all(brick);
-  BlockMask active;
   const auto limit = static_cast<float>(band.settings().band);
+  BlockMask active, negative;
   for (int z = 0; z < 8; ++z) {
     for (std::uint64_t w = known.words[z]; w != 0; w &= w - 1) {
-      const int at = z * 64 + std::countr_zero(w);
-      if (std::abs(brick.distance[at]) < limit) active.set(at);
+      const int bit = std::countr_zero(w);
+      const float d = brick.distance[z * 64 + bit];
+      active.words[z] |= std::uint64_t{std::abs(d) < limit} << bit;
+      negative.words[z] |= std::uint64_t{d < 0} << bit;
     }
   }
   if (!active.any()) return out;
   out.any = true;
-  const BlockMask inside = inside_of(brick, known);
-  const openvdb::Coord origin = grid.index({brick.block.x * 8, brick.block.y * 8, brick.block.z * 8});
-  std::array<openvdb::Index, 512> place;  // of each voxel of the brick in the leaf
-  for (int at = 0; at < 512; ++at) place[at] = FloatLeaf::coordToOffset(grid.index({at & 7, at >> 3 & 7, at >> 6}));
-
-  const auto for_active = [&](const auto& visit) {
+  const auto in_leaf = [&](const BlockMask& of) {
+    BlockMask there;
     for (int z = 0; z < 8; ++z)
-      for (std::uint64_t w = active.words[z]; w != 0; w &= w - 1) visit(z * 64 + std::countr_zero(w));
+      for (std::uint64_t w = of.words[z]; w != 0; w &= w - 1) there.set(place[z * 64 + std::countr_zero(w)]);
+    return there;
   };
-  FloatLeaf leaf(origin, background);
-  const auto voxel = static_cast<float>(grid.voxel);
-  for (int at = 0; at < 512; ++at)
-    if (inside.test(at)) leaf.setValueOnly(place[at], -background);
-  for_active([&](int at) { leaf.setValueOn(place[at], brick.distance[at] * voxel); });
-  out.leaves.push_back(pack(leaf, background, half));
+  LeafMasks masks{in_leaf(active), in_leaf(inside_of(negative, known))};
+  // The active voxels of the brick in the leaf's order.
+  std::array<std::uint16_t, 512> at_place, order;
+  for (int z = 0; z < 8; ++z) {
+    for (std::uint64_t w = active.words[z]; w != 0; w &= w - 1) {
+      const int at = z * 64 + std::countr_zero(w);
+      at_place[place[at]] = static_cast<std::uint16_t>(at);
+    }
+  }
+  std::size_t count = 0;
+  for (int x = 0; x < 8; ++x) {
+    for (std::uint64_t w = masks.active.words[x]; w != 0; w &= w - 1)
+      order[count++] = at_place[x * 64 + std::countr_zero(w)];
+  }
 
+  const openvdb::Coord origin = grid.index({brick.block.x * 8, brick.block.y * 8, brick.block.z * 8});
+  std::array<float, 3 * 512> values;
+  const std::span<const float> scalars{values.data(), count}, vectors{values.data(), 3 * count};
+  const auto voxel = static_cast<float>(grid.voxel);
+  for (std::size_t i = 0; i < count; ++i) values[i] = brick.distance[order[i]] * voxel;
+  out.leaves.push_back(pack(origin, masks, scalars, 1, half));
+  out.leaves.back().faces = face_votes(masks.active, masks.inside);
+
+  masks.inside = {};
   for (const ExtraGrid& extra : extras) {
     const auto value = [&](std::size_t k, int at) {
       return extra.scale *
              brick.extra[static_cast<std::size_t>(extra.channels[k]) * 512 + static_cast<std::size_t>(at)];
     };
     if (extra.kind == ExtraGrid::Kind::scalar || extra.kind == ExtraGrid::Kind::weight) {
-      FloatLeaf scalars(origin, 0);
       const bool weight = extra.kind == ExtraGrid::Kind::weight;
-      // Extended beyond what was projected nothing speaks for a voxel but its neighbours.
-      for_active([&](int at) {
-        const float own = brick.known[0].test(at) ? std::max(0.0F, 1 - value(0, at)) : 0.0F;
-        scalars.setValueOn(place[at], weight ? own : value(0, at));
-      });
-      out.leaves.push_back(pack(scalars, 0, half));
+      for (std::size_t i = 0; i < count; ++i) {
+        // Extended beyond what was projected nothing speaks for a voxel but its neighbours.
+        const float own = brick.known[0].test(order[i]) ? std::max(0.0F, 1 - value(0, order[i])) : 0.0F;
+        values[i] = weight ? own : value(0, order[i]);
+      }
+      out.leaves.push_back(pack(origin, masks, scalars, 1, half));
       continue;
     }
-    VectorLeaf vectors(origin, openvdb::Vec3s(0));
-    for_active([&](int at) {
-      openvdb::Vec3s v;
+    for (std::size_t i = 0; i < count; ++i) {
+      const int at = order[i];
+      float* const v = &values[3 * i];
       if (extra.kind == ExtraGrid::Kind::vector) {
-        for (int k = 0; k < 3; ++k) v[k] = value(static_cast<std::size_t>(k), at);
+        for (std::size_t k = 0; k < 3; ++k) v[k] = value(k, at);
       } else {
         const Eigen::Vector3d n = rotation.transpose() * Eigen::Vector3d(brick.normal_at(0, at), brick.normal_at(1, at),
                                                                          brick.normal_at(2, at));
         for (int k = 0; k < 3; ++k) v[k] = static_cast<float>(n[k]);
       }
-      vectors.setValueOn(place[at], v);
-    });
-    out.leaves.push_back(pack(vectors, half));
+    }
+    out.leaves.push_back(pack(origin, masks, vectors, 3, half));
   }
   return out;
 }

@@ -33,12 +33,16 @@ struct BrickLeaves {
 };
 
 struct LeafMaker {
+  /// `rotation`: of the frame.
+  LeafMaker(const Band& band, const GridFrame& grid, const std::vector<ExtraGrid>& extras,
+            const Eigen::Matrix3d& rotation, bool half);
+
   const Band& band;
   const GridFrame& grid;
   const std::vector<ExtraGrid>& extras;
-  const Eigen::Matrix3d& rotation;  ///< of the frame
-  float background = 1;             ///< world units
+  const Eigen::Matrix3d& rotation;
   bool half = true;
+  std::array<std::uint16_t, 512> place;  ///< of each voxel of a brick in its leaf
 
   [[nodiscard]] BrickLeaves operator()(const Brick& brick) const;
 };

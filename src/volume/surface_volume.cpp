@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
 #include <cmath>
@@ -64,7 +66,9 @@ struct SurfaceVolume::Impl {
   std::vector<std::unique_ptr<StreamedVdb>> files;  ///< of a sequence; the last is being filled
   std::unique_ptr<CornerPoints> points;
   VolumeExportStats stats;
+  tbb::task_group tasks;  ///< grow the bands and pack leaves while the window goes on
 
+  ~Impl();
   Impl(const VolumeExport& s, const Frame& f, const Lattice& lattice, int main_level, const AttributeLayout& layout,
        const std::string& tmp);
   void add_level(const Lattice& lattice, int level, const std::string& name, const std::vector<int>& channels);
@@ -93,6 +97,14 @@ SurfaceVolume::Impl::Impl(const VolumeExport& s, const Frame& f, const Lattice& 
     add_level(lattice, level, "surface", channels);
   }
   begin_file();
+}
+
+SurfaceVolume::Impl::~Impl() {
+  tasks.cancel();
+  try {
+    tasks.wait();
+  } catch (...) {  // the caller has its own reason to leave
+  }
 }
 
 void SurfaceVolume::Impl::add_level(const Lattice& lattice, int level, const std::string& name,
@@ -140,8 +152,7 @@ void SurfaceVolume::Impl::emit(LevelGrid& level, bool end) {
     files.back()->finish();
     begin_file();
   }
-  const auto background = static_cast<float>(level.frame.voxel * settings.band);
-  const LeafMaker make{level.band, level.frame, extras, frame.rotation, background, half};
+  const LeafMaker make(level.band, level.frame, extras, frame.rotation, half);
   std::vector<BrickLeaves> leaves(bricks.size());
   tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t i) { leaves[i] = make(*bricks[i]); });
   for (const BrickLeaves& b : leaves) {
@@ -163,14 +174,21 @@ SurfaceVolume::SurfaceVolume(const VolumeExport& settings, const Frame& frame, c
 SurfaceVolume::~SurfaceVolume() = default;
 
 void SurfaceVolume::add(const Window& window, const IsoSlab& slab, std::int32_t number) {
-  for (LevelGrid& level : impl_->levels) {
-    level.band.collect(window, number);
-    impl_->emit(level, false);
-  }
+  impl_->tasks.wait();
+  for (LevelGrid& level : impl_->levels) level.band.collect(window, number);
   if (impl_->points != nullptr) impl_->points->add(slab);
+  const auto emit = [impl = impl_.get()] {
+    for (LevelGrid& level : impl->levels) impl->emit(level, false);
+  };
+  if (tbb::this_task_arena::max_concurrency() == 1) {
+    emit();
+  } else {
+    impl_->tasks.run(emit);
+  }
 }
 
 void SurfaceVolume::finish(bool open) {
+  impl_->tasks.wait();
   for (LevelGrid& level : impl_->levels) impl_->emit(level, true);
   VolumeExportStats& stats = impl_->stats;
   if (!impl_->files.empty()) {

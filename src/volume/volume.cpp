@@ -124,6 +124,17 @@ bool decide_sign(const VolumeSettings& s, std::uint64_t boundary_edges, const Ru
   return false;
 }
 
+/// Readers have checked theirs; a mesh built by hand may say anything.
+void check_indices(const TriangleMesh& mesh) {
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (const auto v : mesh.triangles[t]) {
+      if (static_cast<std::size_t>(v) < mesh.positions.size()) continue;
+      usage(
+          fmt::format("triangle {} names vertex {}, the mesh has {}; repair its indices", t, v, mesh.positions.size()));
+    }
+  }
+}
+
 VolumeStats convert(const TriangleMesh& mesh, const VolumeSettings& s, const std::string& path, const RunContext& run) {
   const Edges edges = look_at_edges(mesh);
   if (!(edges.mean_length > 0)) throw Error(ExitCode::empty, "the mesh has no area: all its vertices coincide");
@@ -166,6 +177,7 @@ VolumeStats write_volume(const TriangleMesh& mesh, const VolumeSettings& setting
     throw Error(ExitCode::unreadable, "the mesh has no triangles (a point cloud? reconstruct it first)");
   if (mesh.triangles.size() > 0x7FFFFFFFu / 3)
     throw Error(ExitCode::unreadable, "meshes of more than 715,827,882 triangles are not supported");
+  check_indices(mesh);
   VolumeStats stats;
   meshes::with_threads(run.threads, [&] { stats = convert(mesh, settings, path, run); });
   return stats;

@@ -111,6 +111,14 @@ TEST(SurfacePlan, MemoryGrowsWithTheWindowAndShrinksWithTheCells) {
   EXPECT_GT(memory(1, 1), memory(1, 4));
 }
 
+TEST(SurfacePlan, CountsTheVolume) {
+  const Cloud cloud = test::sphere_cloud(30000);
+  const auto memory = [&](const std::string& volume) {
+    return plan_of(cloud, [&](auto& s) { s.volume.path = volume; }).memory_bytes;
+  };
+  EXPECT_GT(memory("out.vdb"), memory("") + 1'000'000);
+}
+
 TEST(SurfacePlan, TimeGrowsWithSamplesStepsAndCells) {
   const auto seconds = [](std::size_t samples, const std::function<void(SurfaceSettings&)>& change) {
     SurfaceSettings s;
@@ -128,6 +136,14 @@ TEST(SurfacePlan, TimeGrowsWithSamplesStepsAndCells) {
   EXPECT_GT(once, 0);
   EXPECT_NEAR(seconds(3'000'000, as_it_is), 3 * once, 1e-9 * once);
   EXPECT_GT(seconds(1'000'000, [](auto& s) { s.steps = 4; }), 1.3 * once);
+  const auto volume = [](double band) {
+    return [band](auto& s) {
+      s.volume.path = "out.vdb";
+      s.volume.band = band;
+    };
+  };
+  EXPECT_GT(seconds(1'000'000, volume(3)), 1.1 * once);
+  EXPECT_GT(seconds(1'000'000, volume(6)), seconds(1'000'000, volume(3)));
   // Larger cells are fewer, and what a sample costs whatever the cells remains.
   const double coarse = seconds(1'000'000, [](auto& s) { s.blend = 4; });
   EXPECT_LT(coarse, 0.8 * once);

@@ -228,6 +228,9 @@ TEST_F(Volume, RefusesWhatCannotBeMeant) {
   TriangleMesh point = mesh;
   for (auto& p : point.positions) p = {1, 1, 1};
   EXPECT_EQ(code(point, {}, path_), ExitCode::empty);
+  TriangleMesh beyond = mesh;
+  beyond.triangles.back()[2] = static_cast<std::uint32_t>(mesh.positions.size());
+  EXPECT_EQ(code(beyond, {}, path_), ExitCode::usage);
   EXPECT_EQ(code(mesh, {}, folder_ / "no/such/out.vdb"), ExitCode::budget);
   run_.max_memory = 1 << 20;
   EXPECT_EQ(code(mesh, {.voxel = 0.005}, path_), ExitCode::budget);

@@ -1,0 +1,23 @@
+// A leaf's record in a .vdb file, made from masks and values without a leaf of OpenVDB's in between.
+#pragma once
+#include <cstdint>
+#include <span>
+
+#include "volume/streamed_vdb.h"
+#include "window/corner_block.h"
+
+namespace lamina::volume {
+
+/// Masks in the order of OpenVDB's leaves: word x, bit 8 y + z.
+struct LeafMasks {
+  BlockMask active;
+  BlockMask inside;  ///< of the voxels that are not active: minus the background; empty where that is 0
+};
+
+/// `values` of the active voxels in the mask's order, `width` (1 or 3) for each.
+PackedLeaf pack(const openvdb::Coord& origin, const LeafMasks& masks, std::span<const float> values, int width,
+                bool half);
+/// As face_votes() of the leaf; `negative`: active voxels inside, those that are not active where `inside` is set.
+std::array<std::int8_t, 6> face_votes(const BlockMask& active, const BlockMask& negative);
+
+}  // namespace lamina::volume
