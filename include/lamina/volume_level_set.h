@@ -24,12 +24,12 @@ class LevelSet {
   std::shared_ptr<const Data> data_;
 };
 
-/// Reads the level set called `grid`; with an empty name the one called `surface`, else the file's first. A float grid
+/// Reads the level set called `name`; with an empty name the one called `surface`, else the file's first. A float grid
 /// of no class counts when nothing better is there. Double grids are rounded to float. Rotated, sheared and
 /// non-uniform transforms are taken as they are.
 /// Throws Error(unreadable) naming the file and what is there: missing, truncated, not a .vdb, no grids, no grid of
 /// that name, a fog volume, points, vectors, a frustum (perspective) transform.
-LevelSet read_level_set(const std::string& path, const std::string& grid = {});
+LevelSet read_level_set(const std::string& path, const std::string& name = {});
 
 struct MeshingSettings {
   double adaptivity = 0;  ///< 0..1: how far flat parts may be simplified into larger polygons; 0: one size everywhere
