@@ -77,7 +77,11 @@ class BandSearch {
     if (open_ && !in_band(values_, at)) return {time, 0, false};
     return {time, Sampler::sample(values_, at), true};
   }
-  void setRange(double t0, double t1) { ray_.setTimes(t0, t1); }
+  void setRange(double t0, double t1) {
+    // OpenVDB takes no times of zero.
+    const double least = openvdb::math::Delta<double>::value();
+    ray_.setTimes(std::max(t0, least), std::max(t1, least));
+  }
   [[nodiscard]] const Ray& ray() const { return ray_; }
   template <typename NodeT>
   bool hasNode(const Coord& at) {
