@@ -7,14 +7,13 @@
 #include <utility>
 #include <vector>
 
+#include "feed/digit_sort.h"
 #include "lamina/floor_divide.h"
 
 namespace lamina {
 namespace {
 
 constexpr int kBlockShift = 3;  ///< a block is eight cells wide
-constexpr int kDigitBits = 11;
-constexpr std::size_t kDigits = std::size_t{1} << kDigitBits;
 
 /// A block's place in the bucket's box and the sample's number, the place in the high half.
 using Entry = std::uint64_t;
@@ -47,19 +46,6 @@ std::array<Axis, 3> box_of(const LocalSamples& s, const FloorDivider& cell, int&
   }
 }
 
-/// Stable: one pass per digit in use.
-void sort_entries(std::vector<Entry>& entries, std::vector<Entry>& other, std::uint64_t places) {
-  other.resize(entries.size());
-  for (int shift = 32; places > 1; shift += kDigitBits, places = (places - 1) / kDigits + 1) {
-    std::array<std::uint32_t, kDigits> begin{};
-    for (const Entry e : entries) ++begin[e >> shift & (kDigits - 1)];
-    std::uint32_t sum = 0;
-    for (auto& b : begin) sum += std::exchange(b, sum);
-    for (const Entry e : entries) other[begin[e >> shift & (kDigits - 1)]++] = e;
-    entries.swap(other);
-  }
-}
-
 template <class T>
 void permute(std::vector<T>& values, const std::vector<Entry>& order, std::vector<T>& scratch) {
   if (values.empty()) return;
@@ -88,7 +74,7 @@ void sort_by_block(LocalSamples& s, const Lattice& lattice, BlockOrderScratch& s
     sorted = sorted && (i == 0 || order[i - 1] <= order[i]);
   }
   if (sorted) return;
-  sort_entries(order, scratch.other, x.blocks * y.blocks * z.blocks);
+  digit_sort(order, scratch.other, x.blocks * y.blocks * z.blocks - 1, [](Entry e) { return e >> 32; });
   for (auto* values : {&s.x, &s.y, &s.z}) permute(*values, order, scratch.integers);
   for (auto* values : {&s.nx, &s.ny, &s.nz, &s.radius, &s.quality}) permute(*values, order, scratch.floats);
   for (auto& values : s.attributes) permute(values, order, scratch.floats);

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <limits>
+
+#include "feed/digit_sort.h"
 
 namespace lamina {
 namespace {
@@ -70,20 +71,6 @@ std::vector<Cubes> cubes_of(const LocalSamples& s, const Lattice& lattice) {
   return cubes;
 }
 
-/// Stable, by the digits that occur.
-void sort_by_key(std::vector<Keyed>& keyed, std::uint64_t largest) {
-  constexpr int kDigit = 11;
-  std::vector<Keyed> other(keyed.size());
-  for (int shift = 0; shift < 64 && (largest >> shift) != 0; shift += kDigit) {
-    std::array<std::uint32_t, (1U << kDigit) + 1> begin{};
-    const auto digit = [shift](const Keyed& k) { return (k.key >> shift) & ((1U << kDigit) - 1); };
-    for (const Keyed& k : keyed) ++begin[digit(k) + 1];
-    for (std::size_t d = 1; d < begin.size(); ++d) begin[d] += begin[d - 1];
-    for (const Keyed& k : keyed) other[begin[digit(k)]++] = k;
-    keyed.swap(other);
-  }
-}
-
 std::vector<Keyed> in_order(const ActiveBucket& bucket, const Lattice& lattice) {
   const LocalSamples& s = bucket.samples;
   std::vector<Keyed> keyed;
@@ -95,7 +82,9 @@ std::vector<Keyed> in_order(const ActiveBucket& bucket, const Lattice& lattice) 
     keyed.push_back({cubes[bucket.level[i]].number(s.x[i], s.y[i], s.z[i]), static_cast<std::uint32_t>(i)});
   }
   const Cubes& last = cubes.back();
-  sort_by_key(keyed, last.first + last.count[0] * last.count[1] * last.count[2]);
+  std::vector<Keyed> scratch;
+  digit_sort(keyed, scratch, last.first + last.count[0] * last.count[1] * last.count[2],
+             [](const Keyed& k) { return k.key; });
   return keyed;
 }
 

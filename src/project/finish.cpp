@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 
+#include "project/shared_corners.h"
 #include "window/bits.h"
 
 namespace lamina {
@@ -96,13 +97,11 @@ std::uint64_t beyond(const Window& window, int level, const CornerBlock& leaf, i
 Signs finer_signs(const Window& window, int level, const Tile& t, int z) {
   Signs out;
   for (std::uint64_t w = t.leaf->shared.words[z]; w != 0; w &= w - 1) {
-    const int bit = std::countr_zero(w);
+    const FinerCorner from = finer_corner(window, level, t, z, std::countr_zero(w));
     const std::uint64_t one = w & (~w + 1);
-    const Cell fine{(t.block.x * 8 + (bit & 7)) * 2, (t.block.y * 8 + (bit >> 3)) * 2, (t.block.z * 8 + z) * 2};
-    const CornerBlock* from = window.probe(level - 1, block_of(fine));
-    if (from->positive.test(offset_in_block(fine))) out.positive |= one;
-    if (from->valued.test(offset_in_block(fine))) out.valued |= one;
-    if (from->carried.test(offset_in_block(fine))) out.carried |= one;
+    if (from.block->positive.test(from.offset)) out.positive |= one;
+    if (from.block->valued.test(from.offset)) out.valued |= one;
+    if (from.block->carried.test(from.offset)) out.carried |= one;
   }
   return out;
 }

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <utility>
 
 namespace lamina {
 
@@ -16,25 +15,38 @@ bool allocate_values(const Window& window, int level, Projected& points, int beg
   return true;
 }
 
+FinerCorner finer_corner(const Window& window, int level, const Tile& tile, int z, int bit) {
+  const Cell fine{(tile.block.x * 8 + (bit & 7)) * 2, (tile.block.y * 8 + (bit >> 3)) * 2, (tile.block.z * 8 + z) * 2};
+  return {window.probe(level - 1, block_of(fine)), offset_in_block(fine)};
+}
+
+void take_shared(const Window& window, int level, const Tile& tile, int z) {
+  CornerBlock& leaf = *tile.leaf;
+  for (std::uint64_t w = leaf.shared.words[z] & leaf.near.words[z]; w != 0; w &= w - 1) {
+    const FinerCorner from = finer_corner(window, level, tile, z, std::countr_zero(w));
+    const std::uint64_t one = w & (~w + 1);
+    if (!from.block->seen.test(from.offset)) continue;
+    leaf.seen.words[z] |= one;
+    if (from.block->good.test(from.offset)) leaf.good.words[z] |= one;
+    if (from.block->positive.test(from.offset)) leaf.positive.words[z] |= one;
+  }
+}
+
+void copy_value(const Window& window, int level, const FinerCorner& from, CornerValues& to, std::uint32_t at) {
+  const CornerValues& source = from.block->values[window.brick_of(level - 1, from.offset >> 6)];
+  const std::uint32_t i = from.block->value_index(from.offset, window.brick_layers(level - 1));
+  std::copy_n(source.of(i), window.channels(), to.of(at));
+}
+
 void copy_shared(Window& window, int level, const Tile& tile, int begin, int end) {
   CornerBlock& leaf = *tile.leaf;
   CornerValues& values = leaf.values[window.brick_of(level, begin)];
   for (int z = begin; z < end; ++z) {
-    for (std::uint64_t w = leaf.shared.words[z] & leaf.near.words[z]; w != 0; w &= w - 1) {
+    take_shared(window, level, tile, z);
+    for (std::uint64_t w = leaf.shared.words[z] & leaf.seen.words[z]; w != 0; w &= w - 1) {
       const int bit = std::countr_zero(w);
-      const int offset = z * 64 + bit;
-      const Cell fine{(tile.block.x * 8 + (bit & 7)) * 2, (tile.block.y * 8 + (bit >> 3)) * 2,
-                      (tile.block.z * 8 + z) * 2};
-      const CornerBlock* from = std::as_const(window).probe(level - 1, block_of(fine));
-      const int o = offset_in_block(fine);
-      if (!from->seen.test(o)) continue;
-      leaf.seen.set(offset);
-      leaf.good.assign(offset, from->good.test(o));
-      leaf.positive.assign(offset, from->positive.test(o));
-      const CornerValues& source = from->values[window.brick_of(level - 1, o >> 6)];
-      const std::uint32_t at = from->value_index(o, window.brick_layers(level - 1));
-      const std::uint32_t to = leaf.value_index(offset, window.brick_layers(level));
-      std::copy_n(source.of(at), window.channels(), values.of(to));
+      copy_value(window, level, finer_corner(window, level, tile, z, bit), values,
+                 leaf.value_index(z * 64 + bit, window.brick_layers(level)));
     }
   }
 }

@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <bit>
-#include <utility>
+
+#include "project/shared_corners.h"
 
 namespace lamina {
 namespace {
@@ -24,37 +25,6 @@ bool any_seen(const Lanes* sums) {
   bool any = false;
   for (int l = 0; l < kLanes; ++l) any = any || is_seen(sums, l);
   return any;
-}
-
-/// A corner as the next finer level has it.
-struct Finer {
-  const CornerBlock* block;
-  int offset;
-};
-
-Finer finer_corner(const Window& window, int level, const Tile& tile, int z, int bit) {
-  const Cell fine{(tile.block.x * 8 + (bit & 7)) * 2, (tile.block.y * 8 + (bit >> 3)) * 2, (tile.block.z * 8 + z) * 2};
-  return {window.probe(level - 1, block_of(fine)), offset_in_block(fine)};
-}
-
-/// Bits of a layer's shared corners, from the finer level.
-void take_shared(const Window& window, int level, const Work& work, int z) {
-  CornerBlock& leaf = *work.tile.leaf;
-  for (std::uint64_t w = leaf.shared.words[z] & leaf.near.words[z]; w != 0; w &= w - 1) {
-    const Finer from = finer_corner(window, level, work.tile, z, std::countr_zero(w));
-    const std::uint64_t one = w & (~w + 1);
-    if (!from.block->seen.test(from.offset)) continue;
-    leaf.seen.words[z] |= one;
-    if (from.block->good.test(from.offset)) leaf.good.words[z] |= one;
-    if (from.block->positive.test(from.offset)) leaf.positive.words[z] |= one;
-  }
-}
-
-/// Copies a shared corner's values from the finer level to place `at`.
-void copy_values(const Window& window, int level, const Finer& from, CornerValues& to, std::uint32_t at) {
-  const CornerValues& source = from.block->values[window.brick_of(level - 1, from.offset >> 6)];
-  const std::uint32_t i = from.block->value_index(from.offset, window.brick_layers(level - 1));
-  std::copy_n(source.of(i), window.channels(), to.of(at));
 }
 
 }  // namespace
@@ -107,7 +77,7 @@ void store_values(Window& window, int level, const Work& work, const std::vector
   }
   std::uint32_t count = 0;
   for (int z = work.begin; z < work.end; ++z) {
-    if (corners && level > 0) take_shared(window, level, work, z);
+    if (corners && level > 0) take_shared(window, level, work.tile, z);
     points.near.words[z] = points.seen.words[z];
     count += static_cast<std::uint32_t>(std::popcount(points.seen.words[z]));
   }
@@ -121,7 +91,7 @@ void store_values(Window& window, int level, const Work& work, const std::vector
     for (std::uint64_t w = points.seen.words[z]; w != 0; w &= w - 1, ++at) {
       const int bit = std::countr_zero(w);
       if (((shared >> bit) & 1U) != 0) {
-        copy_values(window, level, finer_corner(window, level, work.tile, z, bit), values, at);
+        copy_value(window, level, finer_corner(window, level, work.tile, z, bit), values, at);
         continue;
       }
       while (fit.seen[next] == 0) ++next;

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "files/background_writer.h"
+#include "files/descriptor.h"
 
 namespace lamina {
 
@@ -15,9 +16,6 @@ class TempFile {
 
   /// Throws Error(budget) naming the directory when no file can be made in it.
   explicit TempFile(std::string directory);
-  ~TempFile();
-  TempFile(TempFile&& other) noexcept;
-  TempFile& operator=(TempFile&& other) noexcept;
 
   /// Adds bytes at the end and returns their offset. They are written in large pieces at whole pages: small writes cost
   /// the kernel twice the work, by `writer` (buffers of kBufferBytes) and later. Throws Error(budget) naming the
@@ -39,7 +37,7 @@ class TempFile {
 
  private:
   std::string directory_;
-  int descriptor_ = -1;
+  Descriptor file_;
   std::uint64_t written_ = 0;
   BackgroundWriter::Buffer held_;
   std::size_t held_bytes_ = 0;

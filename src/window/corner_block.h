@@ -123,7 +123,7 @@ struct CornerBlock : Projected {
 
   // Cells of the octree. A cell of this level exists when its parent is split (or at the coarsest level when touched).
   BlockMask home;     ///< cells that hold a sample of this level
-  BlockMask touched;  ///< cells that a sample of this level reaches: within two cells of its home
+  BlockMask touched;  ///< cells that a sample of this level reaches: within three cells of its home
   BlockMask close;    ///< where cells are split: within one cell of the home of a sample of this or a coarser level
   BlockMask above;    ///< cells within one cell of the home of a sample of a coarser level
   BlockMask reached;  ///< cells that a sample of this or a coarser level reaches
