@@ -8,7 +8,7 @@
 
 namespace lamina {
 
-MeshOutput::MeshOutput(const ClusterSettings& settings, float chord, const Frame& frame, MeshSink& sink)
+MeshOutput::MeshOutput(const ClusterSettings& settings, float chord, const Frame& frame, SlabSink& sink)
     : chord_(chord), frame_(frame), sink_(sink), clusterer_(settings) {}
 
 MeshOutput::~MeshOutput() {
@@ -31,6 +31,11 @@ void MeshOutput::start() {
     return;
   }
   tasks_.run([this, slabs = std::exchange(queued_, {})] { work(slabs, false); });
+}
+
+void MeshOutput::wait() {
+  tasks_.wait();
+  work(std::exchange(queued_, {}), false);
 }
 
 void MeshOutput::finish() {
@@ -56,8 +61,7 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
   while (clusterer_.pop(done)) {
     const IsoSlab* next = clustered_.size() > 1 ? clustered_[1].get() : nullptr;
     place_vertices(done, *clustered_.front(), next, frame_, chord_, vertices_);
-    sink_.append_vertices(vertices_);
-    sink_.append_triangles(done.triangles);
+    sink_.write(done, vertices_);
     triangles_ += done.triangles.size();
     if (clustered_.front().use_count() == 1) {
       const std::lock_guard lock(mutex_);
