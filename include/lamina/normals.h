@@ -54,7 +54,7 @@ struct NormalsReport {
   std::uint64_t by_viewpoint = 0;  ///< whose sign follows from a viewpoint, directly or through neighbours
   std::uint64_t by_given = 0;      ///< from normals of the input that stay
   std::uint64_t by_outside = 0;    ///< from what is outside: the volume their surface encloses is positive
-  std::uint64_t unsure = 0;        ///< of these, on surfaces that are so flat or open that this says little
+  std::uint64_t unsure = 0;        ///< of these, on surfaces so open or flat that this says little: lying ones face +z
   std::uint64_t patches = 0, components = 0;  ///< pieces that signs were found for; surfaces no link joins
   SignConflicts conflicts;                    ///< of the result
   std::vector<SignConflicts> slabs;           ///< of the result, by slab of the sweep

@@ -43,7 +43,7 @@ struct PatchGraph {
 enum class SignSource : std::uint8_t {
   fixed,    ///< linked to the fixed node, by votes or by given normals
   outside,  ///< the surface encloses a volume
-  unsure,   ///< the same, but little of one
+  unsure,   ///< the same, but it is open, or encloses little
 };
 
 struct PatchSigns {
@@ -54,8 +54,9 @@ struct PatchSigns {
 
 /// Chooses signs so that as many links as possible agree: a spanning tree in Boruvka's rounds, where every cluster of
 /// patches joins the one that it has most to say about, for or against, and the sums are taken anew between the
-/// clusters. Votes are links to the fixed node. Clusters that reach neither are turned outside out. Deterministic.
-PatchSigns find_signs(const PatchGraph& graph);
+/// clusters. Votes are links to the fixed node. Clusters that do not reach it are turned outside out, those that
+/// enclose nothing and lie flat towards `up` (unit length). Deterministic.
+PatchSigns find_signs(const PatchGraph& graph, const std::array<float, 3>& up);
 
 /// Conflicts that remain, by slab.
 std::vector<SignConflicts> count_conflicts(const PatchGraph& graph, const PatchSigns& signs);

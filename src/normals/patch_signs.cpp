@@ -80,54 +80,70 @@ void grow_forest(std::vector<Evidence> evidence, SignedForest& forest, std::size
   }
 }
 
-/// Sums over the nodes of a cluster.
+/// Sums over the nodes of a cluster, with its signs so far.
 struct Body {
   double area = 0;
-  std::array<double, 3> centre{};
+  std::array<double, 3> moment{};  ///< area times centre
+  std::array<double, 3> facing{};  ///< area times normal: zero for what is closed
   double volume = 0, size = 0;
+
+  /// How much of it faces one way.
+  [[nodiscard]] double openness() const { return length(facing) / area; }
+  static double length(const std::array<double, 3>& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 };
 
-/// A surface that encloses a positive volume has its normals outward: the sum of area, normal times offset from the
-/// centre is three times the volume.
-void turn_outside_out(const PatchGraph& graph, const std::vector<std::uint32_t>& root, PatchSigns& signs) {
-  constexpr double kUnsure = 0.1;  // of the volume that the same area could enclose
+std::vector<Body> bodies_of(const PatchGraph& graph, const std::vector<std::uint32_t>& root, const PatchSigns& signs) {
   const std::size_t n = graph.nodes.size();
   std::vector<Body> bodies(n);
   for (std::size_t i = 1; i < n; ++i) {
+    const PatchNode& node = graph.nodes[i];
     Body& body = bodies[root[i]];
-    body.area += double{graph.nodes[i].area};
-    for (std::size_t a = 0; a < 3; ++a)
-      body.centre[a] += double{graph.nodes[i].area} * double{graph.nodes[i].centre[a]};
+    body.area += double{node.area};
+    for (std::size_t a = 0; a < 3; ++a) {
+      body.moment[a] += double{node.area} * double{node.centre[a]};
+      body.facing[a] += signs.sign[i] * double{node.outward[a]};
+    }
   }
   for (std::size_t i = 1; i < n; ++i) {
     const PatchNode& node = graph.nodes[i];
     Body& body = bodies[root[i]];
+    std::array<double, 3> offset{};
     double along = 0;
-    double squared = 0;
     for (std::size_t a = 0; a < 3; ++a) {
-      const double offset = double{node.centre[a]} - body.centre[a] / body.area;
-      along += double{node.outward[a]} * offset;
-      squared += offset * offset;
+      offset[a] = double{node.centre[a]} - body.moment[a] / body.area;
+      along += double{node.outward[a]} * offset[a];
     }
     body.volume += signs.sign[i] * (along + double{node.bulge});
-    body.size += double{node.area} * std::sqrt(squared);
+    body.size += double{node.area} * Body::length(offset);
   }
-  for (std::size_t i = 1; i < n; ++i) {
-    const Body& body = bodies[root[i]];
+  return bodies;
+}
+
+/// A surface that encloses a positive volume has its normals outward: the sum of area, normal times offset from the
+/// centre is three times the volume. Sheets that face one way enclose nothing: a ground has its outside above, whether
+/// it is a hill or a bowl.
+void turn_outside_out(const PatchGraph& graph, const std::array<float, 3>& up, const std::vector<std::uint32_t>& root,
+                      PatchSigns& signs) {
+  constexpr double kOpen = 0.3;     // half a sphere has 0.5
+  constexpr double kUpright = 0.5;  // cosine
+  constexpr double kLittle = 0.1;   // of the volume that the same area could enclose
+  const std::vector<Body> bodies = bodies_of(graph, root, signs);
+  for (std::size_t i = 1; i < graph.nodes.size(); ++i) {
     if (root[i] == kFixed) continue;
-    const bool sure = std::abs(body.volume) > kUnsure * body.size;
+    const Body& body = bodies[root[i]];
+    double upward = 0;
+    for (std::size_t a = 0; a < 3; ++a) upward += body.facing[a] * double{up[a]};
+    const bool open = body.openness() > kOpen;
+    const bool ground = open && std::abs(upward) > kUpright * Body::length(body.facing);
+    if ((ground ? upward : body.volume) < 0) signs.sign[i] = static_cast<std::int8_t>(-signs.sign[i]);
+    const bool sure = !open && std::abs(body.volume) > kLittle * body.size;
     signs.source[i] = sure ? SignSource::outside : SignSource::unsure;
-  }
-  std::vector<std::int8_t> turn(n, 1);
-  for (std::size_t i = 1; i < n; ++i) turn[i] = static_cast<std::int8_t>(bodies[root[i]].volume < 0 ? -1 : 1);
-  for (std::size_t i = 1; i < n; ++i) {
-    if (root[i] != kFixed) signs.sign[i] = static_cast<std::int8_t>(signs.sign[i] * turn[i]);
   }
 }
 
 }  // namespace
 
-PatchSigns find_signs(const PatchGraph& graph) {
+PatchSigns find_signs(const PatchGraph& graph, const std::array<float, 3>& up) {
   const std::size_t n = graph.nodes.size();
   PatchSigns signs{std::vector<std::int8_t>(n, 1), std::vector<SignSource>(n, SignSource::fixed), 0};
   SignedForest forest(n);
@@ -140,7 +156,7 @@ PatchSigns find_signs(const PatchGraph& graph) {
   }
   if (n > 1 && std::any_of(root.begin() + 1, root.end(), [](std::uint32_t r) { return r == kFixed; }))
     ++signs.components;
-  turn_outside_out(graph, root, signs);
+  turn_outside_out(graph, up, root, signs);
   return signs;
 }
 

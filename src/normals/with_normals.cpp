@@ -120,7 +120,8 @@ class Job {
         kRecordBytes, static_cast<std::size_t>(std::min<std::uint64_t>(memory, in.store.total() * (kRecordBytes + 12))),
         directory);
     sweep(in.store, scale_of(settings_, in.store, frame), viewpoints, records);
-    PatchSigns signs = find_signs(graph_);
+    const Eigen::Vector3f up = frame.rotation.col(2).cast<float>();
+    PatchSigns signs = find_signs(graph_, {up.x(), up.y(), up.z()});
     report_.samples = in.store.total();
     tell(signs, viewpoints);
     if (settings_.flip) {

@@ -28,11 +28,30 @@ TEST(PatchSigns, TurnABodyOutsideOut) {
     g.nodes.push_back(node_at(1, side));
     g.nodes.push_back(node_at(-1, side));
     link(g, 1, 2, -3);
-    const PatchSigns s = find_signs(g);
+    const PatchSigns s = find_signs(g, {0, 0, 1});
     EXPECT_EQ(s.components, 1);
     EXPECT_EQ(s.sign[1], side);
     EXPECT_EQ(s.sign[2], -side);
     EXPECT_EQ(s.source[1], SignSource::outside);
+  }
+}
+
+// Hills and bowls alike.
+TEST(PatchSigns, TurnAnOpenGroundUp) {
+  for (const float bulge : {0.5F, -0.5F}) {
+    PatchGraph g;
+    g.nodes.push_back(node_at(1, 0));
+    g.nodes.push_back(node_at(-1, 0));
+    for (std::size_t i : {1, 2}) {
+      g.nodes[i].outward = {0.2F, 0, -0.9F};
+      g.nodes[i].bulge = bulge;
+    }
+    link(g, 1, 2, 3);
+    const PatchSigns s = find_signs(g, {0, 0, 1});
+    EXPECT_EQ(s.sign[1], -1);
+    EXPECT_EQ(s.source[1], SignSource::unsure);
+    EXPECT_EQ(find_signs(g, {0, 0, -1}).sign[1], 1);
+    EXPECT_EQ(find_signs(g, {0, 1, 0}).sign[1], bulge > 0 ? 1 : -1);
   }
 }
 
@@ -42,7 +61,7 @@ TEST(PatchSigns, FollowVotesAgainstTheOutside) {
   g.nodes.push_back(node_at(-1, -1));
   g.nodes[2].vote = -2;
   link(g, 1, 2, 3);
-  const PatchSigns s = find_signs(g);
+  const PatchSigns s = find_signs(g, {0, 0, 1});
   EXPECT_EQ(s.sign[1], -1);
   EXPECT_EQ(s.sign[2], -1);
   EXPECT_EQ(s.source[1], SignSource::fixed);
@@ -58,7 +77,7 @@ TEST(PatchSigns, SumUpWhatClustersSayOfEachOther) {
   link(g, 1, 3, -3);
   link(g, 2, 4, 2);
   link(g, 2, 3, 2);
-  const PatchSigns s = find_signs(g);
+  const PatchSigns s = find_signs(g, {0, 0, 1});
   for (std::size_t i = 1; i < 5; ++i) EXPECT_EQ(s.sign[i], 1) << i;
 }
 
@@ -71,7 +90,7 @@ TEST(PatchSigns, CountsConflictsThatRemain) {
   link(g, 1, 3, 5, 8, 1);
   link(g, 2, 3, 1, 4, 0);  // against the odd one
   g.slabs.push_back({0, 0, 3});
-  const std::vector<SignConflicts> c = count_conflicts(g, find_signs(g));
+  const std::vector<SignConflicts> c = count_conflicts(g, find_signs(g, {0, 0, 1}));
   ASSERT_EQ(c.size(), 2);
   EXPECT_EQ(c[0].pairs, 21);
   EXPECT_EQ(c[0].conflicts, 2);
@@ -92,7 +111,7 @@ RC_GTEST_PROP(PatchSigns, FindHiddenSigns, ()) {
     link(g, std::min(a, b), std::max(a, b), static_cast<float>(hidden[a] * hidden[b] * *rc::gen::inRange(1, 20)));
     joined.unite(a, b, 1);
   }
-  const PatchSigns s = find_signs(g);
+  const PatchSigns s = find_signs(g, {0, 0, 1});
   std::uint64_t components = 0;
   for (std::uint32_t i = 1; i <= n; ++i) {
     const std::uint32_t root = joined.find(i);
