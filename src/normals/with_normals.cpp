@@ -26,11 +26,11 @@ namespace {
 
 using namespace normals;
 
-constexpr std::size_t kMemory = std::size_t{128} << 20;  ///< for records on their way to their rows
-constexpr std::uint64_t kSurveyed = 1 << 18;             ///< samples the spacing is taken from
-constexpr std::uint64_t kLeastSlab = 1 << 17;            ///< samples that keep all threads busy
-constexpr double kPatches = 250'000;                     ///< of a large cloud, about
-constexpr double kLeastPatch = 64;                       ///< samples
+constexpr std::size_t kMemory = std::size_t{64} << 20;  ///< for records on their way to their rows
+constexpr std::uint64_t kSurveyed = 1 << 18;            ///< samples the spacing is taken from
+constexpr std::uint64_t kLeastSlab = 1 << 17;           ///< samples that keep all threads busy
+constexpr double kPatches = 150'000;  ///< of a large cloud; cells and slabs cut them to about twice as many
+constexpr double kLeastPatch = 128;   ///< samples
 constexpr double kMostSteps = 1 << 29;
 
 /// Lengths of the job, steps.
