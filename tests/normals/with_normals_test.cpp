@@ -2,9 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <limits>
 
 #include "lamina/error.h"
+#include "lamina/scatter.h"
 #include "normals/clouds.h"
 
 namespace lamina {
@@ -49,6 +51,16 @@ TEST(WithNormals, OfASphereAndATorusPointOutward) {
     EXPECT_LT(found.report.conflicts.share(), 0.001);
     EXPECT_GT(found.report.conflicts.pairs, 4 * torus.size());
   }
+}
+
+TEST(WithNormals, OfABumpySphereAreItsOwn) {
+  const auto surface = shape_surface("bumpy-sphere", false);
+  Oriented cloud;
+  for (std::uint64_t i = 0; i < 12000; ++i) {
+    const Surface::Point p = surface->point(1, i, 0);
+    cloud.add(p.position, p.normal);
+  }
+  expect_good(compare(cloud, find_normals(cloud, in_mode(NormalsMode::estimate, 8)).normals));
 }
 
 TEST(WithNormals, WithinARadiusAreAsGood) {
@@ -234,6 +246,19 @@ TEST(WithNormals, OfScanLinesReachAcross) {
   NormalsSettings settings;
   settings.viewpoints = {{{0, 0, 1}, true}};
   expect_good(compare(cloud, find_normals(cloud, settings).normals));
+}
+
+TEST(WithNormals, OfARealGroundFaceUp) {
+  const std::string file = LAMINA_SOURCE_DIR "/../shared/data/las/autzen_trim_7.las";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << "no " << file;
+  NormalsSettings settings;
+  settings.viewpoints = {{{0, 0, 1}, true}};
+  NormalsReport report;
+  const auto source = with_normals(open_points(file), settings, report, {});
+  std::size_t up = 0;
+  for (const Vector& n : test::normals_of(*source)) up += n[2] > 0.1 ? 1 : 0;
+  EXPECT_GT(static_cast<double>(up), 0.9 * static_cast<double>(report.samples));
+  EXPECT_LT(report.conflicts.share(), 0.01);
 }
 
 TEST(WithNormals, AreTheSameForAnyNumberOfThreads) {
