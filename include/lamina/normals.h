@@ -71,7 +71,7 @@ struct NormalsReport {
 /// 300 000 at most in a cloud of even density); positions and results rest in unnamed files in
 /// run.tmp_dir (empty: the system's). The result does not depend on threads.
 /// Throws Error: usage (settings out of range, check without normals), empty (no points, or all at one place), budget
-/// (disk), and what the source throws.
+/// (disk; run.max_memory, before the sweep), and what the source throws.
 std::unique_ptr<PointSource> with_normals(std::unique_ptr<PointSource> source, const NormalsSettings& settings,
                                           NormalsReport& report, const RunContext& run = {});
 

@@ -295,5 +295,23 @@ TEST(WithNormals, RefusesWhatCannotBe) {
   EXPECT_THAT(refusal(s), HasSubstr("up"));
 }
 
+TEST(WithNormals, RefusesMoreMemoryThanAllowed) {
+  Oriented cloud;
+  test::add_sphere(cloud, 3000, 1);
+  NormalsReport report;
+  RunContext run;
+  run.max_memory = std::size_t{256} << 20;
+  EXPECT_NO_THROW(
+      lamina::with_normals(std::make_unique<test::OrientedSource>(cloud, false), NormalsSettings{}, report, run));
+  run.max_memory = std::size_t{16} << 20;
+  try {
+    lamina::with_normals(std::make_unique<test::OrientedSource>(cloud, false), NormalsSettings{}, report, run);
+    ADD_FAILURE() << "no error";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::budget);
+    EXPECT_THAT(e.what(), ::testing::HasSubstr("--max-memory allows 17 MB"));
+  }
+}
+
 }  // namespace
 }  // namespace lamina
