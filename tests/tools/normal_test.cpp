@@ -58,7 +58,7 @@ TEST_F(NormalTool, WritesOtherFormatsAndReadsPipes) {
     EXPECT_GT(outward(read_points(out)), 0.999) << ending;
   }
   ASSERT_EQ(run_lamina({"normal", cloud_, "-o", out_, "-q"}).code, 0);
-  const auto piped = run_shell("lamina normal - -q -o - < " + quoted(cloud_));
+  const auto piped = run_shell("lamina normal - -q -o - < " + test::quoted(cloud_));
   EXPECT_EQ(piped.code, 0) << piped.err;
   EXPECT_EQ(piped.out, read_text(out_));
 }
