@@ -50,7 +50,7 @@ void warn_of_contradictions(const SurfaceStats& stats, const std::string& input,
   if (share < kMuch && stats.torn_share < 4 * kMuch) return;
   run.warn(
       fmt::format("{}: normals contradict each other around {:.0f} % of the surface, {:.0f} % in slab {}: orient "
-                  "them alike before (CloudCompare, MeshLab), or expect holes and double sheets",
+                  "them alike before (lamina normal --reorient), or expect holes and double sheets",
                   input, 100 * share, 100 * stats.torn_share, stats.torn_slab));
 }
 

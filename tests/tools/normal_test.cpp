@@ -1,5 +1,6 @@
 #include "lamina/normals.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -71,6 +72,17 @@ TEST_F(NormalTool, SidesAndSigns) {
   ASSERT_EQ(run.code, 0) << run.err;
   EXPECT_THAT(run.err, HasSubstr("3000 turned"));
   EXPECT_GT(outward(read_points(turned)), 0.999);
+}
+
+TEST_F(NormalTool, FacesTheScannerOfAPtxFile) {
+  std::string ptx = "3000\n1\n0.3 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0.3 0 0 1\n";
+  for (std::size_t i = 0; i < rows_.size(); ++i)
+    ptx += fmt::format("{} {} {} 0.5\n", rows_.x[i] - 0.3, rows_.y[i], rows_.z[i]);
+  const std::string scan = write_file(folder_ / "scan.ptx", ptx);
+  ASSERT_EQ(run_lamina({"normal", scan, "-o", out_, "-q"}).code, 0);
+  EXPECT_EQ(outward(read_points(out_)), 0);
+  ASSERT_EQ(run_lamina({"normal", scan, "-o", out_, "--viewpoint", "none", "-q"}).code, 0);
+  EXPECT_GT(outward(read_points(out_)), 0.999);
 }
 
 TEST_F(NormalTool, CheckWarnsOfContradictions) {
