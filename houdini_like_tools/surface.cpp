@@ -140,7 +140,8 @@ void run_surface(const SurfaceOptions& o) {
   }
   std::optional<ResultFile> stats_file;
   if (!o.stats.empty()) stats_file.emplace(o.stats);
-  const SurfaceStats stats = run_parts(settings, o.parts, context);
+  const PartsResult result = run_parts(settings, o.parts, context);
+  const SurfaceStats& stats = result.surface;
   if (!settings.dry_run) {
     context.info(fmt::format("{} vertices, {} triangles in {:.1f} s ({:.2f} M samples per CPU second, {:.0f} MB)",
                              stats.vertices, stats.triangles, stats.wall,
@@ -153,7 +154,17 @@ void run_surface(const SurfaceOptions& o) {
           fmt::format("{} ... {}: {} files, {}", v.files.front(), v.files.back(), v.files.size(), bytes_text(v.bytes)));
   }
   if (!o.preview.empty() && !settings.dry_run) draw_preview(o, settings.output, context);
-  if (stats_file) stats_file->write(to_json(stats, settings).dump(2) + "\n");
+  if (!stats_file) return;
+  nlohmann::ordered_json json = to_json(stats, settings);
+  if (result.chunk) {
+    json["chunk"] = {{"number", o.parts.chunk.number},
+                     {"count", o.parts.chunk.count},
+                     {"first_slab", result.chunk->first_slab},
+                     {"slabs", result.chunk->slabs},
+                     {"overlap_slabs", result.chunk->overlap_slabs},
+                     {"samples", result.chunk->samples}};
+  }
+  stats_file->write(json.dump(2) + "\n");
 }
 
 template <typename T>
