@@ -14,6 +14,7 @@
 #include "inputs.h"
 #include "lamina/error.h"
 #include "model.h"
+#include "normal_options.h"
 #include "result_file.h"
 #include "surface_parts.h"
 #include "surface_ranks.h"
@@ -71,6 +72,7 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
                      {"crossing_cells", s.crossing_cells},
                      {"general_cells", s.general_cells},
                      {"rejected_loops", s.rejected_loops}};
+  if (s.normals) j["normals"] = normals_json(*s.normals);
   if (settings.volume.wanted()) {
     j["volume"] = {{"files", s.volume.files},
                    {"voxelsize", s.volume.voxel},
@@ -139,15 +141,17 @@ void run_surface(const SurfaceOptions& o) {
   }
   std::optional<ResultFile> stats_file;
   if (!o.stats.empty() && launch().rank == 0) stats_file.emplace(o.stats);
+  const bool ranked = launch().size > 1;
   RanksStats ranks;
-  if (launch().size > 1) {
+  PartsResult parts;
+  if (ranked) {
     ranks = run_ranks(settings, o.parts, context);
     if (launch().rank > 0) return;
     report_ranks(ranks.ranks, context);
   } else {
-    ranks.surface = run_parts(settings, o.parts, context);
+    parts = run_parts(settings, o.parts, context);
   }
-  const SurfaceStats& stats = ranks.surface;
+  const SurfaceStats& stats = ranked ? ranks.surface : parts.surface;
   if (!settings.dry_run) {
     context.info(fmt::format("{} vertices, {} triangles in {:.1f} s ({:.2f} M samples per CPU second, {:.0f} MB)",
                              stats.vertices, stats.triangles, stats.wall,
@@ -161,9 +165,17 @@ void run_surface(const SurfaceOptions& o) {
   }
   if (!o.preview.empty() && !settings.dry_run) draw_preview(o, settings.output, context);
   if (!stats_file) return;
-  nlohmann::ordered_json j = to_json(stats, settings);
-  if (!ranks.ranks.empty()) j["ranks"] = ranks_json(ranks.ranks);
-  stats_file->write(j.dump(2) + "\n");
+  nlohmann::ordered_json json = to_json(stats, settings);
+  if (parts.chunk) {
+    json["chunk"] = {{"number", o.parts.chunk.number},
+                     {"count", o.parts.chunk.count},
+                     {"first_slab", parts.chunk->first_slab},
+                     {"slabs", parts.chunk->slabs},
+                     {"overlap_slabs", parts.chunk->overlap_slabs},
+                     {"samples", parts.chunk->samples}};
+  }
+  if (ranked) json["ranks"] = ranks_json(ranks.ranks);
+  stats_file->write(json.dump(2) + "\n");
 }
 
 template <typename T>
@@ -239,6 +251,14 @@ void add_surface(CLI::App& app) {
       ->group(samples);
   add_length(*tool, "--max-radius", s.max_radius, "discard samples with a larger radius as undersampled; 0: none")
       ->group(samples);
+
+  tool->add_option("--normals", s.normals,
+                   "whose normals: the file's; auto: found where the file has none; estimate: all found")
+      ->transform(words<NormalsChoice>(
+          {{"file", NormalsChoice::file}, {"auto", NormalsChoice::automatic}, {"estimate", NormalsChoice::estimate}}))
+      ->option_text("file|auto|estimate [file]")
+      ->group("Normals");
+  add_normals_options(*tool, s.normal_search, "Normals");
 
   const std::string fit = "Fit";
   tool->add_option("--blend", s.blend, "H: the influence radius R is H times a sample's radius r")
