@@ -24,16 +24,12 @@ RankSlabs::RankSlabs(const SlabSpan& span, MeshSinkSettings layout, const std::s
 
 void RankSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {
   if (slab.slab < span_.begin) {
-    last_ = mark_of(vertices, layout_);
-    numbered_ += vertices.size();
+    if (slab.slab == span_.begin - 1) below_ = mark_of(vertices, layout_);
+    first_ += vertices.size();
     return;
   }
   if (slab.slab >= span_.end) return;
-  if (!std::exchange(begun_, true)) {
-    below_ = last_;
-    first_ = numbered_;
-  }
-  numbered_ += vertices.size();
+  begun_ = true;
   require_writable(vertices, layout_.attributes, layout_.double_positions, vertices_);
   const std::size_t record = vertex_record_bytes(layout_.attributes, layout_.double_positions);
   std::vector<std::byte> bytes(kEncoded * record);
@@ -42,7 +38,7 @@ void RankSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {
     encode_vertices(vertices, layout_.attributes, layout_.double_positions, done, n, bytes.data());
     put(records_, std::span(bytes).first(n * record));
   }
-  last_ = mark_of(vertices, layout_);
+  if (slab.slab == span_.end - 1) last_ = mark_of(vertices, layout_);
   make_relative(slab.triangles, first_, below_.vertices, relative_);
   put(faces_, std::as_bytes(std::span(relative_)));
   vertices_ += vertices.size();
