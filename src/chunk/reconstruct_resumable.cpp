@@ -50,7 +50,7 @@ std::string describe_run(const SurfaceSettings& settings) {
 
 /// The input as it lies in the checkpoint; read into it where it does not.
 SweepInput open_input(const SurfaceSettings& settings, const CheckpointFolder& folder, const RunContext& run,
-                      Stopwatch& watch, std::string& id) {
+                      Stopwatch& watch, SurfaceStats& stats, std::string& id) {
   if (settings.more_inputs.empty() && is_kept_input(settings.input)) {
     id = kept_input_id(settings.input);
     return open_kept_input(settings.input, settings);
@@ -58,7 +58,7 @@ SweepInput open_input(const SurfaceSettings& settings, const CheckpointFolder& f
   if (!is_kept_input(folder.store())) {
     NewFolder made(folder.store());
     {
-      const SweepInput input = read_surface_input(settings, made.path(), /*keep=*/true, run, watch);
+      const SweepInput input = read_surface_input(settings, made.path(), /*keep=*/true, run, watch, stats);
       watch.time("store", [&] { save_input(input, settings, made.path()); });
     }
     made.publish();
@@ -109,7 +109,7 @@ class ResumableRun {
  private:
   void reconstruct() {
     std::string id;
-    SweepInput input = open_input(settings_, folder_, run_, watch_, id);
+    SweepInput input = open_input(settings_, folder_, run_, watch_, stats_, id);
     const Resolved resolved = plan_surface(settings_, input, run_, watch_, Stopwatch::now().wall - began_.wall, stats_);
     const SlabSpan all = all_slabs(resolved.lattice, input.ingested.extent);
     const std::uint64_t total = input.ingested.store.total();

@@ -10,6 +10,7 @@
 #include "attributes/ply_type.h"
 #include "files/output_file.h"
 #include "lamina/error.h"
+#include "surface/choose_normals.h"
 
 namespace lamina {
 namespace {
@@ -92,6 +93,7 @@ Json reading(const SurfaceSettings& settings, bool has_radius) {
   const FrameMode frame = chosen_frame(settings);
   return {{"frame", frame == FrameMode::pca ? "pca" : "axis"},
           {"bad_samples", settings.bad_samples == BadSamples::drop ? "drop" : "refuse"},
+          {"normals", normals_words(settings)},
           {"particlescale", has_radius ? settings.radius_scale : 1.0}};
 }
 
@@ -99,7 +101,9 @@ void require_same_reading(const Json& stored, const SurfaceSettings& settings, b
                           const std::string& directory) {
   const Json wanted = reading(settings, has_radius);
   for (const auto& [key, value] : wanted.items()) {
-    if (key == "bad_samples" || (key == "frame" && !settings.frame && !settings.volume.wanted())) continue;
+    if (key == "bad_samples" || (key == "normals" && settings.normals == NormalsChoice::file) ||
+        (key == "frame" && !settings.frame && !settings.volume.wanted()))
+      continue;
     if (stored.at(key) == value) continue;
     throw Error(ExitCode::usage,
                 fmt::format("{}: was stored with --{} {}, not {}; make another store, or leave the option away",

@@ -17,6 +17,7 @@
 #include "lamina/error.h"
 #include "lamina/mesh_sink.h"
 #include "lamina/points.h"
+#include "surface/choose_normals.h"
 #include "surface/ingest.h"
 #include "surface/kept_input.h"
 #include "surface/pipeline.h"
@@ -253,11 +254,13 @@ FrameMode chosen_frame(const SurfaceSettings& settings) {
 }
 
 SweepInput read_surface_input(const SurfaceSettings& settings, const std::string& directory, bool keep,
-                              const RunContext& run, Stopwatch& watch) {
+                              const RunContext& run, Stopwatch& watch, SurfaceStats& stats) {
   if (settings.more_inputs.empty() && is_kept_input(settings.input) && !keep)
     return open_kept_input(settings.input, settings);
-  const std::unique_ptr<PointSource> source =
-      open_inputs(settings, keep ? temporary_directory(settings, run) : directory, run);
+  const std::string scratch = keep ? temporary_directory(settings, run) : directory;
+  std::unique_ptr<PointSource> source = open_inputs(settings, scratch, run);
+  if (settings.normals != NormalsChoice::file)
+    watch.time("normals", [&] { source = choose_normals(std::move(source), settings, stats.normals, scratch, run); });
   Frame frame;
   Ingested ingested = read_input(*source, settings, {directory, keep}, run, watch, frame);
   return {source->info(), frame, std::move(ingested)};
@@ -363,7 +366,7 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
     const MeshSink trial(out);
   }
 
-  SweepInput input = read_surface_input(settings, tmp, /*keep=*/false, run, watch);
+  SweepInput input = read_surface_input(settings, tmp, /*keep=*/false, run, watch, stats);
   const Resolved resolved = plan_surface(settings, input, run, watch, Stopwatch::now().wall - began.wall, stats);
   if (!settings.dry_run) {
     out = mesh_layout(input, resolved);

@@ -40,9 +40,10 @@ std::vector<std::string> input_names(const SurfaceSettings& settings);
 FrameMode chosen_frame(const SurfaceSettings& settings);
 
 /// The settings' input: a kept one (kept_input.h) is opened; others are read into a store in `directory`: unnamed
-/// files, or, with `keep`, named ones that stay.
+/// files, or, with `keep`, named ones that stay. Normals are found on the way where the settings ask for them
+/// (stats.normals).
 SweepInput read_surface_input(const SurfaceSettings& settings, const std::string& directory, bool keep,
-                              const RunContext& run, Stopwatch& watch);
+                              const RunContext& run, Stopwatch& watch, SurfaceStats& stats);
 
 /// Resolves and reports the plan; fills in stats.plan and what was read. `elapsed`: seconds since the job began.
 /// Throws Error(empty) where the samples lie too far apart, Error(budget) where they need too much memory.
