@@ -3,9 +3,11 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <chrono>
 #include <new>
 #include <string>
 #include <string_view>
+#include <thread>
 #include <utility>
 
 #include "console.h"
@@ -61,10 +63,15 @@ std::string unknown_word(const CLI::App& app, const CLI::App& tool) {
   return {};
 }
 
-/// Ranks that mpirun started fail together, and one of them says why.
+/// Ranks that mpirun started fail together, and rank 0 says why. The others leave after it: mpirun ends the job with the
+/// first that goes.
 template <class... Arguments>
 void complain(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
-  if (launch().rank == 0) fmt::print(stderr, format, std::forward<Arguments>(arguments)...);
+  if (launch().rank > 0) {
+    std::this_thread::sleep_for(std::chrono::seconds(1));
+    return;
+  }
+  fmt::print(stderr, format, std::forward<Arguments>(arguments)...);
 }
 
 int answer_parse_error(const CLI::App& app, const CLI::ParseError& error) {

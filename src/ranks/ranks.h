@@ -23,8 +23,9 @@ struct Traffic {
 /// Where messages longer than `most` are cut: MPI counts bytes in an int.
 std::vector<std::size_t> message_lengths(std::size_t bytes, std::size_t most);
 
-/// All ranks the launcher started. Every member but rank(), size(), traffic() and failed_elsewhere() is collective: all
-/// ranks call it, in one order. Waiting ranks sleep, for a processor may have several. One thread at a time.
+/// All ranks the launcher started. Members are collective (all ranks call them, in one order) unless they say
+/// otherwise. Waiting ranks sleep, for a processor may have several. One thread at a time; failed_elsewhere() may be
+/// asked by another.
 class Ranks {
  public:
   /// Begins MPI: once in a process. Throws Error(usage) when the program was built without MPI, or the launcher is of
@@ -44,6 +45,13 @@ class Ranks {
   void together(const std::function<void()>& work);
   /// Whether another rank has failed in together(). May be asked at any time.
   [[nodiscard]] bool failed_elsewhere();
+
+  /// What together() does for others: this rank's work has ended because of another's. At any time.
+  void note_failure();
+
+  /// From one rank to one other; not collective. Messages between two ranks come in order.
+  void send(int to, const Bytes& bytes);
+  Bytes receive(int from);
 
   /// What rank `from` has; the others' is replaced.
   void broadcast(Bytes& bytes, int from = 0);

@@ -8,10 +8,11 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <exception>
-#include <limits>
+#include <mutex>
 #include <new>
 #include <thread>
 
@@ -42,9 +43,10 @@ enum class Ending : int { done, failed, followed };  ///< followed: it stopped b
 struct Ranks::Impl {
   int rank = 0, size = 1;
   Traffic traffic;
-  bool told = false;       ///< another rank has failed
-  bool agreed = false;     ///< all ranks are throwing
-  bool threads_ok = true;  ///< MPI may be asked from any thread, one at a time
+  std::atomic<bool> told = false;  ///< another rank has failed
+  std::mutex calling;              ///< held in calls of MPI that two threads may make at once
+  bool agreed = false;             ///< all ranks are throwing
+  bool threads_ok = true;          ///< MPI may be asked from any thread, one at a time
 
   void wait(std::span<MPI_Request> requests);
   void wait(MPI_Request request) { wait({&request, 1}); }
@@ -61,7 +63,10 @@ void Ranks::Impl::wait(std::span<MPI_Request> requests) {
   auto nap = kNap;
   for (int looks = 0;; ++looks) {
     int done = 0;
-    MPI_Testall(static_cast<int>(requests.size()), requests.data(), &done, MPI_STATUSES_IGNORE);
+    {
+      const std::lock_guard lock(calling);
+      MPI_Testall(static_cast<int>(requests.size()), requests.data(), &done, MPI_STATUSES_IGNORE);
+    }
     if (done != 0) break;
     if (looks < kLooks) {
       ::sched_yield();
@@ -135,10 +140,45 @@ const Traffic& Ranks::traffic() const {
 
 bool Ranks::failed_elsewhere() {
   if (impl_->told || !impl_->threads_ok) return impl_->told;
+  const std::unique_lock lock(impl_->calling, std::try_to_lock);
+  if (!lock.owns_lock()) return false;  // asked again soon
   int there = 0;
   MPI_Iprobe(MPI_ANY_SOURCE, kFailedTag, MPI_COMM_WORLD, &there, MPI_STATUS_IGNORE);
-  impl_->told = there != 0;
+  if (there != 0) impl_->told = true;
   return impl_->told;
+}
+
+void Ranks::note_failure() {
+  impl_->told = true;
+}
+
+void Ranks::send(int to, const Bytes& bytes) {
+  std::uint64_t length = bytes.size();
+  std::vector<MPI_Request> requests(1);
+  {
+    const std::lock_guard lock(impl_->calling);
+    MPI_Isend(&length, 1, MPI_UINT64_T, to, kDataTag, MPI_COMM_WORLD, requests.data());
+    impl_->start_send(bytes, to, requests);
+  }
+  impl_->wait(requests);
+}
+
+Bytes Ranks::receive(int from) {
+  std::uint64_t length = 0;
+  MPI_Request request = MPI_REQUEST_NULL;
+  {
+    const std::lock_guard lock(impl_->calling);
+    MPI_Irecv(&length, 1, MPI_UINT64_T, from, kDataTag, MPI_COMM_WORLD, &request);
+  }
+  impl_->wait(request);
+  Bytes bytes(length);
+  std::vector<MPI_Request> requests;
+  {
+    const std::lock_guard lock(impl_->calling);
+    impl_->start_receive(bytes, from, requests);
+  }
+  impl_->wait(requests);
+  return bytes;
 }
 
 void Ranks::together(const std::function<void()>& work) {

@@ -10,6 +10,7 @@
 #include "points/gunzip.h"
 #include "points/input_file.h"
 #include "points/sniff.h"
+#include "ranks/deal_rows.h"
 #include "ranks/packed_input.h"
 #include "slab_store/store_blocks.h"
 
@@ -31,13 +32,6 @@ bool can_be_shared(const SurfaceSettings& settings, const PointSourceInfo& info)
     return !is_gzip(bytes) && detect_format(bytes, input.path) != PointFormat::vdb;
   });
 }
-
-/// In the place of an input that rank 0 reads alone.
-class NoRows : public PointSource {
- public:
-  explicit NoRows(const PointSourceInfo& info) { info_ = info; }
-  void read(std::uint64_t, std::size_t, SampleBatch& out) override { out = {}; }
-};
 
 RowSpan share_of(std::uint64_t rows, int rank, int size) {
   // Quotient first: rows times ranks may pass 64 bits nowhere near here, but need not.
@@ -92,18 +86,14 @@ class Reading {
       if (shared) {
         source_ = open_inputs(settings_, directory_, run_);
       } else {
-        source_ = std::make_unique<NoRows>(info);
+        source_ = std::make_unique<DealtRows>(ranks_, info);
       }
       if (source_->info().count != info.count) {
         throw Error(ExitCode::unreadable, info.path + ": does not look the same to all ranks; they must see one file");
       }
     });
-    const std::uint64_t rows = info.count;
-    if (shared) {
-      rows_ = share_of(rows, ranks_.rank(), ranks_.size());
-    } else {
-      rows_ = {0, ranks_.first() ? rows : 0};
-    }
+    shared_ = shared;
+    rows_ = share_of(info.count, ranks_.rank(), ranks_.size());
   }
 
   /// On rank 0, while the others wait.
@@ -137,8 +127,18 @@ class Reading {
   /// Whether all samples lay where they may.
   bool fill(const Survey& survey) {
     ranks_.together([&] {
-      watch_.time("store", [&] {
+      const auto work = [&] {
         ingested_.emplace(ingest(*source_, survey, frame_, settings_.radius_scale, directory_, run_, rows_));
+      };
+      watch_.time("store", [&] {
+        if (shared_) {
+          work();
+        } else if (ranks_.first()) {
+          deal_rows(ranks_, *source_, work,
+                    [&](int rank) { return share_of(source_->info().count, rank, ranks_.size()); });
+        } else {
+          static_cast<DealtRows&>(*source_).take(work);
+        }
       });
     });
     std::array<std::int64_t, 1> complete{ingested_->complete ? 1 : 0};
@@ -195,6 +195,7 @@ class Reading {
   const RunContext& run_;
   Stopwatch& watch_;
   std::unique_ptr<PointSource> source_;
+  bool shared_ = true;
   RowSpan rows_{0, 0};
   Frame frame_;
   std::optional<Ingested> ingested_;
