@@ -120,18 +120,18 @@ void add_parts_options(CLI::App& tool, PartsOptions& o) {
   tool.add_flag("--resume", o.checkpoint.resume, "go on with what --checkpoint has")->needs(checkpoint)->group(group);
 }
 
-SurfaceStats run_parts(const SurfaceSettings& settings, const PartsOptions& options, const RunContext& context) {
+PartsResult run_parts(const SurfaceSettings& settings, const PartsOptions& options, const RunContext& context) {
   const bool resumable = !options.checkpoint.directory.empty();
   if (options.chunked && resumable)
     throw Error(ExitCode::usage, "--chunk and --checkpoint contradict each other; a chunk is simply run again");
-  if (resumable) return reconstruct_resumable(settings, options.checkpoint, context);
-  if (!options.chunked) return reconstruct_surface(settings, context);
+  if (resumable) return {reconstruct_resumable(settings, options.checkpoint, context), {}};
+  if (!options.chunked) return {reconstruct_surface(settings, context), {}};
   const ChunkStats stats = reconstruct_chunk(settings, options.chunk, context);
   context.info(fmt::format("chunk {}/{}: slabs {} to {} of {} and {} beside them, about {} of {} samples",
                            options.chunk.number, options.chunk.count, stats.first_slab + 1,
                            stats.first_slab + stats.slabs, stats.all_slabs, stats.overlap_slabs,
                            count_text(stats.samples), count_text(stats.surface.plan.samples)));
-  return stats.surface;
+  return {stats.surface, stats};
 }
 
 void print_tasks(const CLI::App& tool, const std::string& input, const std::string& output,

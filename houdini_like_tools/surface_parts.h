@@ -1,6 +1,7 @@
 // What `lamina surface` can do beside running at once: one chunk of a farm's job, the list of its tasks, checkpoints.
 #pragma once
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 
 #include "lamina/chunk.h"
@@ -21,8 +22,13 @@ struct PartsOptions {
 /// parse.
 void add_parts_options(CLI::App& tool, PartsOptions& options);
 
+struct PartsResult {
+  SurfaceStats surface;
+  std::optional<ChunkStats> chunk;  ///< where one was asked for
+};
+
 /// Runs as the options ask for.
-SurfaceStats run_parts(const SurfaceSettings& settings, const PartsOptions& options, const RunContext& context);
+PartsResult run_parts(const SurfaceSettings& settings, const PartsOptions& options, const RunContext& context);
 
 /// Prints the command lines that make `output` out of the store `input` in options.tasks chunks, with the options the
 /// tool was given. Throws Error(usage) for outputs that parts cannot lie beside.

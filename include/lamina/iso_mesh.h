@@ -26,8 +26,8 @@ struct SurfaceCorner {
   float distance = 0;                      ///< signed distance of the corner, in steps
   float curvature = 0;                     ///< signed mean curvature of the fit, 1/steps; 0 for the plane fit
   float cell = 0;                          ///< edge length of the finest incident cell, in steps
-  /// |projected point - weighted average of the samples| / local support radius; negative where no sample contributes
-  /// and the value is extended from neighbours. A corner without any value has a zero normal.
+  /// |projected point - weighted average of the samples| / local support radius; negative where that is not trusted and
+  /// the value is extended from neighbours, or uncertain. A corner without any value has a zero normal.
   float reach = -1;
 };
 

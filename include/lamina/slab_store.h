@@ -76,6 +76,7 @@ class SlabStore {
 
  private:
   friend class SlabStoreWriter;
+  friend struct StoreAccess;  ///< of those that move blocks between stores
   struct Impl;
   explicit SlabStore(std::unique_ptr<Impl> impl);
   std::unique_ptr<Impl> impl_;

@@ -60,6 +60,10 @@ std::vector<double> slab_samples(const SlabStore& store, const Lattice& lattice,
   return samples;
 }
 
+double chunk_cost(const std::vector<double>& cost, std::size_t begin, std::size_t end) {
+  return Costs(cost).of(begin, end);
+}
+
 std::vector<SlabSpan> cut(const std::vector<double>& cost, std::int32_t first, int count) {
   const Costs costs(cost);
   const auto limit = static_cast<std::size_t>(count);

@@ -17,7 +17,10 @@ std::vector<double> slab_samples(const SlabStore& store, const Lattice& lattice,
 /// function of store, lattice and count alone.
 std::vector<SlabSpan> cut(const SlabStore& store, const Lattice& lattice, const SlabSpan& all, int count);
 
-/// The same from what each slab costs: for all its stages, and where it only lies beside a chunk.
+/// What a chunk of slabs [begin, end) costs, from what each slab does: those beside it are read and projected, too.
+double chunk_cost(const std::vector<double>& cost, std::size_t begin, std::size_t end);
+
+/// The same spans from what each slab costs; the first is slab number `first`.
 std::vector<SlabSpan> cut(const std::vector<double>& cost, std::int32_t first, int count);
 
 }  // namespace lamina

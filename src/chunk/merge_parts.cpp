@@ -89,7 +89,7 @@ std::vector<PartReader> open_parts(const std::vector<std::string>& paths) {
 }
 
 void encode_shifted(std::span<const PartTriangle> triangles, std::uint64_t first, std::uint64_t vertices,
-                    std::vector<std::byte>& out) {
+                    const std::string& part, std::vector<std::byte>& out) {
   out.resize(triangles.size() * kFaceRecordBytes);
   std::vector<std::array<std::uint32_t, 3>> shifted(triangles.size());
   bool inside = true;
@@ -100,7 +100,8 @@ void encode_shifted(std::span<const PartTriangle> triangles, std::uint64_t first
       shifted[t][k] = static_cast<std::uint32_t>(number);
     }
   }
-  if (!inside) refuse("a triangle names a vertex that the parts do not have");
+  if (!inside)
+    refuse(fmt::format("{}: is damaged: a triangle names a vertex that is not there; make the chunk again", part));
   encode_faces(shifted.data(), shifted.size(), out.data());
 }
 
@@ -145,7 +146,7 @@ MergedParts merge_parts(const std::vector<std::string>& paths, const std::string
   std::vector<std::byte> faces;
   for (const PartReader& part : parts) {
     part.read_triangles([&](std::span<const PartTriangle> triangles) {
-      encode_shifted(triangles, first, merged.vertices, faces);
+      encode_shifted(triangles, first, merged.vertices, part.path(), faces);
       write(file, faces.data(), faces.size());
       bytes += faces.size();
     });

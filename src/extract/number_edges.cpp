@@ -2,6 +2,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "extract/crossing.h"
 #include "extract/extract.h"
@@ -48,6 +49,23 @@ void assign_numbers(const Window& window, const std::vector<TileView>& views, Is
   for (std::vector<float>& a : out.corner_attributes) a.resize(corners);
 }
 
+/// Beyond a rim, and around things thinner than a cell, neighbours' planes lead far away from all samples: the
+/// projected point of a corner that is not trusted stays near the average of its own samples, where its record leads
+/// (at `cell`).
+void tether(const float* record, float cell, std::array<float, 3>& offset) {
+  constexpr float kLongest = 0.3F;  // cells
+  std::array<float, 3> away{};
+  float d2 = 0;
+  for (int i = 0; i < 3; ++i) {
+    away[i] = offset[i] + record[kDistance] * record[kNormalX + i];
+    d2 += away[i] * away[i];
+  }
+  const float longest = kLongest * cell;
+  if (d2 <= longest * longest) return;
+  const float back = 1.0F - longest / std::sqrt(d2);
+  for (int i = 0; i < 3; ++i) offset[i] -= back * away[i];
+}
+
 /// Fills in the tile's surface corners. Trusted corners are read here, which is what corner_value() answers for them in
 /// the finest level that holds them, without its search.
 void fill_corners(const Window& window, const TileView& tile, IsoSlab& out) {
@@ -81,10 +99,13 @@ void fill_corners(const Window& window, const TileView& tile, IsoSlab& out) {
       }
       if (valued) {
         for (int i = 0; i < 3; ++i) c.offset[i] = -value.distance * value.normal[i];
+        if ((trusted & one) == 0 && (near & seen & one) != 0) {
+          tether(values.of(rank + static_cast<std::uint32_t>(std::popcount(near & (one - 1)))), size, c.offset);
+        }
         c.normal = value.normal;
         c.distance = value.distance;
         c.curvature = value.curvature;
-        c.reach = (seen & one) != 0 ? value.reach : -1.0F;
+        c.reach = (trusted & one) != 0 ? value.reach : -1.0F;
       }
       for (int a = 0; a < attributes; ++a) out.corner_attributes[a][id] = valued ? extra[a] : 0.0F;
       out.corners[id++] = c;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -28,12 +29,25 @@ struct FeedSettings {
   std::uint64_t batch_samples = 1u << 18;
 };
 
+/// Largest influence a sample can have, steps.
+float support_limit(const FeedSettings& settings, const Lattice& lattice);
+
 struct FeedCounts {
   std::uint64_t samples = 0;       ///< that have got a radius
   std::uint64_t undersampled = 0;  ///< left out by max_radius
   std::uint64_t clamped = 0;       ///< radius reduced to what the coarsest level can serve
   std::uint64_t bucket_reads = 0;  ///< times a bucket was decompressed
 };
+
+/// Buckets [begin, end).
+struct BucketSpan {
+  std::size_t begin = 0, end = 0;
+};
+
+/// The buckets that a feed reads which begins at `from` (begin_at(); nothing: at the bottom) and prepares all below
+/// `to`: it may look for two more, but does without them.
+BucketSpan buckets_read(const SlabStore& store, const RadiiSettings& radii, bool given_radii,
+                        std::optional<std::int64_t> from, std::int64_t to);
 
 /// Buckets go by ascending z: prepare() runs ahead, release() follows behind. Inside a bucket samples are sorted by
 /// blocks of cells (feed/block_order.h): successive ones lie close to each other, which the stages may rely on for

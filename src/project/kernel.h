@@ -92,6 +92,9 @@ struct Kernel {
   const char* name;  ///< "x86-64-v3", ...
   /// Adds samples of `ranges` to `sums` (kSums + attributes lanes).
   void (*accumulate)(const TileSamples&, const SampleRange* ranges, int count, const Queries&, Lanes* sums);
+  /// The same without the samples whose normals point away from a query's `facing`, a vector of any length.
+  void (*accumulate_facing)(const TileSamples&, const SampleRange* ranges, int count, const Queries&,
+                            const Queries& facing, Lanes* sums);
   void (*fit)(const Lanes* sums, const FitInput&, FitOutput&);
   /// Extends trusted neighbours' planes to the eight corners of row (y, z) of a tile. `cell` in steps; `near`: squared
   /// distance in cells up to which a corner is surrounded.

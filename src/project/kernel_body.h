@@ -14,9 +14,11 @@ inline Vec& vec(Lanes& l) {
 }
 
 /// `A`: number of attributes where known at compile time, else negative. `B`: whether samples have bands narrower than
-/// their supports; otherwise every contributing sample is near enough.
-template <int A, bool B>
-void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query, Lanes* sums) {
+/// their supports; otherwise every contributing sample is near enough. `F`: whether samples whose normals point away
+/// from `facing` are passed over.
+template <int A, bool B, bool F>
+void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query,
+                     const Queries& facing, Lanes* sums) {
   const Vec qx = vec(query.x);
   const Vec qy = vec(query.y);
   const Vec qz = vec(query.z);
@@ -44,7 +46,12 @@ void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count,
       const Vec dy = splat(s.y[i]) - qy;
       const Vec dz = splat(s.z[i]) - qz;
       const Vec d2 = dx * dx + dy * dy + dz * dz;
-      const Vec t = one - d2 * splat(s.inv_support2[i]);
+      Vec t = one - d2 * splat(s.inv_support2[i]);
+      if constexpr (F) {
+        const Vec along =
+            splat(s.nx[i]) * vec(facing.x) + splat(s.ny[i]) * vec(facing.y) + splat(s.nz[i]) * vec(facing.z);
+        t = along >= zero ? t : zero;
+      }
       const Vec phi = t > zero ? t : zero;
       const Vec phi2 = phi * phi;
       const Vec w = splat(s.weight[i]) * (phi2 * phi2);
@@ -89,21 +96,28 @@ void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count,
   for (int a = 0; a < A; ++a) vec(sums[kSums + a]) = own[a];
 }
 
-template <bool B>
-void accumulate_some(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query, Lanes* sums) {
+template <bool B, bool F>
+void accumulate_some(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query,
+                     const Queries& facing, Lanes* sums) {
   switch (s.attributes.size()) {
     case 0:
-      return accumulate_body<0, B>(s, ranges, count, query, sums);
+      return accumulate_body<0, B, F>(s, ranges, count, query, facing, sums);
     case 3:
-      return accumulate_body<3, B>(s, ranges, count, query, sums);
+      return accumulate_body<3, B, F>(s, ranges, count, query, facing, sums);
     default:
-      return accumulate_body<-1, B>(s, ranges, count, query, sums);
+      return accumulate_body<-1, B, F>(s, ranges, count, query, facing, sums);
   }
 }
 
 inline void accumulate(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query, Lanes* sums) {
-  return s.banded ? accumulate_some<true>(s, ranges, count, query, sums)
-                  : accumulate_some<false>(s, ranges, count, query, sums);
+  return s.banded ? accumulate_some<true, false>(s, ranges, count, query, query, sums)
+                  : accumulate_some<false, false>(s, ranges, count, query, query, sums);
+}
+
+inline void accumulate_facing(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query,
+                              const Queries& facing, Lanes* sums) {
+  return s.banded ? accumulate_some<true, true>(s, ranges, count, query, facing, sums)
+                  : accumulate_some<false, true>(s, ranges, count, query, facing, sums);
 }
 
 /// Exactly rounded, so the same on all processors.

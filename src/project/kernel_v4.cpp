@@ -10,7 +10,7 @@ namespace {
 }  // namespace
 
 Kernel kernel() {
-  return {"x86-64-v4", &accumulate, &fit, &extend};
+  return {"x86-64-v4", &accumulate, &accumulate_facing, &fit, &extend};
 }
 
 }  // namespace lamina::kernel_v4

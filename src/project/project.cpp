@@ -7,6 +7,7 @@
 #include <atomic>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <utility>
 
 #include "project/queries.h"
@@ -120,48 +121,73 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
     const std::int32_t first = lattice.first_layer(level, slab);
     const std::int32_t end = first + lattice.layers(level);
     const float level_margin = settings_.steps > 1 ? kStepLimit * static_cast<float>(lattice.cell_size(level)) : 0.0F;
-    // Sums survive from batch to batch and query points from step to step; one batch keeps both in the thread's
-    // scratch.
-    std::vector<TileState> kept(batches.size() > 1 ? work.size() : 0);
-    for (int step = 0; step < settings_.steps; ++step) {
-      if (batches.size() == 1 && step > 0) break;
-      const float halo = batches.size() == 1 || step > 0 ? level_margin : 0.0F;
-      for (std::size_t b = 0; b < batches.size(); ++b) {
-        const ClumpedBatch batch = scratch_->load(batches[b], feed, lattice);
-        const Reach reach{level, first, end, halo, shift_of(settings_)};
-        const TileRuns bins = bin_clumps(lattice, reach, batch, blocks);
-        tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t t) {
-          Scratch::Local& local = scratch_->local.local();
-          list_queries(work[t], local.queries);
-          TileState& state = kept.empty() ? local.state : kept[t];
-          if (b == 0) {
-            if (step == 0) {
-              start(state, local.queries, channels, shift_of(settings_));
-            } else {
-              advance(kernel_, settings_, state, local.queries, channels);
-            }
-          }
-          local.rows.gather(lattice, reach, work[t].tile.block, bins.of(t), settings_.band);
+    const auto finish = [&](std::size_t t, Scratch::Local& local, TileState& state) {
+      settle(kernel_, settings_, state, local.queries, channels);
+      const Tally tally = fit_tile(kernel_, settings_, channels, state, local.queries, local.fit);
+      store_values(window, level, work[t], local.queries, state, local.fit);
+      seen.fetch_add(tally.seen, std::memory_order_relaxed);
+      good.fetch_add(tally.good, std::memory_order_relaxed);
+      torn.fetch_add(tally.torn, std::memory_order_relaxed);
+      corners.fetch_add(local.queries.size(), std::memory_order_relaxed);
+    };
+    const int passes = passes_of(settings_);
+    if (batches.size() == 1) {
+      const ClumpedBatch batch = scratch_->load(batches[0], feed, lattice);
+      const Reach reach{level, first, end, level_margin, shift_of(settings_)};
+      const TileRuns bins = bin_clumps(lattice, reach, batch, blocks);
+      tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t t) {
+        Scratch::Local& local = scratch_->local.local();
+        TileState& state = local.state;
+        list_queries(work[t], local.queries);
+        start(state, local.queries, channels, shift_of(settings_));
+        local.rows.gather(lattice, reach, work[t].tile.block, bins.of(t), settings_.band);
+        accumulate(kernel_, local.rows, state, channels);
+        for (int pass = 1; pass < passes; ++pass) {
+          if (!advance(kernel_, settings_, state, local.queries, channels, pass)) break;
           accumulate(kernel_, local.rows, state, channels);
-          if (b + 1 < batches.size()) return;
-          if (batches.size() == 1) {
-            for (int more = 1; more < settings_.steps; ++more) {
-              advance(kernel_, settings_, state, local.queries, channels);
-              accumulate(kernel_, local.rows, state, channels);
-            }
-          } else if (step + 1 < settings_.steps) {
-            return;
-          }
-          settle(state, channels);
-          const Tally tally = fit_tile(kernel_, settings_, channels, state, local.queries, local.fit);
-          store_values(window, level, work[t], local.queries, state, local.fit);
-          seen.fetch_add(tally.seen, std::memory_order_relaxed);
-          good.fetch_add(tally.good, std::memory_order_relaxed);
-          torn.fetch_add(tally.torn, std::memory_order_relaxed);
-          corners.fetch_add(local.queries.size(), std::memory_order_relaxed);
+        }
+        finish(t, local, state);
+      });
+      continue;
+    }
+    // Sums survive from batch to batch and query points from pass to pass. Later passes are for few tiles.
+    std::vector<TileState> kept(work.size());
+    std::vector<std::uint32_t> active(work.size());
+    std::iota(active.begin(), active.end(), 0U);
+    for (int pass = 0; pass < passes; ++pass) {
+      std::vector<std::uint8_t> on(active.size());
+      tbb::parallel_for(std::size_t{0}, active.size(), [&](std::size_t a) {
+        Scratch::Local& local = scratch_->local.local();
+        TileState& state = kept[active[a]];
+        list_queries(work[active[a]], local.queries);
+        if (pass == 0) start(state, local.queries, channels, shift_of(settings_));
+        on[a] = pass == 0 || advance(kernel_, settings_, state, local.queries, channels, pass) ? 1 : 0;
+      });
+      std::vector<std::uint32_t> going;
+      blocks.clear();
+      for (std::size_t a = 0; a < active.size(); ++a) {
+        if (on[a] == 0) continue;
+        going.push_back(active[a]);
+        blocks.push_back(work[active[a]].tile.block);
+      }
+      active = std::move(going);
+      if (active.empty()) break;
+      const Reach reach{level, first, end, pass > 0 ? level_margin : 0.0F, shift_of(settings_)};
+      for (const std::vector<std::size_t>& numbers : batches) {
+        const ClumpedBatch batch = scratch_->load(numbers, feed, lattice);
+        const TileRuns bins = bin_clumps(lattice, reach, batch, blocks);
+        tbb::parallel_for(std::size_t{0}, active.size(), [&](std::size_t a) {
+          Scratch::Local& local = scratch_->local.local();
+          local.rows.gather(lattice, reach, blocks[a], bins.of(a), settings_.band);
+          accumulate(kernel_, local.rows, kept[active[a]], channels);
         });
       }
     }
+    tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t t) {
+      Scratch::Local& local = scratch_->local.local();
+      list_queries(work[t], local.queries);
+      finish(t, local, kept[t]);
+    });
   }
   counts_.corners += corners;
   counts_.seen += seen;

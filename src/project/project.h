@@ -13,10 +13,14 @@ namespace lamina {
 enum class Fit { plane, sphere };
 
 struct ProjectSettings {
-  Fit fit = Fit::sphere;    ///< sphere: algebraic sphere (Guennebaud & Gross 2007); plane: METHOD 3.2
-  bool centres = false;     ///< project the centres of leaf cells instead of corners (METHOD 3.3; see diffuse.h)
-  int steps = 1;            ///< N >= 1: almost orthogonal projection steps (Alexa & Adamson 2004)
-  float band = 2.25F;       ///< a corner keeps a value only if a sample lies this near, in cells of the sample's level
+  Fit fit = Fit::sphere;  ///< sphere: algebraic sphere (Guennebaud & Gross 2007); plane: METHOD 3.2
+  bool centres = false;   ///< project the centres of leaf cells instead of corners (METHOD 3.3; see diffuse.h)
+  int steps = 1;          ///< N >= 1: almost orthogonal projection steps (Alexa & Adamson 2004)
+  float band = 2.25F;     ///< a corner keeps a value only if a sample lies this near, in cells of the sample's level
+  /// A point whose samples' mean normal is shorter than this sees two sheets, or one bent sharply, and counts only the
+  /// samples on its own side, that face where the mean does; 0: all count always.
+  float sheets = 0.8F;
+  float apart = 0.7F;       ///< provided that the two lie this far apart (cells): the lattice can tell them
   float good_reach = 0.4F;  ///< trusted while |projected point - weighted average| <= this, in support radii
   int good_samples = 3;     ///< and at least this many samples contributed
 };

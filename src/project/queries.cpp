@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 
 namespace lamina {
 namespace {
@@ -9,6 +10,9 @@ namespace {
 struct Point {
   float x, y, z;
 };
+
+/// Normals contradict each other where their mean is shorter than this.
+constexpr float kTorn = 0.5F;
 
 Point point_of(const Query& q, float shift) {
   return {static_cast<float>(q.x) + shift, static_cast<float>(q.y) + shift, static_cast<float>(q.z) + shift};
@@ -19,6 +23,7 @@ template <typename At>
 void fill(Lot& lot, std::size_t count, std::size_t channels, const At& at) {
   const std::size_t groups = (count + kLanes - 1) / kLanes;
   lot.points.resize(groups);
+  lot.facing.clear();
   for (std::size_t g = 0; g < groups; ++g) {
     for (int l = 0; l < kLanes; ++l) {
       const Point p = at(std::min(g * kLanes + static_cast<std::size_t>(l), count - 1));
@@ -47,6 +52,36 @@ FitInput offsets(const Lot& lot, const std::vector<Query>& queries, std::size_t 
   return in;
 }
 
+/// Whether the normals a point sees contradict each other.
+bool is_torn(const Lanes* sums, int lane) {
+  const float x = sums[kNx][lane];
+  const float y = sums[kNy][lane];
+  const float z = sums[kNz][lane];
+  return sums[kNearest][lane] <= 1 && x * x + y * y + z * z < kTorn * kTorn * sums[kW][lane] * sums[kW][lane];
+}
+
+/// Whether the samples a point sees lie on two sheets, facing opposite ways, that the lattice can tell apart: `near`
+/// has the sums of those on the point's own side.
+bool is_apart(const ProjectSettings& settings, const Lanes* all, int lane, const Lanes* near, int l) {
+  const float w_near = near[kW][l];
+  const float w_far = all[kW][lane] - w_near;
+  if (w_near <= 0 || w_far <= 0) return false;
+  float apart = 0;
+  float n2 = 0;
+  float against = 0;
+  float far2 = 0;
+  for (int k = 0; k < 3; ++k) {
+    const float n = near[kNx + k][l];
+    const float far = all[kNx + k][lane] - n;
+    apart += n * ((all[kPx + k][lane] - near[kPx + k][l]) / w_far - near[kPx + k][l] / w_near);
+    n2 += n * n;
+    against += n * far;
+    far2 += far * far;
+  }
+  const float n = std::sqrt(n2);
+  return std::abs(apart) >= settings.apart * n && against < -0.7F * n * std::sqrt(far2);
+}
+
 }  // namespace
 
 void list_queries(const Work& work, std::vector<Query>& out) {
@@ -66,6 +101,7 @@ void list_queries(const Work& work, std::vector<Query>& out) {
 void start(TileState& state, const std::vector<Query>& queries, std::size_t channels, float shift) {
   fill(state.all, queries.size(), channels, [&](std::size_t i) { return point_of(queries[i], shift); });
   state.stepped = false;
+  state.torn = 0;
 }
 
 void accumulate(const Kernel& kernel, const RowSamples& rows, TileState& state, std::size_t channels) {
@@ -76,7 +112,11 @@ void accumulate(const Kernel& kernel, const RowSamples& rows, TileState& state, 
     const auto [y_lo, y_hi] = std::minmax_element(q.y.v.begin(), q.y.v.end());
     const auto [z_lo, z_hi] = std::minmax_element(q.z.v.begin(), q.z.v.end());
     const int n = rows.ranges(*y_lo, *y_hi, *z_lo, *z_hi, ranges.data());
-    kernel.accumulate(rows.samples(), ranges.data(), n, q, &lot.sums[g * channels]);
+    if (lot.facing.empty()) {
+      kernel.accumulate(rows.samples(), ranges.data(), n, q, &lot.sums[g * channels]);
+    } else {
+      kernel.accumulate_facing(rows.samples(), ranges.data(), n, q, lot.facing[g], &lot.sums[g * channels]);
+    }
   }
 }
 
@@ -84,48 +124,101 @@ FitInput fit_input(const TileState& state, const std::vector<Query>& queries, st
   return offsets(state.all, queries, g, queries.size(), fit, shift, [](std::size_t i) { return i; });
 }
 
-void advance(const Kernel& kernel, const ProjectSettings& settings, TileState& state, const std::vector<Query>& queries,
-             std::size_t channels) {
+bool advance(const Kernel& kernel, const ProjectSettings& settings, TileState& state, const std::vector<Query>& queries,
+             std::size_t channels, int pass) {
   const float shift = shift_of(settings);
   const Lot& from = state.stepped ? state.moved : state.all;
   const std::size_t count = state.stepped ? state.moving.size() : queries.size();
   const auto number = [&](std::size_t i) { return state.stepped ? state.moving[i] : static_cast<std::uint32_t>(i); };
   std::vector<std::uint32_t> moving;
   std::vector<Point> to;
+  std::vector<Point> facing;
+  bool any_facing = false;
   FitOutput out{};
   for (std::size_t g = 0; g < from.points.size(); ++g) {
     const Lanes* sums = &from.sums[g * channels];
-    kernel.fit(sums, offsets(from, queries, g, count, settings.fit, shift, number), out);
+    bool fitted = false;
     for (std::size_t i = g * kLanes; i < std::min(count, (g + 1) * kLanes); ++i) {
       const int l = static_cast<int>(i - g * kLanes);
+      if (sums[kW][l] <= 0) continue;
+      const Point here{from.points[g].x[l], from.points[g].y[l], from.points[g].z[l]};
+      if (!state.stepped) {
+        const Point n{sums[kNx][l], sums[kNy][l], sums[kNz][l]};
+        const float w2 = sums[kW][l] * sums[kW][l];
+        const float n2 = n.x * n.x + n.y * n.y + n.z * n.z;
+        if (is_torn(sums, l)) ++state.torn;
+        if (n2 > 0 && n2 < settings.sheets * settings.sheets * w2) {
+          moving.push_back(number(i));
+          to.push_back(here);
+          facing.push_back(n);
+          any_facing = true;
+          continue;
+        }
+      }
+      Point side{};
+      if (!from.facing.empty()) side = {from.facing[g].x[l], from.facing[g].y[l], from.facing[g].z[l]};
+      const bool behind = side.x != 0 || side.y != 0 || side.z != 0;
+      if (pass >= settings.steps + (behind ? 1 : 0)) continue;
+      if (!fitted) kernel.fit(sums, offsets(from, queries, g, count, settings.fit, shift, number), out);
+      fitted = true;
       const float d = out.distance[l];
-      if (sums[kW][l] <= 0 || d > kStepLimit || d < -kStepLimit) continue;
+      if (d > kStepLimit || d < -kStepLimit) continue;
       const Point corner = point_of(queries[number(i)], shift);
       const Point p{corner.x - d * out.nx[l], corner.y - d * out.ny[l], corner.z - d * out.nz[l]};
-      const Point by{p.x - from.points[g].x[l], p.y - from.points[g].y[l], p.z - from.points[g].z[l]};
+      const Point by{p.x - here.x, p.y - here.y, p.z - here.z};
       if (by.x * by.x + by.y * by.y + by.z * by.z <= kStill * kStill) continue;
       moving.push_back(number(i));
       to.push_back(p);
+      facing.push_back(behind ? Point{out.nx[l], out.ny[l], out.nz[l]} : Point{});
+      any_facing = any_facing || behind;
     }
   }
-  settle(state, channels);
+  settle(kernel, settings, state, queries, channels);
   state.moving = std::move(moving);
+  if (state.moving.empty()) return false;
   fill(state.moved, to.size(), channels, [&](std::size_t i) { return to[i]; });
+  if (any_facing) {
+    state.moved.facing.resize(state.moved.points.size());
+    for (std::size_t i = 0; i < state.moved.points.size() * kLanes; ++i) {
+      const Point& f = facing[std::min(i, facing.size() - 1)];
+      Queries& lanes = state.moved.facing[i / kLanes];
+      const int l = static_cast<int>(i % kLanes);
+      lanes.x[l] = f.x;
+      lanes.y[l] = f.y;
+      lanes.z[l] = f.z;
+    }
+  }
   state.stepped = true;
+  return true;
 }
 
-void settle(TileState& state, std::size_t channels) {
-  for (std::size_t i = 0; state.stepped && i < state.moving.size(); ++i) {
-    const std::size_t to = state.moving[i] / kLanes;
-    const int lane = static_cast<int>(state.moving[i] % kLanes);
+void settle(const Kernel& kernel, const ProjectSettings& settings, TileState& state, const std::vector<Query>& queries,
+            std::size_t channels) {
+  const std::size_t count = state.stepped ? state.moving.size() : 0;
+  const auto number = [&](std::size_t i) { return state.moving[i]; };
+  FitOutput out{};
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t query = state.moving[i];
+    const std::size_t to = query / kLanes;
+    const int lane = static_cast<int>(query % kLanes);
     const std::size_t from = i / kLanes;
     const int l = static_cast<int>(i % kLanes);
+    Lanes* const all = &state.all.sums[to * channels];
+    const Lanes* const moved = &state.moved.sums[from * channels];
+    if (!state.moved.facing.empty()) {
+      if (l == 0)
+        kernel.fit(moved, offsets(state.moved, queries, from, count, settings.fit, shift_of(settings), number), out);
+      const Queries& f = state.moved.facing[from];
+      if (f.x[l] != 0 || f.y[l] != 0 || f.z[l] != 0) {
+        if (!is_apart(settings, all, lane, moved, l)) continue;
+        if (out.reach[l] > settings.good_reach || moved[kSeen][l] < static_cast<float>(settings.good_samples)) continue;
+      }
+    }
+    if (is_torn(all, lane) && !is_torn(moved, l)) --state.torn;  // two sheets told apart: no contradiction
     state.all.points[to].x[lane] = state.moved.points[from].x[l];
     state.all.points[to].y[lane] = state.moved.points[from].y[l];
     state.all.points[to].z[lane] = state.moved.points[from].z[l];
-    for (std::size_t c = 0; c < channels; ++c) {
-      state.all.sums[to * channels + c][lane] = state.moved.sums[from * channels + c][l];
-    }
+    for (std::size_t c = 0; c < channels; ++c) all[c][lane] = moved[c][l];
   }
   state.stepped = false;
 }

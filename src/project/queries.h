@@ -25,15 +25,17 @@ struct Query {
 /// point.
 struct Lot {
   std::vector<Queries> points;  ///< cells relative to the tile
+  std::vector<Queries> facing;  ///< samples whose normals point away from these do not count; zero: all do
   std::vector<Lanes> sums;      ///< per group kSums + attributes lanes
 };
 
 /// What a tile keeps between batches and steps.
 struct TileState {
   Lot all;                            ///< every query's
-  std::vector<std::uint32_t> moving;  ///< queries that still move, after the first step
+  std::vector<std::uint32_t> moving;  ///< queries that go on, after the first pass
   Lot moved;                          ///< of those
   bool stepped = false;               ///< `moved` is the one to add samples to
+  std::uint64_t torn = 0;             ///< queries whose samples' normals contradict each other
 };
 
 /// Cell centres lie half a cell above their corner.
@@ -50,13 +52,21 @@ inline constexpr float kStill = 1e-3F;
 void list_queries(const Work& work, std::vector<Query>& out);
 /// Puts the query points on the corners (or centres) and clears the sums.
 void start(TileState& state, const std::vector<Query>& queries, std::size_t channels, float shift);
-/// Moves the query points to the projected points for the next step; only those that move go on.
-void advance(const Kernel& kernel, const ProjectSettings& settings, TileState& state, const std::vector<Query>& queries,
-             std::size_t channels);
-/// Adds the samples to the sums of the points that still move.
+/// How often the samples are looked at: once a step, and once more for points between two sheets.
+inline int passes_of(const ProjectSettings& settings) {
+  return settings.steps + (settings.sheets > 0 ? 1 : 0);
+}
+/// Ends a pass and prepares the next one, `pass` (1 is the second). Query points move to the projected points; only
+/// those that move go on. After the first pass those that see two sheets stay where they are and are summed up again
+/// without the samples that face the other way, one pass behind the others from then on. False when none goes on.
+bool advance(const Kernel& kernel, const ProjectSettings& settings, TileState& state, const std::vector<Query>& queries,
+             std::size_t channels, int pass);
+/// Adds the samples to the sums of the points that go on.
 void accumulate(const Kernel& kernel, const RowSamples& rows, TileState& state, std::size_t channels);
-/// Ends the steps: `all` has every query's last point and sums.
-void settle(TileState& state, std::size_t channels);
+/// Ends the steps: `all` has every query's last point and sums; those between sheets have one sheet's where the two lie
+/// apart and that sheet can be trusted there.
+void settle(const Kernel& kernel, const ProjectSettings& settings, TileState& state, const std::vector<Query>& queries,
+            std::size_t channels);
 /// How the sums of a group of `all` become points.
 FitInput fit_input(const TileState& state, const std::vector<Query>& queries, std::size_t group, Fit fit, float shift);
 

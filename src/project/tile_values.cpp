@@ -2,19 +2,12 @@
 
 #include <algorithm>
 #include <bit>
+#include <cmath>
 
 #include "project/shared_corners.h"
 
 namespace lamina {
 namespace {
-
-/// Whether the normals a point sees contradict each other.
-bool is_torn(const Lanes* sums, int lane) {
-  const float x = sums[kNx][lane];
-  const float y = sums[kNy][lane];
-  const float z = sums[kNz][lane];
-  return x * x + y * y + z * z < 0.25F * sums[kW][lane] * sums[kW][lane];
-}
 
 /// Whether a sample close enough contributed to a point.
 bool is_seen(const Lanes* sums, int lane) {
@@ -27,6 +20,23 @@ bool any_seen(const Lanes* sums) {
   return any;
 }
 
+/// Makes a corner's projected point the average of its samples, on the side where the fit has it: a fit that reaches
+/// beyond its samples tells no more.
+void keep_to_samples(const Lanes* sums, const FitInput& in, int l, FitOutput& fit) {
+  const float inv = 1.0F / sums[kW][l];
+  const float x = in.offset.x[l] - sums[kPx][l] * inv;
+  const float y = in.offset.y[l] - sums[kPy][l] * inv;
+  const float z = in.offset.z[l] - sums[kPz][l] * inv;
+  const float d = std::sqrt(x * x + y * y + z * z);
+  if (!(d > 1e-3F)) return;  // too near for a direction: the fit's point is as near
+  const float side = fit.distance[l] < 0 ? -1.0F : 1.0F;
+  fit.distance[l] = side * d;
+  fit.nx[l] = side * x / d;
+  fit.ny[l] = side * y / d;
+  fit.nz[l] = side * z / d;
+  fit.curvature[l] = 0;
+}
+
 }  // namespace
 
 Tally fit_tile(const Kernel& kernel, const ProjectSettings& settings, std::size_t channels, const TileState& state,
@@ -36,22 +46,24 @@ Tally fit_tile(const Kernel& kernel, const ProjectSettings& settings, std::size_
   out.seen.assign(groups * kLanes, 0);
   out.good.assign(groups * kLanes, 0);
   Tally tally;
+  tally.torn = state.torn;
   for (std::size_t g = 0; g < groups; ++g) {
     const Lanes* sums = &state.all.sums[g * channels];
     if (!any_seen(sums)) continue;
     FitOutput& fit = out.fits[g];
-    kernel.fit(sums, fit_input(state, queries, g, settings.fit, shift_of(settings)), fit);
+    const FitInput in = fit_input(state, queries, g, settings.fit, shift_of(settings));
+    kernel.fit(sums, in, fit);
     const int lanes = static_cast<int>(std::min<std::size_t>(kLanes, queries.size() - g * kLanes));
     for (int l = 0; l < lanes; ++l) {
       const bool has_normal = fit.nx[l] != 0 || fit.ny[l] != 0 || fit.nz[l] != 0;
       const bool seen = is_seen(sums, l) && has_normal;
       const bool good =
           seen && fit.reach[l] <= settings.good_reach && sums[kSeen][l] >= static_cast<float>(settings.good_samples);
+      if (seen && !good && !settings.centres) keep_to_samples(sums, in, l, fit);
       out.seen[g * kLanes + static_cast<std::size_t>(l)] = seen ? 1 : 0;
       out.good[g * kLanes + static_cast<std::size_t>(l)] = good ? 1 : 0;
       tally.seen += seen ? 1 : 0;
       tally.good += good ? 1 : 0;
-      tally.torn += seen && is_torn(sums, l) ? 1 : 0;
     }
   }
   return tally;

@@ -5,6 +5,7 @@
 
 #include <utility>
 
+#include "lamina/error.h"
 #include "slab_store/store_impl.h"
 
 namespace lamina {
@@ -46,9 +47,14 @@ void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
   const auto& [blocks, checksums, count, z_lower, z_upper] = impl_->buckets[bucket];
   const auto& columns = impl_->columns;
   const TempFile& file = impl_->file_of(bucket);
-  columns.resize(out, count);
   std::vector<std::size_t> first(blocks.size());
-  for (std::size_t i = 1; i < blocks.size(); ++i) first[i] = first[i - 1] + blocks[i - 1].count;
+  std::uint64_t here = 0;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    first[i] = here;
+    here += blocks[i].count;
+  }
+  if (here != count) throw Error(ExitCode::internal, fmt::format("slab store: bucket {} lies in other stores", bucket));
+  columns.resize(out, count);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size()),
                     [&, &blocks = blocks, &checksums = checksums](const auto& range) {
                       std::vector<std::byte> bytes;

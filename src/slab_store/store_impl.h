@@ -2,8 +2,10 @@
 #pragma once
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "slab_store/block_codec.h"
@@ -35,6 +37,14 @@ struct SlabStore::Impl {
   std::string directory;     ///< where the store is kept; empty: it is not
 
   [[nodiscard]] TempFile& file_of(std::size_t bucket) { return files[bucket * files.size() / buckets.size()]; }
+};
+
+/// The insides of a store, for those that move its blocks.
+struct StoreAccess {
+  using Impl = SlabStore::Impl;
+  static Impl& of(SlabStore& store) { return *store.impl_; }
+  static const Impl& of(const SlabStore& store) { return *store.impl_; }
+  static SlabStore make(std::unique_ptr<Impl> impl) { return SlabStore(std::move(impl)); }
 };
 
 }  // namespace lamina

@@ -53,6 +53,9 @@ void place_vertices(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* n
         const Corner b = look_up(v.other);
         const double t = v.t;
         p = (1 - t) * position(*a.corner) + t * position(*b.corner);
+        // Where a corner is not trusted its point keeps to the samples, which the edge may not.
+        if (a.corner->reach < 0 || b.corner->reach < 0)
+          p = (1 - t) * clustered(*a.corner, chord) + t * clustered(*b.corner, chord);
         const Vec3 blended = (1 - t) * normal + t * to_vec(b.corner->normal);
         if (blended.squaredNorm() > 1e-12) normal = blended.normalized();
         for (std::size_t c = 0; c < attributes; ++c) {

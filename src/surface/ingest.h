@@ -1,5 +1,7 @@
 // From the input's samples to the slab store: validated, rotated, fixed-point, bucketed along the sweep axis.
 #pragma once
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -33,9 +35,14 @@ struct StorePlace {
   StorePlace(std::string in, bool stays = false) : directory(std::move(in)), keep(stays) {}
 };
 
-/// Reads the whole input into the store; samples with a defect are left out. After a survey of all rows the result is
-/// always complete; after one of a part it need not be.
+/// Rows [first, end) of an input, as far as there are.
+struct RowSpan {
+  std::uint64_t first = 0, end = std::numeric_limits<std::uint64_t>::max();
+};
+
+/// Reads the input, or some of its rows, into the store; samples with a defect are left out. After a survey of all rows
+/// the result is always complete; after one of a part it need not be.
 Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, double radius_scale,
-                const StorePlace& place, const RunContext& run);
+                const StorePlace& place, const RunContext& run, const RowSpan& rows = {});
 
 }  // namespace lamina

@@ -48,13 +48,23 @@ Pipeline::Pipeline(const SurfaceSettings& settings, const Resolved& resolved, co
       held_(stages_.triangulated.begin),
       covered_(stages_.refined.begin),
       leaf_cells_(static_cast<std::size_t>(resolved.lattice.levels), 0) {
+  if (const auto from = z_read(settings, resolved, span, all_).from) feed_.begin_at(*from);
+}
+
+ZRead z_read(const SurfaceSettings& settings, const Resolved& resolved, const SlabSpan& span, const SlabSpan& all) {
   const Lattice& lattice = resolved.lattice;
-  const double ahead = static_cast<double>(feed_.support_limit()) + static_cast<double>(projector_.margin(lattice));
-  if (span.begin > all_.begin) {
-    feed_.begin_at(std::min(std::int64_t{stages_.marked.begin} * lattice.slab_height(),
-                            std::int64_t{stages_.projected.begin} * lattice.slab_height() -
-                                static_cast<std::int64_t>(std::ceil(ahead)) - 1));
+  const std::int64_t height = lattice.slab_height();
+  const StageSpans stages = stage_spans(span, all, settings.diffuse);
+  const double ahead = static_cast<double>(support_limit(resolved.feed, lattice)) +
+                       static_cast<double>(Projector(project_settings(settings), select_kernel()).margin(lattice));
+  ZRead z;
+  if (span.begin > all.begin) {
+    z.from = std::min(stages.marked.begin * height,
+                      stages.projected.begin * height - static_cast<std::int64_t>(std::ceil(ahead)) - 1);
   }
+  z.to = std::max((stages.projected.end + kReachSlabs) * height,
+                  stages.projected.end * height + static_cast<std::int64_t>(ahead) + 1);
+  return z;
 }
 
 void Pipeline::mark(const ActiveBucket& bucket) {

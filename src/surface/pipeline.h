@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 
 #include "extract/extract.h"
 #include "feed/sample_feed.h"
@@ -15,6 +16,13 @@
 #include "window/window.h"
 
 namespace lamina {
+
+/// The z of the samples that the pipeline reads for a span of slabs: [from, to); no `from`: from the bottom.
+struct ZRead {
+  std::optional<std::int64_t> from;
+  std::int64_t to = 0;
+};
+ZRead z_read(const SurfaceSettings& settings, const Resolved& resolved, const SlabSpan& span, const SlabSpan& all);
 
 /// Refine, project, finish, number, triangulate, cluster, write: run() takes the slabs through all of them.
 class Pipeline {

@@ -54,22 +54,6 @@ void warn_of_contradictions(const SurfaceStats& stats, const std::string& input,
                   input, 100 * share, 100 * stats.torn_share, stats.torn_slab));
 }
 
-/// Everything named, as one stream; says what the readers found worth saying.
-std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const std::string& tmp_dir,
-                                         const RunContext& run) {
-  std::unique_ptr<PointSource> source = open_points(input_names(settings), {tmp_dir, settings.columns});
-  const PointSourceInfo& info = source->info();
-  for (const std::string& remark : info.remarks) run.info(remark);
-  if (info.geographic) {
-    throw Error(ExitCode::unreadable,
-                fmt::format("{}: x and y are degrees of longitude and latitude, in which no distance can be measured; "
-                            "project them to metres first, for example to the UTM zone: pdal translate IN.las OUT.las "
-                            "reprojection --filters.reprojection.out_srs=EPSG:326ZONE",
-                            info.path));
-  }
-  return source;
-}
-
 /// Float positions keep a hundredth of a cell as long as the coordinates are below some ten thousand cells;
 /// georeferenced ones are not. Nor can float hold the very large and the very small.
 bool needs_double(const Census& census, double finest_cell) {
@@ -226,6 +210,21 @@ std::vector<std::string> input_names(const SurfaceSettings& settings) {
   return names;
 }
 
+std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const std::string& tmp_dir,
+                                         const RunContext& run) {
+  std::unique_ptr<PointSource> source = open_points(input_names(settings), {tmp_dir, settings.columns});
+  const PointSourceInfo& info = source->info();
+  for (const std::string& remark : info.remarks) run.info(remark);
+  if (info.geographic) {
+    throw Error(ExitCode::unreadable,
+                fmt::format("{}: x and y are degrees of longitude and latitude, in which no distance can be measured; "
+                            "project them to metres first, for example to the UTM zone: pdal translate IN.las OUT.las "
+                            "reprojection --filters.reprojection.out_srs=EPSG:326ZONE",
+                            info.path));
+  }
+  return source;
+}
+
 /// A mesh in the place of its points would cost the user the scan.
 void require_two_files(const SurfaceSettings& settings) {
   std::error_code ignored;
@@ -270,14 +269,18 @@ Resolved plan_surface(const SurfaceSettings& settings, const SweepInput& input, 
                       double elapsed, SurfaceStats& stats) {
   const PointSourceInfo& info = input.info;
   const Census& census = input.ingested.census;
+  RadiusSurvey radii;
   const auto plan_for = [&](const SurfaceSettings& s) {
-    Resolved r = resolve_plan(s, input.frame, input.ingested.store, input.ingested.extent, info.has_radius,
+    Resolved r = resolve_plan(s, input.frame, input.ingested.store, input.ingested.extent, radii, info.has_radius,
                               info.attributes.size());
     r.plan.memory_bytes += table_bytes(r.lattice, input.ingested);
     return r;
   };
   Resolved resolved;
-  watch.time("plan", [&] { resolved = plan_for(settings); });
+  watch.time("plan", [&] {
+    radii = input.radii ? *input.radii : survey_radii(input.ingested.store, kSurveySamples, settings.density);
+    resolved = plan_for(settings);
+  });
   expect_time(settings, info, resolved, watch, elapsed);
   stats.plan = resolved.plan;
   stats.samples_read = info.count;

@@ -1,6 +1,8 @@
 // The job in three steps, for those that run a part of it: read the input, plan, sweep a span of slabs.
 #pragma once
 #include <functional>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +24,7 @@ struct SweepInput {
   PointSourceInfo info;
   Frame frame;
   Ingested ingested;
+  std::optional<RadiusSurvey> radii{};  ///< where they have been surveyed already
 };
 
 /// Runs `work` with the threads and in the arena of a job.
@@ -44,6 +47,11 @@ FrameMode chosen_frame(const SurfaceSettings& settings);
 /// (stats.normals).
 SweepInput read_surface_input(const SurfaceSettings& settings, const std::string& directory, bool keep,
                               const RunContext& run, Stopwatch& watch, SurfaceStats& stats);
+
+/// Opens everything named, as one stream; says what the readers found worth saying. Throws Error(unreadable) for
+/// coordinates in degrees.
+std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const std::string& tmp_dir,
+                                         const RunContext& run);
 
 /// Resolves and reports the plan; fills in stats.plan and what was read. `elapsed`: seconds since the job began.
 /// Throws Error(empty) where the samples lie too far apart, Error(budget) where they need too much memory.

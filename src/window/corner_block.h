@@ -37,7 +37,7 @@ struct alignas(64) BlockMask {
 /// Distance is signed (positive outside), the normal is the fit's at the projected point, which lies at corner -
 /// distance * normal; curvature is the fit's signed curvature there (1/steps, positive where the surface bends away
 /// from its normal, as a sphere seen from outside); reach is |projected point - weighted average| in units of the local
-/// support radius.
+/// support radius. Of a corner that is not trusted the projected point is that average itself (its reach is the fit's).
 enum Channel : int { kDistance = 0, kNormalX, kNormalY, kNormalZ, kCurvature, kReach, kFirstAttribute };
 
 /// Leaves what it allocates as it is, for values that are written next.

@@ -78,40 +78,40 @@ class ChunkIdentity : public ::testing::Test {
 };
 
 TEST_F(ChunkIdentity, VaryingDensity) {
-  expect_same(long_cloud(12000), {}, {1, 2, 7});
+  expect_same(long_cloud(8000), {}, {1, 2, 7});
   EXPECT_GT(slabs_, 20);
 }
 
 TEST_F(ChunkIdentity, EverySlabItsOwnChunk) {
   SurfaceSettings s;
   s.levels = 3;
-  expect_same(long_cloud(2500, 3), s, {1000});
+  expect_same(long_cloud(1500, 2), s, {30});
   EXPECT_GT(slabs_, 8);
 }
 
 TEST_F(ChunkIdentity, WithoutClustering) {
   SurfaceSettings s;
   s.cluster = ClusterMode::none;
-  expect_same(long_cloud(6000), s, {5});
+  expect_same(long_cloud(4000), s, {5});
 }
 
 TEST_F(ChunkIdentity, FreeClustering) {
   SurfaceSettings s;
   s.cluster = ClusterMode::free;
-  expect_same(long_cloud(6000), s, {5});
+  expect_same(long_cloud(4000), s, {5});
 }
 
 TEST_F(ChunkIdentity, Diffusion) {
   SurfaceSettings s;
   s.diffuse = true;
-  expect_same(long_cloud(6000), s, {5});
+  expect_same(long_cloud(4000), s, {5});
 }
 
 TEST_F(ChunkIdentity, SeveralStepsAndWideSupport) {
   SurfaceSettings s;
   s.steps = 3;
   s.blend = 2;
-  expect_same(long_cloud(6000), s, {5});
+  expect_same(long_cloud(4000), s, {5});
 }
 
 TEST_F(ChunkIdentity, CellsThatFollowTheRadiusAlone) {
@@ -119,14 +119,14 @@ TEST_F(ChunkIdentity, CellsThatFollowTheRadiusAlone) {
   s.blend = 3;
   s.cell = {0.9, Length::Unit::sample_radius};
   s.boundary = 0.7;
-  expect_same(long_cloud(5000), s, {6});
+  expect_same(long_cloud(3000), s, {6});
 }
 
 TEST_F(ChunkIdentity, OneSizeOfCells) {
   SurfaceSettings s;
   s.cell = {0.02, Length::Unit::world};
   s.window = 3;
-  expect_same(long_cloud(6000), s, {6});
+  expect_same(long_cloud(4000), s, {6});
 }
 
 TEST_F(ChunkIdentity, OneLevel) {
@@ -136,19 +136,19 @@ TEST_F(ChunkIdentity, OneLevel) {
 }
 
 TEST_F(ChunkIdentity, ManyComponents) {
-  expect_same(pearls(150, 60), {}, {2, 7});
+  expect_same(pearls(80, 50), {}, {2, 7});
 }
 
 TEST_F(ChunkIdentity, SamplesOnNoSurface) {
   for (const ClusterMode mode : {ClusterMode::preserving, ClusterMode::free}) {
     SurfaceSettings s;
     s.cluster = mode;
-    expect_same(dust(4000), s, {11});
+    expect_same(dust(1500), s, {7});
   }
 }
 
 TEST_F(ChunkIdentity, RadiiThatTheInputGives) {
-  Cloud cloud = long_cloud(6000);
+  Cloud cloud = long_cloud(4000);
   cloud.add_property("radius", ScalarType::float32, [](const Point3& p) { return 0.05 + 0.03 * std::sin(5 * p[2]); });
   SurfaceSettings s;
   s.radius_scale = 1.1;
@@ -156,7 +156,7 @@ TEST_F(ChunkIdentity, RadiiThatTheInputGives) {
 }
 
 TEST_F(ChunkIdentity, GeoreferencedAndUndersampled) {
-  Cloud cloud = long_cloud(6000);
+  Cloud cloud = long_cloud(4000);
   for (Point3& p : cloud.positions) p[0] += 5e6, p[1] += 4e5;
   SurfaceSettings s;
   s.max_radius = {2.0, Length::Unit::sample_radius};

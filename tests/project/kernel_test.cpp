@@ -104,6 +104,37 @@ TEST(Kernel, SumsAreTheDefinition) {
   }
 }
 
+TEST(Kernel, SamplesThatFaceAwayDoNotCount) {
+  std::mt19937_64 random(5);
+  const TileSamples s = random_samples(random, 120, 1);
+  const Queries q{random_lanes(random, 2, 6), random_lanes(random, 2, 6), random_lanes(random, 2, 6)};
+  Queries facing{random_lanes(random, -1, 1), random_lanes(random, -1, 1), random_lanes(random, -1, 1)};
+  facing.x[0] = facing.y[0] = facing.z[0] = 0;  // no side: all count
+  const SampleRange all{0, 120};
+  for (const Kernel& kernel : available_kernels()) {
+    std::vector<Lanes> sums(kSums + 1, Lanes{});
+    sums[kNearest].v.fill(1e30F);
+    kernel.accumulate_facing(s, &all, 1, q, facing, sums.data());
+    for (int l = 0; l < kLanes; ++l) {
+      TileSamples kept;
+      kept.resize(0, 1);
+      for (std::uint32_t i = 0; i < 120; ++i) {
+        if (s.nx[i] * facing.x[l] + s.ny[i] * facing.y[l] + s.nz[i] * facing.z[l] < 0) continue;
+        const auto n = kept.x.size();
+        kept.resize(n + 1, 1);
+        for (auto member :
+             {&TileSamples::x, &TileSamples::y, &TileSamples::z, &TileSamples::nx, &TileSamples::ny, &TileSamples::nz,
+              &TileSamples::support, &TileSamples::inv_support2, &TileSamples::inv_band2, &TileSamples::weight}) {
+          (kept.*member)[n] = (s.*member)[i];
+        }
+        kept.attributes[0][n] = s.attributes[0][i];
+      }
+      const auto expected = sums_of(kernel, kept, {{0, static_cast<std::uint32_t>(kept.x.size())}}, q);
+      for (std::size_t c = 0; c < sums.size(); ++c) EXPECT_EQ(sums[c][l], expected[c][l]) << "sum " << c;
+    }
+  }
+}
+
 TEST(Kernel, SamplesOutOfReachChangeNothing) {
   // What tiles and rows bring along beside the samples that contribute must not show in any bit.
   std::mt19937_64 random(2);

@@ -33,6 +33,7 @@ struct TruthValue {
   int seen = 0;
   double nearest = 1e30;  ///< least (distance / band)^2 over the samples that contribute
   double distance = 0, curvature = 0, reach = 0;
+  Vec3 from_average{};  ///< the point minus the weighted average of its samples
   Vec3 normal{};
   std::vector<double> attributes;
   double distance_error = 0, curvature_error = 0, reach_error = 0, normal_error = 0;
@@ -94,6 +95,7 @@ class MlsTruth {
     v.curvature_error = fit.error[4] / cell;
     v.reach = fit.out[5];
     v.reach_error = fit.error[5];
+    for (int k = 0; k < 3; ++k) v.from_average[k] = fit.from_average[k] * cell;
     const std::size_t attributes = samples_.empty() ? 0 : samples_.front().attributes.size();
     v.attributes.assign(fit.out.begin() + 6, fit.out.begin() + 6 + static_cast<std::ptrdiff_t>(attributes));
     v.attribute_errors.assign(fit.error.begin() + 6, fit.error.begin() + 6 + static_cast<std::ptrdiff_t>(attributes));
@@ -114,6 +116,7 @@ class MlsTruth {
     int seen = 0;
     double nearest = 1e30;
     Outputs out{}, error{};
+    Vec3 from_average{};
     bool undecided = false;
     void add_difference(const Fit& other) {
       undecided = undecided || other.undecided || other.seen != seen || (other.nearest > 1) != (nearest > 1);
@@ -235,6 +238,7 @@ class MlsTruth {
     for (int k = 0; k < 3; ++k) y[k] = corner[k] - query[k];
     const Shape shape = evaluate(sums, y);
     fit.out = shape.out;
+    for (std::size_t k = 0; w > 0 && k < 3; ++k) fit.from_average[k] = y[k] - sums[kSumP + k] / w;
     for (const Term& term : terms) {
       for (const double sign : {-1.0, 1.0}) {
         Sums moved = sums;
