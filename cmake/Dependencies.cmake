@@ -14,3 +14,9 @@ find_package(fmt REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(PNG REQUIRED)
 find_package(ZLIB REQUIRED)
+# Several machines on one mesh; without it the program runs alone.
+option(LAMINA_WITH_MPI "Build with MPI where it is found" ON)
+if(LAMINA_WITH_MPI)
+  enable_language(C)  # CMake asks the C compiler for MPI's C interface
+  find_package(MPI COMPONENTS C)
+endif()

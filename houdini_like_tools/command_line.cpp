@@ -6,9 +6,11 @@
 #include <new>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "console.h"
 #include "lamina/error.h"
+#include "lamina/ranks.h"
 #include "lamina/version.h"
 #include "option_table.h"
 #include "text.h"
@@ -59,6 +61,12 @@ std::string unknown_word(const CLI::App& app, const CLI::App& tool) {
   return {};
 }
 
+/// Ranks that mpirun started fail together, and one of them says why.
+template <class... Arguments>
+void complain(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
+  if (launch().rank == 0) fmt::print(stderr, format, std::forward<Arguments>(arguments)...);
+}
+
 int answer_parse_error(const CLI::App& app, const CLI::ParseError& error) {
   if (error.get_exit_code() == 0) return app.exit(error);  // help and version
   const CLI::App& tool = chosen_tool(app);
@@ -68,7 +76,7 @@ int answer_parse_error(const CLI::App& app, const CLI::ParseError& error) {
     reason =
         &tool == &app ? fmt::format("no tool named; there are {}", fmt::join(tool_names(app), ", ")) : error.what();
   }
-  fmt::print(stderr, "{}: {} (see '{} --help')\n", command, reason, command);
+  complain("{}: {} (see '{} --help')\n", command, reason, command);
   return exit_code(ExitCode::usage);
 }
 
@@ -90,13 +98,13 @@ int run_program(int argc, const char* const* argv, const std::vector<AddTool>& t
   } catch (const CLI::ParseError& e) {
     return answer_parse_error(app, e);
   } catch (const Error& e) {
-    fmt::print(stderr, "lamina: {}\n", e.what());
+    complain("lamina: {}\n", e.what());
     return exit_code(e.code());
   } catch (const std::bad_alloc&) {
-    fmt::print(stderr, "lamina: out of memory; free some, or see --max-memory to plan the job\n");
+    complain("lamina: out of memory; free some, or see --max-memory to plan the job\n");
     return exit_code(ExitCode::budget);
   } catch (const std::exception& e) {
-    fmt::print(stderr, "lamina: internal error: {}\n", e.what());
+    complain("lamina: internal error: {}\n", e.what());
     return exit_code(ExitCode::internal);
   }
 }

@@ -16,6 +16,8 @@
 #include "model.h"
 #include "normal_options.h"
 #include "result_file.h"
+#include "surface_parts.h"
+#include "surface_ranks.h"
 #include "text.h"
 #include "tool.h"
 
@@ -26,6 +28,7 @@ struct SurfaceOptions {
   std::vector<std::string> inputs;
   SurfaceSettings settings;
   RunOptions run;
+  PartsOptions parts;
   std::string stats, preview;
 };
 
@@ -123,9 +126,11 @@ void run_surface(const SurfaceOptions& o) {
   }
   if (!o.preview.empty() && settings.output == "-")
     throw Error(ExitCode::usage, "--preview draws the mesh file; give --output one");
+  if (!o.preview.empty() && o.parts.chunked)
+    throw Error(ExitCode::usage, "--preview draws a mesh, --chunk makes only a part of one");
   if (!o.preview.empty() && o.preview == settings.output)
     throw Error(ExitCode::usage, "--preview and --output name the same file");
-  if (!o.preview.empty() && !settings.dry_run)
+  if (!o.preview.empty() && !settings.dry_run && launch().rank == 0)
     ResultFile(o.preview);  // refuses what cannot be written, before the work
   RunContext context = make_context(o.run);
   // The plan is what a dry run is for: a result, not a message.
@@ -135,8 +140,18 @@ void run_surface(const SurfaceOptions& o) {
     };
   }
   std::optional<ResultFile> stats_file;
-  if (!o.stats.empty()) stats_file.emplace(o.stats);
-  const SurfaceStats stats = reconstruct_surface(settings, context);
+  if (!o.stats.empty() && launch().rank == 0) stats_file.emplace(o.stats);
+  const bool ranked = launch().size > 1;
+  RanksStats ranks;
+  PartsResult parts;
+  if (ranked) {
+    ranks = run_ranks(settings, o.parts, context);
+    if (launch().rank > 0) return;
+    report_ranks(ranks.ranks, context);
+  } else {
+    parts = run_parts(settings, o.parts, context);
+  }
+  const SurfaceStats& stats = ranked ? ranks.surface : parts.surface;
   if (!settings.dry_run) {
     context.info(fmt::format("{} vertices, {} triangles in {:.1f} s ({:.2f} M samples per CPU second, {:.0f} MB)",
                              stats.vertices, stats.triangles, stats.wall,
@@ -149,7 +164,18 @@ void run_surface(const SurfaceOptions& o) {
           fmt::format("{} ... {}: {} files, {}", v.files.front(), v.files.back(), v.files.size(), bytes_text(v.bytes)));
   }
   if (!o.preview.empty() && !settings.dry_run) draw_preview(o, settings.output, context);
-  if (stats_file) stats_file->write(to_json(stats, settings).dump(2) + "\n");
+  if (!stats_file) return;
+  nlohmann::ordered_json json = to_json(stats, settings);
+  if (parts.chunk) {
+    json["chunk"] = {{"number", o.parts.chunk.number},
+                     {"count", o.parts.chunk.count},
+                     {"first_slab", parts.chunk->first_slab},
+                     {"slabs", parts.chunk->slabs},
+                     {"overlap_slabs", parts.chunk->overlap_slabs},
+                     {"samples", parts.chunk->samples}};
+  }
+  if (ranked) json["ranks"] = ranks_json(ranks.ranks);
+  stats_file->write(json.dump(2) + "\n");
 }
 
 template <typename T>
@@ -268,6 +294,7 @@ void add_surface(CLI::App& app) {
       ->group(mesh);
 
   add_volume_options(*tool, s.volume);
+  add_parts_options(*tool, o->parts);
 
   tool->add_option("--window", s.window, "slabs each stage advances at once")->capture_default_str()->group("Run");
   auto* dry =
@@ -283,7 +310,8 @@ void add_surface(CLI::App& app) {
   add_examples(*tool,
                "  lamina surface scan.ply -o mesh_of_scan.ply\n"
                "  lamina surface scan.ply --dry-run");
-  tool->callback([o, output, dry] {
+  tool->callback([o, tool, output, dry] {
+    if (o->parts.tasks > 0) return print_tasks(*tool, o->inputs.front(), o->settings.output, o->parts);
     if (output->count() == 0 && dry->count() == 0) throw CLI::RequiredError("--output");
     run_surface(*o);
   });

@@ -63,15 +63,15 @@ struct NormalsReport {
 
 /// The same points with normals. Each gets the plane through its nearest samples (principal component analysis); the
 /// sign comes from the viewpoints, or from given normals that stay, or else is such that every surface's outside is
-/// out; it travels along links between neighbours, first within patches of some 64 samples, then between patches over
-/// a spanning tree (docs/normals.md). Samples that get no normal have 0 0 0.
+/// out; it travels along links between neighbours, first within patches of some 64 samples or more, then between
+/// patches over a spanning tree (docs/normals.md). Samples that get no normal have 0 0 0.
 ///
 /// Reads the input twice before this returns, and once more through the result, whose rows are those of `source`, in
-/// order, and random_access as it is. Memory goes with the cloud's cross-section and the number of patches (no more
-/// than a quarter of a million or so in a cloud of even density); positions and results rest in unnamed files in
+/// order, and random_access as it is. Memory goes with the cloud's cross-section and the number of patches (some
+/// 300 000 at most in a cloud of even density); positions and results rest in unnamed files in
 /// run.tmp_dir (empty: the system's). The result does not depend on threads.
 /// Throws Error: usage (settings out of range, check without normals), empty (no points, or all at one place), budget
-/// (disk), and what the source throws.
+/// (disk; run.max_memory, before the sweep), and what the source throws.
 std::unique_ptr<PointSource> with_normals(std::unique_ptr<PointSource> source, const NormalsSettings& settings,
                                           NormalsReport& report, const RunContext& run = {});
 

@@ -2,7 +2,9 @@
 // surface.
 #pragma once
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -64,5 +66,10 @@ struct RadiusSurvey {
 /// (layout has_radius) the quantiles are those of the given radii. Memory: 20 bytes per sample of a run. Throws nothing
 /// of its own; all-zero radii when the store is empty or all samples coincide.
 RadiusSurvey survey_radii(const SlabStore& store, std::uint64_t sample_limit, std::uint32_t min_samples = 16);
+
+/// The same where a bucket's samples come from elsewhere: `read` fills them in as SlabStore::read() does.
+using ReadBucket = std::function<void(std::size_t bucket, LocalSamples& out)>;
+RadiusSurvey survey_radii(const SlabStore& counts, const ReadBucket& read, std::uint64_t sample_limit,
+                          std::uint32_t min_samples = 16);
 
 }  // namespace lamina

@@ -13,6 +13,35 @@ constexpr int kReadAhead = 2;
 /// Buckets beyond them that the system is told of.
 constexpr int kAnnounceAhead = 6;
 
+/// Side of the coarsest counting cells, steps.
+std::int64_t counting_height(const RadiiSettings& radii) {
+  return std::int64_t{radii.finest_cell} << (radii.levels - 1);
+}
+
+std::int64_t cell_of(std::int64_t z, std::int64_t height) {
+  return z / height - (z % height < 0 ? 1 : 0);
+}
+
+/// The first bucket that a feed beginning at z reads; `counting`: side of the coarsest counting cells, 0 where there
+/// are none.
+std::size_t first_bucket(const SlabStore& store, std::int64_t z, std::int64_t counting) {
+  const auto first_reaching = [&](std::int64_t from) {
+    std::size_t bucket = 0;
+    while (bucket < store.buckets() && (store.count(bucket) == 0 || store.z_upper(bucket) < from)) ++bucket;
+    return bucket;
+  };
+  const std::size_t first = first_reaching(z);
+  if (counting == 0 || first == store.buckets()) return first;
+  // A radius depends on the counting cells above and below the sample's own.
+  return first_reaching((cell_of(store.z_lower(first), counting) - 1) * counting);
+}
+
+/// A radius that asks for cells larger than the coarsest level has gives no more than that level can use.
+float radius_limit(const FeedSettings& settings, const Lattice& lattice) {
+  const double coarsest = 2.0 * lattice.cell_size(lattice.levels - 1) / settings.cell_ratio;
+  return static_cast<float>(settings.cell_follows_support ? coarsest / settings.blend : coarsest);
+}
+
 /// Coarsest level whose cell is at most `size`.
 std::uint8_t level_for(double size, const Lattice& lattice) {
   int level = 0;
@@ -22,14 +51,20 @@ std::uint8_t level_for(double size, const Lattice& lattice) {
 
 }  // namespace
 
+float support_limit(const FeedSettings& settings, const Lattice& lattice) {
+  return radius_limit(settings, lattice) * settings.blend;
+}
+
 SampleFeed::SampleFeed(SlabStore& store, const Lattice& lattice, const FeedSettings& settings,
                        const RadiiSettings& radii, bool given_radii)
-    : store_(store), lattice_(lattice), settings_(settings), cache_(store, lattice, settings.cache_bytes) {
+    : store_(store),
+      lattice_(lattice),
+      settings_(settings),
+      counting_height_(counting_height(radii)),
+      cache_(store, lattice, settings.cache_bytes) {
   if (!given_radii) estimator_ = std::make_unique<RadiusEstimator>(radii);
-  // A radius that asks for cells larger than the coarsest level has gives no more than that level can use.
-  const double coarsest = 2.0 * lattice.cell_size(lattice.levels - 1) / settings.cell_ratio;
-  radius_limit_ = static_cast<float>(settings.cell_follows_support ? coarsest / settings.blend : coarsest);
-  support_limit_ = radius_limit_ * settings.blend;
+  radius_limit_ = radius_limit(settings, lattice);
+  support_limit_ = lamina::support_limit(settings, lattice);
 }
 
 FeedCounts SampleFeed::counts() const {
@@ -41,6 +76,29 @@ FeedCounts SampleFeed::counts() const {
 std::size_t SampleFeed::next_filled(std::size_t bucket) const {
   while (bucket < store_.buckets() && store_.count(bucket) == 0) ++bucket;
   return bucket;
+}
+
+void SampleFeed::begin_at(std::int64_t z) {
+  const std::size_t first = first_bucket(store_, z, estimator_ == nullptr ? 0 : counting_height_);
+  pushed_ = announced_ = ready_ = first_ = first;
+}
+
+BucketSpan buckets_read(const SlabStore& store, const RadiiSettings& radii, bool given_radii,
+                        std::optional<std::int64_t> from, std::int64_t to) {
+  const std::int64_t height = given_radii ? 0 : counting_height(radii);
+  BucketSpan span{from ? first_bucket(store, *from, height) : 0, 0};
+  std::int64_t known = to;  // below this all samples are asked for
+  span.end = span.begin;
+  while (span.end < store.buckets() && (store.count(span.end) == 0 || store.z_lower(span.end) < to)) {
+    if (store.count(span.end) > 0) known = std::max(known, std::int64_t{store.z_upper(span.end)} + 1);
+    ++span.end;
+  }
+  if (given_radii) return span;
+  // The last one's radii are final when a sample lies beyond the counting cells above its own.
+  const std::int64_t beyond = (cell_of(known - 1, height) + 2) * height;
+  while (span.end < store.buckets() && store.z_upper(span.end) < beyond) ++span.end;
+  span.end = std::min(span.end + 1, store.buckets());
+  return span;
 }
 
 void SampleFeed::prepare(std::int64_t z_limit, const OnReady& on_ready) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <unordered_map>
 #include <vector>
 
@@ -28,12 +29,25 @@ struct FeedSettings {
   std::uint64_t batch_samples = 1u << 18;
 };
 
+/// Largest influence a sample can have, steps.
+float support_limit(const FeedSettings& settings, const Lattice& lattice);
+
 struct FeedCounts {
   std::uint64_t samples = 0;       ///< that have got a radius
   std::uint64_t undersampled = 0;  ///< left out by max_radius
   std::uint64_t clamped = 0;       ///< radius reduced to what the coarsest level can serve
   std::uint64_t bucket_reads = 0;  ///< times a bucket was decompressed
 };
+
+/// Buckets [begin, end).
+struct BucketSpan {
+  std::size_t begin = 0, end = 0;
+};
+
+/// The buckets that a feed reads which begins at `from` (begin_at(); nothing: at the bottom) and prepares all below
+/// `to`: it may look for two more, but does without them.
+BucketSpan buckets_read(const SlabStore& store, const RadiiSettings& radii, bool given_radii,
+                        std::optional<std::int64_t> from, std::int64_t to);
 
 /// Buckets go by ascending z: prepare() runs ahead, release() follows behind. Inside a bucket samples are sorted by
 /// blocks of cells (feed/block_order.h): successive ones lie close to each other, which the stages may rely on for
@@ -43,6 +57,10 @@ class SampleFeed {
   /// Gives buckets released back to the store.
   SampleFeed(SlabStore& store, const Lattice& lattice, const FeedSettings& settings, const RadiiSettings& radii,
              bool given_radii);
+
+  /// Leaves out what lies below, before anything else is asked for: buckets with a sample at or above z get the radii,
+  /// and so come in the batches, of a feed that begins at the bottom; buckets below may have other radii.
+  void begin_at(std::int64_t z);
 
   /// Called for every bucket in ascending order once its radii are known.
   using OnReady = std::function<void(const ActiveBucket&)>;
@@ -74,6 +92,7 @@ class SampleFeed {
   SlabStore& store_;
   Lattice lattice_;
   FeedSettings settings_;
+  std::int64_t counting_height_;                ///< of the coarsest counting cells, steps
   std::unique_ptr<RadiusEstimator> estimator_;  ///< null when the input gave radii
   float support_limit_;
   float radius_limit_;

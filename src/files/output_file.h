@@ -19,6 +19,7 @@ class OutputFile {
   [[nodiscard]] int fd() const { return file_.get(); }             ///< the staged file, open for reading and writing
   [[nodiscard]] bool streams() const { return streams_; }          ///< goes to a pipe or device at the end
   [[nodiscard]] const std::string& name() const { return name_; }  ///< for messages
+  [[nodiscard]] const std::string& staged() const { return partial_; }       ///< the hidden file; empty when it streams
   [[nodiscard]] const std::string& directory() const { return directory_; }  ///< where the staged file lies
 
   void publish();                                ///< closes and renames; of a file that does not stream

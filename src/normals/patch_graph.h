@@ -54,8 +54,9 @@ struct PatchSigns {
 
 /// Chooses signs so that as many links as possible agree: a spanning tree in Boruvka's rounds, where every cluster of
 /// patches joins the one that it has most to say about, for or against, and the sums are taken anew between the
-/// clusters. Votes are links to the fixed node. Clusters that do not reach it are turned outside out, those that
-/// enclose nothing and lie flat towards `up` (unit length). Deterministic.
+/// clusters. Votes are links to the fixed node. Clusters whose links contradict each other too much to follow wait
+/// until those that enclose a volume have been turned outside out. What then still is not joined to the fixed node is
+/// turned outside out, too; sheets that enclose nothing and lie flat towards `up` (unit length). Deterministic.
 PatchSigns find_signs(const PatchGraph& graph, const std::array<float, 3>& up);
 
 /// Conflicts that remain, by slab.

@@ -14,6 +14,7 @@ namespace {
 struct Evidence {
   std::uint32_t a = 0, b = 0;
   float sum = 0;
+  float weight = 0;  ///< sum of sizes: more than the sum's where links contradict each other
 };
 
 /// Sums what goes between the same two clusters, in a fixed order.
@@ -21,14 +22,20 @@ void add_up(std::vector<Evidence>& evidence) {
   tbb::parallel_sort(evidence.begin(), evidence.end(), [](const Evidence& l, const Evidence& r) {
     if (l.a != r.a) return l.a < r.a;
     if (l.b != r.b) return l.b < r.b;
-    return l.sum < r.sum;
+    if (l.sum != r.sum) return l.sum < r.sum;
+    return l.weight < r.weight;
   });
   std::size_t n = 0;
   for (std::size_t i = 0; i < evidence.size();) {
     Evidence e = evidence[i];
     double sum = 0;
-    for (; i < evidence.size() && evidence[i].a == e.a && evidence[i].b == e.b; ++i) sum += double{evidence[i].sum};
+    double weight = 0;
+    for (; i < evidence.size() && evidence[i].a == e.a && evidence[i].b == e.b; ++i) {
+      sum += double{evidence[i].sum};
+      weight += double{evidence[i].weight};
+    }
     e.sum = static_cast<float>(sum);
+    e.weight = static_cast<float>(weight);
     evidence[n++] = e;
   }
   evidence.resize(n);
@@ -37,18 +44,34 @@ void add_up(std::vector<Evidence>& evidence) {
 std::vector<Evidence> evidence_of(const PatchGraph& graph) {
   std::vector<Evidence> evidence;
   evidence.reserve(graph.edges.size());
-  for (const PatchEdge& e : graph.edges) evidence.push_back({e.a, e.b, e.agreement});
+  for (const PatchEdge& e : graph.edges) evidence.push_back({e.a, e.b, e.agreement, std::abs(e.agreement)});
   for (std::uint32_t i = 1; i < graph.nodes.size(); ++i) {
-    if (graph.nodes[i].vote != 0) evidence.push_back({kFixed, i, graph.nodes[i].vote});
+    if (graph.nodes[i].vote != 0) {
+      const float vote = graph.nodes[i].vote;
+      evidence.push_back({kFixed, i, vote, std::abs(vote)});
+    }
   }
   add_up(evidence);
   return evidence;
 }
 
-void grow_forest(std::vector<Evidence> evidence, SignedForest& forest, std::size_t nodes) {
+/// Moves the evidence from the clusters there were to those there are.
+void regroup(std::vector<Evidence>& evidence, SignedForest& forest) {
+  for (Evidence& e : evidence) {
+    const std::uint32_t a = forest.find(e.a);
+    const std::uint32_t b = forest.find(e.b);
+    const int sign = forest.sign(e.a) * forest.sign(e.b);
+    e = {std::min(a, b), std::max(a, b), sign < 0 ? -e.sum : e.sum, e.weight};
+  }
+  std::erase_if(evidence, [](const Evidence& e) { return e.a == e.b || e.weight == 0; });
+  add_up(evidence);
+}
+
+/// Joins clusters until none has anything to say to another, where the sum is at least this share of the weight.
+void grow_forest(std::vector<Evidence>& evidence, float least_share, SignedForest& forest, std::size_t nodes) {
+  constexpr std::size_t kNothing = ~std::size_t{0};
   std::vector<std::size_t> best(nodes);
-  while (!evidence.empty()) {
-    constexpr std::size_t kNothing = ~std::size_t{0};
+  for (bool joined = true; joined;) {
     std::fill(best.begin(), best.end(), kNothing);
     const auto offer = [&](std::uint32_t cluster, std::size_t i) {
       // The fixed node waits to be asked: its ties are many, and none is urgent.
@@ -57,26 +80,18 @@ void grow_forest(std::vector<Evidence> evidence, SignedForest& forest, std::size
       if (now == kNothing || std::abs(evidence[i].sum) > std::abs(evidence[now].sum)) now = i;
     };
     for (std::size_t i = 0; i < evidence.size(); ++i) {
-      offer(evidence[i].a, i);
-      offer(evidence[i].b, i);
+      const Evidence& e = evidence[i];
+      if (e.sum == 0 || std::abs(e.sum) < least_share * e.weight) continue;
+      offer(e.a, i);
+      offer(e.b, i);
     }
-    bool joined = false;
+    joined = false;
     for (const std::size_t i : best) {
-      if (i == kNothing || evidence[i].sum == 0) continue;
+      if (i == kNothing) continue;
       const Evidence& e = evidence[i];
       joined = forest.unite(e.a, e.b, static_cast<std::int8_t>(e.sum > 0 ? 1 : -1)) || joined;
     }
-    if (!joined) break;
-    for (Evidence& e : evidence) {
-      const std::uint32_t a = forest.find(e.a);
-      const std::uint32_t b = forest.find(e.b);
-      const int sign = forest.sign(e.a) * forest.sign(e.b);
-      e = {std::min(a, b), std::max(a, b), sign < 0 ? -e.sum : e.sum};
-    }
-    evidence.erase(
-        std::remove_if(evidence.begin(), evidence.end(), [](const Evidence& e) { return e.a == e.b || e.sum == 0; }),
-        evidence.end());
-    add_up(evidence);
+    if (joined) regroup(evidence, forest);
   }
 }
 
@@ -86,6 +101,7 @@ struct Body {
   std::array<double, 3> moment{};  ///< area times centre
   std::array<double, 3> facing{};  ///< area times normal: zero for what is closed
   double volume = 0, size = 0;
+  std::uint64_t samples = 0;
 
   /// How much of it faces one way.
   [[nodiscard]] double openness() const { return length(facing) / area; }
@@ -99,6 +115,7 @@ std::vector<Body> bodies_of(const PatchGraph& graph, const std::vector<std::uint
     const PatchNode& node = graph.nodes[i];
     Body& body = bodies[root[i]];
     body.area += double{node.area};
+    body.samples += node.count;
     for (std::size_t a = 0; a < 3; ++a) {
       body.moment[a] += double{node.area} * double{node.centre[a]};
       body.facing[a] += signs.sign[i] * double{node.outward[a]};
@@ -119,44 +136,69 @@ std::vector<Body> bodies_of(const PatchGraph& graph, const std::vector<std::uint
   return bodies;
 }
 
+constexpr double kOpen = 0.3;  ///< half a sphere has 0.5
+
+/// Closed, and with an inside worth the name.
+bool encloses(const Body& body) {
+  constexpr double kLittle = 0.1;  // of the volume that the same area could enclose
+  return body.openness() <= kOpen && std::abs(body.volume) > kLittle * body.size;
+}
+
 /// A surface that encloses a positive volume has its normals outward: the sum of area, normal times offset from the
 /// centre is three times the volume. Sheets that face one way enclose nothing: a ground has its outside above, whether
 /// it is a hill or a bowl.
-void turn_outside_out(const PatchGraph& graph, const std::array<float, 3>& up, const std::vector<std::uint32_t>& root,
-                      PatchSigns& signs) {
-  constexpr double kOpen = 0.3;     // half a sphere has 0.5
+bool is_inside_out(const Body& body, const std::array<float, 3>& up) {
   constexpr double kUpright = 0.5;  // cosine
-  constexpr double kLittle = 0.1;   // of the volume that the same area could enclose
-  const std::vector<Body> bodies = bodies_of(graph, root, signs);
-  for (std::size_t i = 1; i < graph.nodes.size(); ++i) {
-    if (root[i] == kFixed) continue;
-    const Body& body = bodies[root[i]];
-    double upward = 0;
-    for (std::size_t a = 0; a < 3; ++a) upward += body.facing[a] * double{up[a]};
-    const bool open = body.openness() > kOpen;
-    const bool ground = open && std::abs(upward) > kUpright * Body::length(body.facing);
-    if ((ground ? upward : body.volume) < 0) signs.sign[i] = static_cast<std::int8_t>(-signs.sign[i]);
-    const bool sure = !open && std::abs(body.volume) > kLittle * body.size;
-    signs.source[i] = sure ? SignSource::outside : SignSource::unsure;
+  double upward = 0;
+  for (std::size_t a = 0; a < 3; ++a) upward += body.facing[a] * double{up[a]};
+  const bool ground = std::abs(upward) > kUpright * Body::length(body.facing) && body.openness() > kOpen;
+  return (ground ? upward : body.volume) < 0;
+}
+
+void read_forest(SignedForest& forest, std::vector<std::uint32_t>& root, PatchSigns& signs) {
+  for (std::uint32_t i = 0; i < root.size(); ++i) {
+    root[i] = forest.find(i);
+    signs.sign[i] = forest.sign(i);
   }
 }
 
 }  // namespace
 
 PatchSigns find_signs(const PatchGraph& graph, const std::array<float, 3>& up) {
+  constexpr float kClear = 0.2F;  // share of evidence between clusters that do not contradict each other
   const std::size_t n = graph.nodes.size();
   PatchSigns signs{std::vector<std::int8_t>(n, 1), std::vector<SignSource>(n, SignSource::fixed), 0};
   SignedForest forest(n);
-  grow_forest(evidence_of(graph), forest, n);
+  std::vector<Evidence> evidence = evidence_of(graph);
+  grow_forest(evidence, kClear, forest, n);
   std::vector<std::uint32_t> root(n);
-  for (std::uint32_t i = 0; i < n; ++i) {
-    root[i] = forest.find(i);
-    signs.sign[i] = forest.sign(i);
-    if (root[i] == i && (i != kFixed)) ++signs.components;
+  read_forest(forest, root, signs);
+  std::vector<Body> bodies = bodies_of(graph, root, signs);
+  for (std::uint32_t i = 1; i < n; ++i) {
+    if (root[i] != kFixed) signs.source[i] = encloses(bodies[root[i]]) ? SignSource::outside : SignSource::unsure;
   }
-  if (n > 1 && std::any_of(root.begin() + 1, root.end(), [](std::uint32_t r) { return r == kFixed; }))
+  // Bodies that pass through each other, as a handle through a wall, say nothing of each other: each has its outside.
+  // Scraps that noise has cut off are none.
+  constexpr std::uint64_t kShare = 200;
+  std::uint64_t samples = 0;
+  for (const PatchNode& node : graph.nodes) samples += node.count;
+  for (std::uint32_t i = 1; i < n; ++i) {
+    if (root[i] != i || !encloses(bodies[i]) || bodies[i].samples < samples / kShare) continue;
     ++signs.components;
-  turn_outside_out(graph, up, root, signs);
+    forest.unite(kFixed, i, static_cast<std::int8_t>(is_inside_out(bodies[i], up) ? -1 : 1));
+  }
+  regroup(evidence, forest);
+  grow_forest(evidence, 0, forest, n);
+  const bool any_fixed = std::any_of(root.begin() + 1, root.end(), [](std::uint32_t r) { return r == kFixed; });
+  signs.components += any_fixed ? 1 : 0;
+
+  read_forest(forest, root, signs);
+  bodies = bodies_of(graph, root, signs);
+  for (std::uint32_t i = 1; i < n; ++i) {
+    if (root[i] == kFixed) continue;
+    signs.components += root[i] == i ? 1 : 0;
+    if (is_inside_out(bodies[root[i]], up)) signs.sign[i] = static_cast<std::int8_t>(-signs.sign[i]);
+  }
   return signs;
 }
 

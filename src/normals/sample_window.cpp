@@ -24,6 +24,34 @@ void append_all(const WindowSamples& from, WindowSamples& to) {
 
 }  // namespace
 
+Slab slab_from(const SlabStore& store, const WindowSettings& settings, std::size_t first) {
+  Slab slab{first, first, std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::min(), 0};
+  while (slab.end < store.buckets() &&
+         (slab.samples < settings.least_samples || slab.high - slab.low < settings.least_height)) {
+    if (store.count(slab.end) > 0) {
+      slab.low = std::min<std::int64_t>(slab.low, store.z_lower(slab.end));
+      slab.high = std::max<std::int64_t>(slab.high, store.z_upper(slab.end));
+    }
+    slab.samples += store.count(slab.end++);
+  }
+  return slab;
+}
+
+WindowCounts largest_window(const SlabStore& store, const WindowSettings& settings) {
+  WindowCounts most;
+  for (Slab slab = slab_from(store, settings, 0); slab.low <= slab.high; slab = slab_from(store, settings, slab.end)) {
+    std::uint64_t window = 0;
+    for (std::size_t b = 0; b < store.buckets(); ++b) {
+      if (store.count(b) > 0 && store.z_upper(b) >= slab.low - settings.reach &&
+          store.z_lower(b) <= slab.high + settings.reach)
+        window += store.count(b);
+    }
+    most.window = std::max(most.window, window);
+    most.slab = std::max(most.slab, slab.samples);
+  }
+  return most;
+}
+
 SampleWindow::SampleWindow(const SlabStore& store, const WindowSettings& settings)
     : store_(store), settings_(settings) {}
 
@@ -48,49 +76,35 @@ void SampleWindow::load(std::size_t bucket) {
   s.nz = std::move(local.nz);
 }
 
-void SampleWindow::choose_slab() {
-  std::uint64_t samples = 0;
-  low_ = std::numeric_limits<std::int32_t>::max();
-  high_ = std::numeric_limits<std::int32_t>::min();
-  while (next_ < store_.buckets() && (samples < settings_.least_samples || high_ - low_ < settings_.least_height)) {
-    if (store_.count(next_) > 0) {
-      low_ = std::min<std::int64_t>(low_, store_.z_lower(next_));
-      high_ = std::max<std::int64_t>(high_, store_.z_upper(next_));
-    }
-    samples += store_.count(next_++);
-  }
-}
-
 /// Drops samples below the slab's reach.
 void SampleWindow::keep_what_is_near() {
   WindowSamples kept;
   for (std::size_t i = 0; i < samples_.size(); ++i) {
-    if (samples_.z[i] >= low_ - settings_.reach && samples_.z[i] < low_) kept.append(samples_, i);
+    if (samples_.z[i] >= slab_.low - settings_.reach && samples_.z[i] < slab_.low) kept.append(samples_, i);
   }
   before_ = std::move(kept);
 }
 
 bool SampleWindow::advance() {
-  const std::size_t first = next_;
-  choose_slab();
-  if (first == next_ || high_ < low_) return false;
+  slab_ = slab_from(store_, settings_, slab_.end);
+  if (slab_.high < slab_.low) return false;
   keep_what_is_near();
   for (; loaded_ < store_.buckets(); ++loaded_) {
     const bool near =
-        loaded_ < next_ || store_.count(loaded_) == 0 || store_.z_lower(loaded_) <= high_ + settings_.reach;
+        loaded_ < slab_.end || store_.count(loaded_) == 0 || store_.z_lower(loaded_) <= slab_.high + settings_.reach;
     if (!near) break;
     load(loaded_);
   }
   WindowSamples all = std::move(before_);
   const std::size_t begin = all.size();
-  for (std::size_t b = first; b < next_; ++b) {
+  for (std::size_t b = slab_.first; b < slab_.end; ++b) {
     append_all(ahead_.front(), all);
     ahead_.pop_front();
   }
   const std::size_t end = all.size();
   for (const WindowSamples& bucket : ahead_) {
     for (std::size_t i = 0; i < bucket.size(); ++i) {
-      if (bucket.z[i] <= high_ + settings_.reach) all.append(bucket, i);
+      if (bucket.z[i] <= slab_.high + settings_.reach) all.append(bucket, i);
     }
   }
   done_ += end - begin;

@@ -17,6 +17,22 @@ struct WindowSettings {
   std::int32_t least_height = 1;  ///< steps, likewise
 };
 
+/// Buckets [first, end) of the store, worked on together.
+struct Slab {
+  std::size_t first = 0, end = 0;
+  std::int64_t low = 0, high = -1;  ///< z of its lowest and highest sample
+  std::uint64_t samples = 0;
+};
+
+/// The slab that begins with a bucket: empty (high below low) where nothing is left.
+Slab slab_from(const SlabStore& store, const WindowSettings& settings, std::size_t first);
+
+/// The most samples that the window will show at once, and those of them that are its slab's.
+struct WindowCounts {
+  std::uint64_t window = 0, slab = 0;
+};
+WindowCounts largest_window(const SlabStore& store, const WindowSettings& settings);
+
 class SampleWindow {
  public:
   SampleWindow(const SlabStore& store, const WindowSettings& settings);
@@ -33,16 +49,14 @@ class SampleWindow {
 
  private:
   void load(std::size_t bucket);
-  void choose_slab();
   void keep_what_is_near();
 
   const SlabStore& store_;
   WindowSettings settings_;
-  std::size_t next_ = 0;             ///< bucket the next slab begins with
-  std::size_t loaded_ = 0;           ///< buckets before it have been read
-  std::int64_t low_ = 0, high_ = 0;  ///< z of the slab's lowest and highest sample
+  Slab slab_;
+  std::size_t loaded_ = 0;  ///< buckets before it have been read
   std::uint64_t done_ = 0;
-  std::deque<WindowSamples> ahead_;  ///< of buckets [next_, loaded_)
+  std::deque<WindowSamples> ahead_;  ///< of buckets [slab_.end, loaded_)
   WindowSamples before_;             ///< of earlier slabs
   WindowSamples samples_;
   std::vector<std::uint32_t> core_;

@@ -43,13 +43,13 @@ void WindowSamples::gather(const WindowSamples& from, std::span<const std::uint3
   move(from.given, given);
 }
 
-float agreement(const std::array<float, 3>& d, const std::array<float, 3>& a, const std::array<float, 3>& b,
+float agreement(const std::array<float, 3>& offset, const std::array<float, 3>& a, const std::array<float, 3>& b,
                 float scale) {
   constexpr float kNoise = 0.25F;  // offsets of half the neighbourhood's radius are mirrored by half
-  const float along_a = a[0] * d[0] + a[1] * d[1] + a[2] * d[2];
-  const float along_b = b[0] * d[0] + b[1] * d[1] + b[2] * d[2];
+  const float along_a = a[0] * offset[0] + a[1] * offset[1] + a[2] * offset[2];
+  const float along_b = b[0] * offset[0] + b[1] * offset[1] + b[2] * offset[2];
   const float cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  const float squared = d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + kNoise * scale;
+  const float squared = offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2] + kNoise * scale;
   return squared > 0 ? cosine - 2 * along_a * along_b / squared : cosine;
 }
 

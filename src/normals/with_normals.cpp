@@ -26,11 +26,11 @@ namespace {
 
 using namespace normals;
 
-constexpr std::size_t kMemory = std::size_t{128} << 20;  ///< for records on their way to their rows
-constexpr std::uint64_t kSurveyed = 1 << 18;             ///< samples the spacing is taken from
-constexpr std::uint64_t kLeastSlab = 1 << 17;            ///< samples that keep all threads busy
-constexpr double kPatches = 250'000;                     ///< of a large cloud, about
-constexpr double kLeastPatch = 64;                       ///< samples
+constexpr std::size_t kMemory = std::size_t{64} << 20;  ///< for records on their way to their rows
+constexpr std::uint64_t kSurveyed = 1 << 18;            ///< samples the spacing is taken from
+constexpr std::uint64_t kLeastSlab = 1 << 17;           ///< samples that keep all threads busy
+constexpr double kPatches = 150'000;  ///< of a large cloud; cells and slabs cut them to about twice as many
+constexpr double kLeastPatch = 128;   ///< samples
 constexpr double kMostSteps = 1 << 29;
 
 /// Lengths of the job, steps.
@@ -119,7 +119,9 @@ class Job {
     edit::RecordSorter records(
         kRecordBytes, static_cast<std::size_t>(std::min<std::uint64_t>(memory, in.store.total() * (kRecordBytes + 12))),
         directory);
-    sweep(in.store, scale_of(settings_, in.store, frame), viewpoints, records);
+    const Scale scale = scale_of(settings_, in.store, frame);
+    require_memory(in.store, scale, memory);
+    sweep(in.store, scale, viewpoints, records);
     const Eigen::Vector3f up = frame.rotation.col(2).cast<float>();
     PatchSigns signs = find_signs(graph_, {up.x(), up.y(), up.z()});
     report_.samples = in.store.total();
@@ -132,6 +134,25 @@ class Job {
   }
 
  private:
+  void require_memory(const SlabStore& store, const Scale& scale, std::size_t records) const {
+    if (run_.max_memory == 0) return;
+    // Measured: arrays of the window twice while it slides, its tree, links and patches of the slab.
+    constexpr std::uint64_t kWindow = 150;
+    constexpr std::uint64_t kSlab = 150;
+    constexpr double kPatch = 400;
+    constexpr std::uint64_t kProgram = std::uint64_t{40} << 20;
+    const WindowCounts most = largest_window(store, scale.window);
+    const double patches = 2 * std::min(kPatches, static_cast<double>(store.total()) / kLeastPatch) + 1;
+    const std::uint64_t needed =
+        kProgram + records + kWindow * most.window + kSlab * most.slab + static_cast<std::uint64_t>(kPatch * patches);
+    if (needed <= run_.max_memory) return;
+    throw Error(ExitCode::budget,
+                fmt::format("{}: normals need about {:.0f} MB of memory, --max-memory allows {:.0f} MB; give it more, "
+                            "or cut the cloud across its longest way",
+                            source_.info().path, static_cast<double>(needed) / 1e6,
+                            static_cast<double>(run_.max_memory) / 1e6));
+  }
+
   void sweep(const SlabStore& store, const Scale& scale, const Viewpoints& viewpoints, edit::RecordSorter& records) {
     SampleWindow window(store, scale.window);
     Links links;

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "lamina/error.h"
 
 namespace lamina {
@@ -52,6 +54,10 @@ PlyRows understand_vertices(const PlyHeader& header, const std::string& path, co
     rows.stride += static_cast<std::size_t>(byte_size(property.type));
   }
   give_roles(rows.columns, rows.info, name, "property");
+  // Stanford's range images are seen along z.
+  const auto is_grid = [](const PlyElement& element) { return element.name == "range_grid"; };
+  if (std::any_of(header.elements.begin(), header.elements.end(), is_grid))
+    rows.info.scans = {{0, ScanPart::Scanner::direction, {0, 0, 1}}};
   return rows;
 }
 

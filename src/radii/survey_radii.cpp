@@ -107,10 +107,10 @@ class Octree {
   std::vector<std::uint64_t> keys_;
 };
 
-LocalSamples read_positions(const SlabStore& store, Window window) {
+LocalSamples read_positions(const ReadBucket& read, Window window) {
   LocalSamples all, bucket;
   for (std::size_t b = window.begin; b < window.end; ++b) {
-    store.read(b, bucket);
+    read(b, bucket);
     all.x.insert(all.x.end(), bucket.x.begin(), bucket.x.end());
     all.y.insert(all.y.end(), bucket.y.begin(), bucket.y.end());
     all.z.insert(all.z.end(), bucket.z.begin(), bucket.z.end());
@@ -159,10 +159,11 @@ std::size_t bucket_of_rank(const SlabStore& store, std::uint64_t rank) {
   return b;
 }
 
-std::vector<WeightedRadius> density_radii(const SlabStore& store, Window window, std::uint32_t min_samples) {
+std::vector<WeightedRadius> density_radii(const SlabStore& store, const ReadBucket& read, Window window,
+                                          std::uint32_t min_samples) {
   std::vector<WeightedRadius> radii;
   if (count(store, window) > 0) {
-    LocalSamples samples = read_positions(store, window);
+    LocalSamples samples = read_positions(read, window);
     drop_coincident(samples);
     Octree(samples, window, store, min_samples).find_radii(radii);
   }
@@ -170,18 +171,19 @@ std::vector<WeightedRadius> density_radii(const SlabStore& store, Window window,
   return radii;
 }
 
-std::vector<WeightedRadius> given_radii(const SlabStore& store, Window window) {
+std::vector<WeightedRadius> given_radii(const ReadBucket& read, Window window) {
   std::vector<WeightedRadius> radii;
   LocalSamples bucket;
   for (std::size_t b = window.begin; b < window.end; ++b) {
-    store.read(b, bucket);
+    read(b, bucket);
     for (const float r : bucket.radius) radii.push_back({r, 1});
   }
   return radii;
 }
 
 /// How many buckets make a window tall enough to hold whole cells: 16 times the radius seen in it.
-std::size_t window_buckets(const SlabStore& store, std::uint64_t sample_limit, std::uint32_t min_samples) {
+std::size_t window_buckets(const SlabStore& store, const ReadBucket& read, std::uint64_t sample_limit,
+                           std::uint32_t min_samples) {
   constexpr double tall = 16;
   const std::size_t middle = bucket_of_rank(store, store.total() / 2);
   for (std::size_t n = 1;; n *= 2) {
@@ -189,7 +191,7 @@ std::size_t window_buckets(const SlabStore& store, std::uint64_t sample_limit, s
     const Window window{begin, std::min(store.buckets(), begin + n)};
     const std::uint64_t samples = count(store, window);
     if (samples >= sample_limit || window.end - window.begin == store.buckets()) return n;
-    const auto radii = density_radii(store, window, min_samples);
+    const auto radii = density_radii(store, read, window, min_samples);
     std::int32_t low = std::numeric_limits<std::int32_t>::max();
     std::int32_t high = std::numeric_limits<std::int32_t>::min();
     for (std::size_t b = window.begin; b < window.end; ++b) {
@@ -222,14 +224,20 @@ std::vector<Window> choose_windows(const SlabStore& store, std::uint64_t sample_
 }  // namespace
 
 RadiusSurvey survey_radii(const SlabStore& store, std::uint64_t sample_limit, std::uint32_t min_samples) {
+  const ReadBucket read = [&](std::size_t bucket, LocalSamples& out) { store.read(bucket, out); };
+  return survey_radii(store, read, sample_limit, min_samples);
+}
+
+RadiusSurvey survey_radii(const SlabStore& store, const ReadBucket& read, std::uint64_t sample_limit,
+                          std::uint32_t min_samples) {
   RadiusSurvey survey;
   if (store.total() == 0) return survey;
   const bool given = store.layout().has_radius;
   const bool whole = store.total() <= sample_limit;
-  const std::size_t size = given || whole ? 1 : window_buckets(store, sample_limit, min_samples);
+  const std::size_t size = given || whole ? 1 : window_buckets(store, read, sample_limit, min_samples);
   std::vector<WeightedRadius> radii;
   for (const Window& window : choose_windows(store, sample_limit, size)) {
-    const auto found = given ? given_radii(store, window) : density_radii(store, window, min_samples);
+    const auto found = given ? given_radii(read, window) : density_radii(store, read, window, min_samples);
     radii.insert(radii.end(), found.begin(), found.end());
     survey.samples += count(store, window);
   }

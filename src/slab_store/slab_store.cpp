@@ -44,26 +44,28 @@ std::size_t SlabStore::files() const {
 }
 
 void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
-  const auto& [blocks, count, z_lower, z_upper] = impl_->buckets[bucket];
+  const auto& [blocks, checksums, count, z_lower, z_upper] = impl_->buckets[bucket];
   const auto& columns = impl_->columns;
   const TempFile& file = impl_->file_of(bucket);
-  columns.resize(out, count);
   std::vector<std::size_t> first(blocks.size());
-  for (std::size_t i = 1; i < blocks.size(); ++i) first[i] = first[i - 1] + blocks[i - 1].count;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size()), [&, &blocks = blocks](const auto& range) {
-    std::vector<std::byte> bytes;
-    for (std::size_t i = range.begin(); i < range.end(); ++i) {
-      bytes.resize(blocks[i].bytes);
-      file.read(blocks[i].offset, bytes);
-      if (!decode_block(columns, bytes, blocks[i].count, out, first[i])) {
-        throw Error(
-            ExitCode::budget,
-            fmt::format("the temporary file in '{}' is damaged at byte {} (samples of bucket {}); check the disk "
-                        "or choose another with --tmp-dir",
-                        file.directory(), blocks[i].offset, bucket));
-      }
-    }
-  });
+  std::uint64_t here = 0;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    first[i] = here;
+    here += blocks[i].count;
+  }
+  if (here != count) throw Error(ExitCode::internal, fmt::format("slab store: bucket {} lies in other stores", bucket));
+  columns.resize(out, count);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size()),
+                    [&, &blocks = blocks, &checksums = checksums](const auto& range) {
+                      std::vector<std::byte> bytes;
+                      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                        bytes.resize(blocks[i].bytes);
+                        file.read(blocks[i].offset, bytes);
+                        const bool whole = checksums.empty() || block_checksum(bytes) == checksums[i];
+                        if (!whole || !decode_block(columns, bytes, blocks[i].count, out, first[i]))
+                          file.report_damage(blocks[i].offset, fmt::format("samples of bucket {}", bucket));
+                      }
+                    });
 }
 
 void SlabStore::will_read(std::size_t bucket) const {
@@ -82,6 +84,7 @@ void SlabStore::will_read(std::size_t bucket) const {
 }
 
 void SlabStore::release_before(std::size_t bucket) {
+  if (!impl_->directory.empty()) return;
   while (impl_->released < impl_->files.size()) {
     const std::size_t end =
         ((impl_->released + 1) * impl_->buckets.size() + impl_->files.size() - 1) / impl_->files.size();

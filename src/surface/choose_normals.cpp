@@ -1,5 +1,7 @@
 #include "surface/choose_normals.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <utility>
 
@@ -73,6 +75,18 @@ std::unique_ptr<PointSource> choose_normals(std::unique_ptr<PointSource> source,
   run.info(describe(*report));
   warn_of_conflicts(*report, path, run);
   return found;
+}
+
+std::string normals_words(const SurfaceSettings& settings) {
+  if (settings.normals == NormalsChoice::file) return "file";
+  // Every setting by name: one that is added must be dealt with here, or this does not compile.
+  const auto& [mode, k, radius, viewpoints, scanners, pose_origins, flip, bad_samples] = settings.normal_search;
+  (void)mode, (void)bad_samples;
+  std::string words = settings.normals == NormalsChoice::automatic ? "auto" : "estimate";
+  words += fmt::format(" k {} radius {} scanners {} poses {} flip {}", k, radius, scanners, pose_origins, flip);
+  for (const Viewpoint& v : viewpoints)
+    words += fmt::format(" {} {} {} {}", v.direction ? "towards" : "from", v.at[0], v.at[1], v.at[2]);
+  return words;
 }
 
 }  // namespace lamina

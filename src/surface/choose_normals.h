@@ -17,4 +17,7 @@ std::unique_ptr<PointSource> choose_normals(std::unique_ptr<PointSource> source,
                                             std::optional<NormalsReport>& report, const std::string& tmp_dir,
                                             const RunContext& run);
 
+/// What the settings ask for in words: others where other normals come out.
+std::string normals_words(const SurfaceSettings& settings);
+
 }  // namespace lamina

@@ -152,13 +152,14 @@ void widen(Extent& b, const Extent& by) {
   b.z_max = std::max(b.z_max, by.z_max);
 }
 
-StoreSettings store_settings(const Survey& survey, const Frame& frame, const std::string& directory) {
+StoreSettings store_settings(const Survey& survey, const Frame& frame, const StorePlace& place) {
   // The rotated bounding box bounds the samples' z.
   const Eigen::Vector3d half = 0.5 * (survey.high - survey.low) / frame.step;
   constexpr double kMargin = 1.0625;  // where only a part of the samples has been seen, others lie a little outside
   const double reach = kMargin * frame.rotation.row(2).cwiseAbs().dot(half.transpose()) + 1;
   StoreSettings s;
-  s.directory = directory;
+  s.directory = place.directory;
+  s.keep = place.keep;
   s.z_min = static_cast<std::int32_t>(-std::ceil(reach));
   const std::uint64_t wanted = std::clamp<std::uint64_t>(survey.usable / kBucketSamples, 1, kMaxBuckets);
   s.bucket_height = static_cast<std::int32_t>(std::ceil(2 * reach / static_cast<double>(wanted))) + 1;
@@ -169,9 +170,9 @@ StoreSettings store_settings(const Survey& survey, const Frame& frame, const std
 }  // namespace
 
 Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, double radius_scale,
-                const std::string& directory, const RunContext& run) {
+                const StorePlace& place, const RunContext& run, const RowSpan& rows) {
   const PointSourceInfo& info = source.info();
-  const StoreSettings buckets = store_settings(survey, frame, directory);
+  const StoreSettings buckets = store_settings(survey, frame, place);
   SlabStoreWriter writer({info.has_radius, info.has_quality, info.attributes}, buckets);
   Extent extent = kNothing;
   Census census;
@@ -179,21 +180,27 @@ Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, d
   const double quality = quality_scale(survey);
   const std::int64_t top = buckets.z_min + static_cast<std::int64_t>(buckets.buckets) * buckets.bucket_height;
   PiecePool pool;
-  std::uint64_t next = 0;
+  const std::uint64_t end = std::min(rows.end, info.count);
+  std::uint64_t next = std::min(rows.first, end);
+  const std::uint64_t count = end - next;
+  std::uint64_t done = 0;
   std::atomic<bool> stopped = false;
+  const auto read = [&](SampleBatch& out) {
+    source.read(out.first, std::min<std::uint64_t>(kChunk, end - out.first), out);
+  };
   const auto take = [&](tbb::flow_control& flow) -> Piece* {
-    if (next >= info.count || stopped || run.cancelled()) {
+    if (next >= end || stopped || run.cancelled()) {
       flow.stop();
       return nullptr;
     }
     Piece* const piece = pool.take();
     piece->rows.first = next;
-    if (!info.random_access) source.read(next, kChunk, piece->rows);
+    if (!info.random_access) read(piece->rows);
     next += kChunk;
     return piece;
   };
   const auto convert = [&](Piece* piece) {
-    if (info.random_access) source.read(piece->rows.first, kChunk, piece->rows);
+    if (info.random_access) read(piece->rows);
     to_local(*piece, info.attributes, frame, radius_scale, quality);
     return piece;
   };
@@ -205,7 +212,8 @@ Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, d
         complete && piece->within && (census.usable == 0 || (extent.z_min >= buckets.z_min && extent.z_max < top));
     stopped = !complete;
     if (complete) writer.append(piece->local);
-    if (run.progress) run.progress({"read", std::min(piece->rows.first + kChunk, info.count), info.count, 0, 0});
+    done += piece->rows.size();
+    if (run.progress) run.progress({"read", done, count, 0, 0});
     pool.give_back(piece);
   };
   constexpr std::size_t kInFlight = 8;

@@ -8,7 +8,7 @@
 
 namespace lamina {
 
-MeshOutput::MeshOutput(const ClusterSettings& settings, float chord, const Frame& frame, MeshSink& sink)
+MeshOutput::MeshOutput(const ClusterSettings& settings, float chord, const Frame& frame, SlabSink& sink)
     : chord_(chord), frame_(frame), sink_(sink), clusterer_(settings) {}
 
 MeshOutput::~MeshOutput() {
@@ -33,6 +33,11 @@ void MeshOutput::start() {
   tasks_.run([this, slabs = std::exchange(queued_, {})] { work(slabs, false); });
 }
 
+void MeshOutput::wait() {
+  tasks_.wait();
+  work(std::exchange(queued_, {}), false);
+}
+
 void MeshOutput::finish() {
   tasks_.wait();
   work(std::exchange(queued_, {}), true);
@@ -55,8 +60,7 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
   while (clusterer_.pop(done_)) {
     const IsoSlab* next = clustered_.size() > 1 ? clustered_[1].get() : nullptr;
     place_vertices(done_, *clustered_.front(), next, frame_, chord_, vertices_);
-    sink_.append_vertices(vertices_);
-    sink_.append_triangles(done_.triangles);
+    sink_.write(done_, vertices_);
     triangles_ += done_.triangles.size();
     if (clustered_.front().use_count() == 1) {
       const std::lock_guard lock(mutex_);

@@ -12,7 +12,6 @@
 namespace lamina {
 namespace {
 
-constexpr std::uint64_t kSurveySamples = 1u << 18;  ///< samples whose radii are looked at before streaming
 /// The size of most cells in units of the largest the median radius allows: with 0.64 the radii of an evenly sampled
 /// surface (which scatter by 0.75 to 1.25 around their median) all ask for the same level.
 constexpr double kMainCell = 0.7;
@@ -142,8 +141,7 @@ void check_settings(const SurfaceSettings& s) {
 namespace {
 
 Resolved plan_once(const SurfaceSettings& s, const Frame& frame, const SlabStore& store, const Extent& bounds,
-                   bool given_radii, std::size_t attributes) {
-  RadiusSurvey survey = survey_radii(store, kSurveySamples, s.density);
+                   RadiusSurvey survey, bool given_radii, std::size_t attributes) {
   if (!given_radii) {
     for (float* r : {&survey.low, &survey.median, &survey.high}) *r *= static_cast<float>(s.radius_scale);
   }
@@ -228,7 +226,12 @@ Resolved plan_once(const SurfaceSettings& s, const Frame& frame, const SlabStore
 
 Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabStore& store, const Extent& bounds,
                       bool given_radii, std::size_t attributes) {
-  Resolved out = plan_once(s, frame, store, bounds, given_radii, attributes);
+  return resolve_plan(s, frame, store, bounds, survey_radii(store, kSurveySamples, s.density), given_radii, attributes);
+}
+
+Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabStore& store, const Extent& bounds,
+                      const RadiusSurvey& radii, bool given_radii, std::size_t attributes) {
+  Resolved out = plan_once(s, frame, store, bounds, radii, given_radii, attributes);
   // Where most cells are of the finest level, the coarsest of the default levels only makes slabs higher: faster on
   // small clouds, but twice the memory.
   SurfaceSettings bare = s;  // the mesh must not depend on whether there is a volume beside it
@@ -237,7 +240,7 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
       expected_memory(bare, out, store, attributes) > kRoomy) {
     SurfaceSettings lower = s;
     lower.levels = kDefaultLevels - 1;
-    return plan_once(lower, frame, store, bounds, given_radii, attributes);
+    return plan_once(lower, frame, store, bounds, radii, given_radii, attributes);
   }
   return out;
 }

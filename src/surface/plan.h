@@ -25,6 +25,11 @@ void check_settings(const SurfaceSettings& settings);
 Resolved resolve_plan(const SurfaceSettings& settings, const Frame& frame, const SlabStore& store, const Extent& bounds,
                       bool given_radii, std::size_t attributes);
 
+/// The same after a survey_radii() of the store with kSurveySamples and settings.density.
+Resolved resolve_plan(const SurfaceSettings& settings, const Frame& frame, const SlabStore& store, const Extent& bounds,
+                      const RadiusSurvey& radii, bool given_radii, std::size_t attributes);
+inline constexpr std::uint64_t kSurveySamples = 1u << 18;  ///< whose radii are looked at before streaming
+
 /// Processor seconds of a whole run on the machine the model was made on; of which reading the input takes
 /// kReferenceRead a sample.
 double expected_cpu_seconds(const SurfaceSettings& settings, const Resolved& resolved, std::size_t attributes);

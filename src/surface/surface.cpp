@@ -19,10 +19,12 @@
 #include "lamina/points.h"
 #include "surface/choose_normals.h"
 #include "surface/ingest.h"
+#include "surface/kept_input.h"
 #include "surface/pipeline.h"
 #include "surface/plan.h"
 #include "surface/stopwatch.h"
 #include "surface/survey.h"
+#include "surface/sweep.h"
 #include "volume/surface_volume.h"
 
 namespace lamina {
@@ -48,67 +50,8 @@ void warn_of_contradictions(const SurfaceStats& stats, const std::string& input,
   if (share < kMuch && stats.torn_share < 4 * kMuch) return;
   run.warn(
       fmt::format("{}: normals contradict each other around {:.0f} % of the surface, {:.0f} % in slab {}: orient "
-                  "them alike before (CloudCompare, MeshLab), or expect holes and double sheets",
+                  "them alike before (lamina normal --reorient), or expect holes and double sheets",
                   input, 100 * share, 100 * stats.torn_share, stats.torn_slab));
-}
-
-/// Next to the output unless told otherwise; the system's temporary folder for standard output, pipes and devices.
-std::string temporary_directory(const SurfaceSettings& settings, const RunContext& run) {
-  if (!run.tmp_dir.empty()) return run.tmp_dir;
-  std::error_code ignored;
-  const auto kind = std::filesystem::status(settings.output, ignored).type();
-  const bool beside = kind == std::filesystem::file_type::regular || kind == std::filesystem::file_type::not_found;
-  if (settings.output.empty() || settings.output == "-" || !beside) return system_tmp_dir();
-  const std::string parent = std::filesystem::path(settings.output).parent_path().string();
-  return parent.empty() ? "." : parent;
-}
-
-std::vector<std::string> input_names(const SurfaceSettings& settings) {
-  std::vector<std::string> names{settings.input};
-  names.insert(names.end(), settings.more_inputs.begin(), settings.more_inputs.end());
-  return names;
-}
-
-/// Volume tools like a lattice aligned with the input's axes.
-FrameMode frame_mode(const SurfaceSettings& settings) {
-  return settings.frame.value_or(settings.volume.wanted() ? FrameMode::axis : FrameMode::pca);
-}
-
-/// A mesh in the place of its points would cost the user the scan.
-void require_two_files(const SurfaceSettings& settings) {
-  std::error_code ignored;
-  const std::vector<PointInput> inputs = expand_inputs(input_names(settings));
-  const auto is_input = [&](const std::string& name) {
-    return std::filesystem::is_regular_file(name, ignored) &&
-           std::any_of(inputs.begin(), inputs.end(),
-                       [&](const PointInput& input) { return std::filesystem::equivalent(input.path, name, ignored); });
-  };
-  for (const std::string& grids : {settings.volume.path, settings.volume.points}) {
-    if (grids.empty()) continue;
-    if (grids == settings.output || is_input(grids))
-      throw Error(ExitCode::usage, fmt::format("{}: is named twice; give the grids a file of their own", grids));
-  }
-  if (settings.output == "-" || settings.output.empty()) return;
-  if (is_input(settings.output)) {
-    throw Error(ExitCode::usage,
-                fmt::format("{}: is input and output; give the mesh another name with --output", settings.output));
-  }
-}
-
-/// Everything named, as one stream; says what the readers found worth saying.
-std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const std::string& tmp_dir,
-                                         const RunContext& run) {
-  std::unique_ptr<PointSource> source = open_points(input_names(settings), {tmp_dir, settings.columns});
-  const PointSourceInfo& info = source->info();
-  for (const std::string& remark : info.remarks) run.info(remark);
-  if (info.geographic) {
-    throw Error(ExitCode::unreadable,
-                fmt::format("{}: x and y are degrees of longitude and latitude, in which no distance can be measured; "
-                            "project them to metres first, for example to the UTM zone: pdal translate IN.las OUT.las "
-                            "reprojection --filters.reprojection.out_srs=EPSG:326ZONE",
-                            info.path));
-  }
-  return source;
 }
 
 /// Float positions keep a hundredth of a cell as long as the coordinates are below some ten thousand cells;
@@ -205,13 +148,13 @@ std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceS
 
 /// Fills the store. A large input is read once, in a frame chosen by a part of its rows; twice where samples lie
 /// outside what these promised.
-Ingested read_input(PointSource& source, const SurfaceSettings& settings, const std::string& tmp, const RunContext& run,
-                    Stopwatch& watch, Frame& frame) {
+Ingested read_input(PointSource& source, const SurfaceSettings& settings, const StorePlace& place,
+                    const RunContext& run, Stopwatch& watch, Frame& frame) {
   require_samples(source.info());
   std::optional<Ingested> ingested;
   const auto fill = [&](const Survey& survey) {
-    frame = choose_frame(survey, frame_mode(settings));
-    watch.time("store", [&] { ingested.emplace(ingest(source, survey, frame, settings.radius_scale, tmp, run)); });
+    frame = choose_frame(survey, chosen_frame(settings));
+    watch.time("store", [&] { ingested.emplace(ingest(source, survey, frame, settings.radius_scale, place, run)); });
   };
   std::optional<Survey> survey;
   watch.time("survey", [&] { survey = survey_part(source); });
@@ -248,6 +191,171 @@ void expect_time(const SurfaceSettings& settings, const PointSourceInfo& source,
   plan.seconds = elapsed + slowness * (whole - reading) / (1 + kEfficiency * (plan.threads - 1));
 }
 
+}  // namespace
+
+/// Next to the output unless told otherwise; the system's temporary folder for standard output, pipes and devices.
+std::string temporary_directory(const SurfaceSettings& settings, const RunContext& run) {
+  if (!run.tmp_dir.empty()) return run.tmp_dir;
+  std::error_code ignored;
+  const auto kind = std::filesystem::status(settings.output, ignored).type();
+  const bool beside = kind == std::filesystem::file_type::regular || kind == std::filesystem::file_type::not_found;
+  if (settings.output.empty() || settings.output == "-" || !beside) return system_tmp_dir();
+  const std::string parent = std::filesystem::path(settings.output).parent_path().string();
+  return parent.empty() ? "." : parent;
+}
+
+std::vector<std::string> input_names(const SurfaceSettings& settings) {
+  std::vector<std::string> names{settings.input};
+  names.insert(names.end(), settings.more_inputs.begin(), settings.more_inputs.end());
+  return names;
+}
+
+std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const std::string& tmp_dir,
+                                         const RunContext& run) {
+  std::unique_ptr<PointSource> source = open_points(input_names(settings), {tmp_dir, settings.columns});
+  const PointSourceInfo& info = source->info();
+  for (const std::string& remark : info.remarks) run.info(remark);
+  if (info.geographic) {
+    throw Error(ExitCode::unreadable,
+                fmt::format("{}: x and y are degrees of longitude and latitude, in which no distance can be measured; "
+                            "project them to metres first, for example to the UTM zone: pdal translate IN.las OUT.las "
+                            "reprojection --filters.reprojection.out_srs=EPSG:326ZONE",
+                            info.path));
+  }
+  return source;
+}
+
+/// A mesh in the place of its points would cost the user the scan.
+void require_two_files(const SurfaceSettings& settings) {
+  std::error_code ignored;
+  const bool kept = settings.more_inputs.empty() && is_kept_input(settings.input);
+  const std::vector<PointInput> inputs = kept ? std::vector<PointInput>{} : expand_inputs(input_names(settings));
+  const auto is_input = [&](const std::string& name) {
+    return std::filesystem::is_regular_file(name, ignored) &&
+           std::any_of(inputs.begin(), inputs.end(),
+                       [&](const PointInput& input) { return std::filesystem::equivalent(input.path, name, ignored); });
+  };
+  for (const std::string& grids : {settings.volume.path, settings.volume.points}) {
+    if (grids.empty()) continue;
+    if (grids == settings.output || is_input(grids))
+      throw Error(ExitCode::usage, fmt::format("{}: is named twice; give the grids a file of their own", grids));
+  }
+  if (settings.output == "-" || settings.output.empty()) return;
+  if (is_input(settings.output)) {
+    throw Error(ExitCode::usage,
+                fmt::format("{}: is input and output; give the mesh another name with --output", settings.output));
+  }
+}
+
+/// Volume tools like a lattice aligned with the input's axes.
+FrameMode chosen_frame(const SurfaceSettings& settings) {
+  return settings.frame.value_or(settings.volume.wanted() ? FrameMode::axis : FrameMode::pca);
+}
+
+SweepInput read_surface_input(const SurfaceSettings& settings, const std::string& directory, bool keep,
+                              const RunContext& run, Stopwatch& watch, SurfaceStats& stats) {
+  if (settings.more_inputs.empty() && is_kept_input(settings.input) && !keep)
+    return open_kept_input(settings.input, settings);
+  const std::string scratch = keep ? temporary_directory(settings, run) : directory;
+  std::unique_ptr<PointSource> source = open_inputs(settings, scratch, run);
+  if (settings.normals != NormalsChoice::file)
+    watch.time("normals", [&] { source = choose_normals(std::move(source), settings, stats.normals, scratch, run); });
+  Frame frame;
+  Ingested ingested = read_input(*source, settings, {directory, keep}, run, watch, frame);
+  return {source->info(), frame, std::move(ingested)};
+}
+
+Resolved plan_surface(const SurfaceSettings& settings, const SweepInput& input, const RunContext& run, Stopwatch& watch,
+                      double elapsed, SurfaceStats& stats) {
+  const PointSourceInfo& info = input.info;
+  const Census& census = input.ingested.census;
+  RadiusSurvey radii;
+  const auto plan_for = [&](const SurfaceSettings& s) {
+    Resolved r = resolve_plan(s, input.frame, input.ingested.store, input.ingested.extent, radii, info.has_radius,
+                              info.attributes.size());
+    r.plan.memory_bytes += table_bytes(r.lattice, input.ingested);
+    return r;
+  };
+  Resolved resolved;
+  watch.time("plan", [&] {
+    radii = input.radii ? *input.radii : survey_radii(input.ingested.store, kSurveySamples, settings.density);
+    resolved = plan_for(settings);
+  });
+  expect_time(settings, info, resolved, watch, elapsed);
+  stats.plan = resolved.plan;
+  stats.samples_read = info.count;
+  stats.replaced_attributes = census.unusable_attributes;
+  for (int k = 1; k < kDefects; ++k) {
+    if (census.rejected[k] > 0) {
+      stats.rejected.push_back({describe(static_cast<Defect>(k)), census.rejected[k], census.first_row[k]});
+    }
+  }
+  run.info(describe(resolved.plan, settings));
+  constexpr std::uint64_t kLargestTables = std::uint64_t{1} << 30;  // a scan of 380 million samples needs a few MB
+  if (is_out_of_reach(resolved.plan, settings.blend) ||
+      table_bytes(resolved.lattice, input.ingested) > kLargestTables) {
+    throw Error(ExitCode::empty,
+                fmt::format("{}: some of the {} samples lie so far away from the others ({:.3g}, r {:.3g}) that the "
+                            "lattice cannot hold both; remove them",
+                            input_name(settings), resolved.plan.samples,
+                            *std::max_element(resolved.plan.extent.begin(), resolved.plan.extent.end()),
+                            resolved.plan.radius_median));
+  }
+  if (run.max_memory > 0 && resolved.plan.memory_bytes > run.max_memory) {
+    refuse_memory(settings, resolved.plan.levels, resolved.plan.memory_bytes, run.max_memory,
+                  [&](const SurfaceSettings& s) { return plan_for(s).plan.memory_bytes; });
+  }
+  stats.disk_bytes = input.ingested.store.disk_bytes();
+  return resolved;
+}
+
+MeshSinkSettings mesh_layout(const SweepInput& input, const Resolved& resolved) {
+  MeshSinkSettings out;
+  out.attributes = input.info.attributes;
+  out.double_positions = needs_double(input.ingested.census, resolved.plan.finest_cell);
+  return out;
+}
+
+void sweep(const SurfaceSettings& settings, SweepInput& input, const Resolved& resolved, const SlabSpan& span,
+           SlabSink& sink, SurfaceVolume* volume, const RunContext& run, Stopwatch& watch, SurfaceStats& stats) {
+  const PointSourceInfo& info = input.info;
+  SampleFeed feed(input.ingested.store, resolved.lattice, resolved.feed, resolved.radii, info.has_radius);
+  Pipeline pipeline(settings, resolved, input.frame, input.ingested.extent, feed, info.attributes.size(), sink, span,
+                    volume);
+  pipeline.run(run, watch);
+  pipeline.report(stats);
+  warn_of_contradictions(stats, input_name(settings), run);
+  if (feed.counts().undersampled > 0) {
+    stats.rejected.push_back({"radius above --max-radius", feed.counts().undersampled, std::nullopt});
+    run.info(fmt::format("{} of {} samples discarded as undersampled: radius above --max-radius",
+                         feed.counts().undersampled, info.count));
+  }
+}
+
+void finish_stats(const Stopwatch& watch, const Stopwatch::Moment& began, SurfaceStats& stats) {
+  stats.stages = watch.stages();
+  const Stopwatch::Moment ended = Stopwatch::now();
+  stats.wall = ended.wall - began.wall;
+  stats.cpu = ended.cpu - began.cpu;
+  stats.peak_memory = peak_memory();
+}
+
+void no_surface(const std::string& input, std::uint64_t samples) {
+  throw Error(ExitCode::empty,
+              fmt::format("{}: no surface came out of {} samples; they lie too far apart for their radii, or on no "
+                          "surface at all (try --blend or --particlescale above 1)",
+                          input, samples));
+}
+
+void run_in_arena(const RunContext& run, const std::function<void()>& work) {
+  const int threads = run.threads > 0 ? run.threads : tbb::this_task_arena::max_concurrency();
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+  tbb::task_arena arena(threads);
+  arena.execute(work);
+}
+
+namespace {
+
 SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run) {
   SurfaceStats stats;
   Stopwatch watch;
@@ -261,69 +369,21 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
     const MeshSink trial(out);
   }
 
-  std::unique_ptr<PointSource> source = open_inputs(settings, tmp, run);
-  if (settings.normals != NormalsChoice::file)
-    watch.time("normals", [&] { source = choose_normals(std::move(source), settings, stats.normals, tmp, run); });
-  const PointSourceInfo& info = source->info();
-  Frame frame;
-  std::optional<Ingested> ingested = read_input(*source, settings, tmp, run, watch, frame);
-  const Census& census = ingested->census;
-  const auto plan_for = [&](const SurfaceSettings& s) {
-    Resolved r = resolve_plan(s, frame, ingested->store, ingested->extent, info.has_radius, info.attributes.size());
-    r.plan.memory_bytes += table_bytes(r.lattice, *ingested);
-    return r;
-  };
-  Resolved resolved;
-  watch.time("plan", [&] { resolved = plan_for(settings); });
-  expect_time(settings, info, resolved, watch, Stopwatch::now().wall - began.wall);
-  stats.plan = resolved.plan;
-  stats.samples_read = info.count;
-  stats.replaced_attributes = census.unusable_attributes;
-  for (int k = 1; k < kDefects; ++k) {
-    if (census.rejected[k] > 0) {
-      stats.rejected.push_back({describe(static_cast<Defect>(k)), census.rejected[k], census.first_row[k]});
-    }
-  }
-  run.info(describe(resolved.plan, settings));
-  constexpr std::uint64_t kLargestTables = std::uint64_t{1} << 30;  // a scan of 380 million samples needs a few MB
-  if (is_out_of_reach(resolved.plan, settings.blend) || table_bytes(resolved.lattice, *ingested) > kLargestTables) {
-    throw Error(ExitCode::empty,
-                fmt::format("{}: some of the {} samples lie so far away from the others ({:.3g}, r {:.3g}) that the "
-                            "lattice cannot hold both; remove them",
-                            input_name(settings), resolved.plan.samples,
-                            *std::max_element(resolved.plan.extent.begin(), resolved.plan.extent.end()),
-                            resolved.plan.radius_median));
-  }
-  if (run.max_memory > 0 && resolved.plan.memory_bytes > run.max_memory) {
-    refuse_memory(settings, resolved.plan.levels, resolved.plan.memory_bytes, run.max_memory,
-                  [&](const SurfaceSettings& s) { return plan_for(s).plan.memory_bytes; });
-  }
-
-  stats.disk_bytes = ingested->store.disk_bytes();
+  SweepInput input = read_surface_input(settings, tmp, /*keep=*/false, run, watch, stats);
+  const Resolved resolved = plan_surface(settings, input, run, watch, Stopwatch::now().wall - began.wall, stats);
   if (!settings.dry_run) {
-    out.attributes = info.attributes;
-    out.double_positions = needs_double(census, resolved.plan.finest_cell);
+    out = mesh_layout(input, resolved);
+    out.path = settings.output;
+    out.tmp_dir = tmp;
     MeshSink sink(out);
-    SampleFeed feed(ingested->store, resolved.lattice, resolved.feed, resolved.radii, info.has_radius);
     std::optional<SurfaceVolume> volume;
-    if (settings.volume.wanted())
-      volume.emplace(settings.volume, frame, resolved.lattice, resolved.main_level, info.attributes, tmp);
-    Pipeline pipeline(settings, resolved, frame, ingested->extent, feed, info.attributes.size(), sink,
-                      volume ? &*volume : nullptr);
-    pipeline.run(run, watch);
-    pipeline.report(stats);
-    warn_of_contradictions(stats, input_name(settings), run);
-    if (feed.counts().undersampled > 0) {
-      stats.rejected.push_back({"radius above --max-radius", feed.counts().undersampled, std::nullopt});
-      run.info(fmt::format("{} of {} samples discarded as undersampled: radius above --max-radius",
-                           feed.counts().undersampled, info.count));
+    if (settings.volume.wanted()) {
+      volume.emplace(settings.volume, input.frame, resolved.lattice, resolved.main_level, input.info.attributes, tmp);
     }
-    if (sink.triangles() == 0) {
-      throw Error(ExitCode::empty,
-                  fmt::format("{}: no surface came out of {} samples; they lie too far apart for their radii, or on no "
-                              "surface at all (try --blend or --particlescale above 1)",
-                              input_name(settings), resolved.plan.samples));
-    }
+    MeshFileSlabs slabs(sink);
+    sweep(settings, input, resolved, all_slabs(resolved.lattice, input.ingested.extent), slabs,
+          volume ? &*volume : nullptr, run, watch, stats);
+    if (sink.triangles() == 0) no_surface(input_name(settings), resolved.plan.samples);
     if (volume) {
       watch.time("volume", [&] { volume->finish(/*open=*/stats.rejected_loops > 0); });
       volume->commit();
@@ -333,11 +393,7 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
     stats.vertices = sink.vertices();
     stats.triangles = sink.triangles();
   }
-  stats.stages = watch.stages();
-  const Stopwatch::Moment ended = Stopwatch::now();
-  stats.wall = ended.wall - began.wall;
-  stats.cpu = ended.cpu - began.cpu;
-  stats.peak_memory = peak_memory();
+  finish_stats(watch, began, stats);
   return stats;
 }
 
@@ -346,11 +402,8 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
 SurfaceStats reconstruct_surface(const SurfaceSettings& settings, const RunContext& run) {
   check_settings(settings);
   require_two_files(settings);
-  const int threads = run.threads > 0 ? run.threads : tbb::this_task_arena::max_concurrency();
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
-  tbb::task_arena arena(threads);
   SurfaceStats stats;
-  arena.execute([&] { stats = reconstruct(settings, run); });
+  run_in_arena(run, [&] { stats = reconstruct(settings, run); });
   return stats;
 }
 

@@ -2,9 +2,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <limits>
 
 #include "lamina/error.h"
+#include "lamina/scatter.h"
 #include "normals/clouds.h"
 
 namespace lamina {
@@ -49,6 +51,16 @@ TEST(WithNormals, OfASphereAndATorusPointOutward) {
     EXPECT_LT(found.report.conflicts.share(), 0.001);
     EXPECT_GT(found.report.conflicts.pairs, 4 * torus.size());
   }
+}
+
+TEST(WithNormals, OfABumpySphereAreItsOwn) {
+  const auto surface = shape_surface("bumpy-sphere", false);
+  Oriented cloud;
+  for (std::uint64_t i = 0; i < 12000; ++i) {
+    const Surface::Point p = surface->point(1, i, 0);
+    cloud.add(p.position, p.normal);
+  }
+  expect_good(compare(cloud, find_normals(cloud, in_mode(NormalsMode::estimate, 8)).normals));
 }
 
 TEST(WithNormals, WithinARadiusAreAsGood) {
@@ -236,6 +248,19 @@ TEST(WithNormals, OfScanLinesReachAcross) {
   expect_good(compare(cloud, find_normals(cloud, settings).normals));
 }
 
+TEST(WithNormals, OfARealGroundFaceUp) {
+  const std::string file = LAMINA_SOURCE_DIR "/../shared/data/las/autzen_trim_7.las";
+  if (!std::filesystem::exists(file)) GTEST_SKIP() << "no " << file;
+  NormalsSettings settings;
+  settings.viewpoints = {{{0, 0, 1}, true}};
+  NormalsReport report;
+  const auto source = with_normals(open_points(file), settings, report, {});
+  std::size_t up = 0;
+  for (const Vector& n : test::normals_of(*source)) up += n[2] > 0.1 ? 1 : 0;
+  EXPECT_GT(static_cast<double>(up), 0.9 * static_cast<double>(report.samples));
+  EXPECT_LT(report.conflicts.share(), 0.01);
+}
+
 TEST(WithNormals, AreTheSameForAnyNumberOfThreads) {
   Oriented cloud;
   test::add_torus(cloud, 20000);
@@ -268,6 +293,24 @@ TEST(WithNormals, RefusesWhatCannotBe) {
   s = {};
   s.viewpoints = {{{0, 0, 0}, true}};
   EXPECT_THAT(refusal(s), HasSubstr("up"));
+}
+
+TEST(WithNormals, RefusesMoreMemoryThanAllowed) {
+  Oriented cloud;
+  test::add_sphere(cloud, 3000, 1);
+  NormalsReport report;
+  RunContext run;
+  run.max_memory = std::size_t{256} << 20;
+  EXPECT_NO_THROW(
+      lamina::with_normals(std::make_unique<test::OrientedSource>(cloud, false), NormalsSettings{}, report, run));
+  run.max_memory = std::size_t{16} << 20;
+  try {
+    lamina::with_normals(std::make_unique<test::OrientedSource>(cloud, false), NormalsSettings{}, report, run);
+    ADD_FAILURE() << "no error";
+  } catch (const Error& e) {
+    EXPECT_EQ(e.code(), ExitCode::budget);
+    EXPECT_THAT(e.what(), ::testing::HasSubstr("--max-memory allows 17 MB"));
+  }
 }
 
 }  // namespace

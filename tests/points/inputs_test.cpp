@@ -126,6 +126,12 @@ TEST_F(Inputs, RangeGridsAreTheirVertices) {
   const SampleBatch rows = all_rows(*source);
   EXPECT_THAT(rows.x, ElementsAre(11, 14));
   EXPECT_THAT(rows.z, ElementsAre(33, 36));
+  // A range image is seen along its own z axis.
+  const auto alone = open_points(folder_ / "scan.ply");
+  ASSERT_EQ(alone->info().scans.size(), 1);
+  EXPECT_EQ(alone->info().scans[0].scanner, ScanPart::Scanner::direction);
+  EXPECT_THAT(alone->info().scans[0].at, ElementsAre(0, 0, 1));
+  EXPECT_EQ(source->info().scans[0].scanner, ScanPart::Scanner::direction);
 }
 
 TEST_F(Inputs, JoinedSourcesAreRowsBehindEachOther) {

@@ -92,7 +92,7 @@ TEST_F(SurfaceBadInput, NoNormals) {
   test::PlyModel model = test::ply_model(test::sphere_cloud(100));
   model.elements[0].columns.resize(3);
   for (auto& row : model.elements[0].cells) row.resize(3);
-  expect_failure(ExitCode::unreadable, {"in.ply", "no normals", "nx ny nz", "CloudCompare"},
+  expect_failure(ExitCode::unreadable, {"in.ply", "no normals", "nx ny nz", "--normals auto"},
                  test::write_file(folder_ / "in.ply", test::ply_bytes(model, PlyFormat::ascii)));
 }
 

@@ -1,5 +1,6 @@
 #include "lamina/normals.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -58,7 +59,7 @@ TEST_F(NormalTool, WritesOtherFormatsAndReadsPipes) {
     EXPECT_GT(outward(read_points(out)), 0.999) << ending;
   }
   ASSERT_EQ(run_lamina({"normal", cloud_, "-o", out_, "-q"}).code, 0);
-  const auto piped = run_shell("lamina normal - -q -o - < " + quoted(cloud_));
+  const auto piped = run_shell("lamina normal - -q -o - < " + test::quoted(cloud_));
   EXPECT_EQ(piped.code, 0) << piped.err;
   EXPECT_EQ(piped.out, read_text(out_));
 }
@@ -71,6 +72,17 @@ TEST_F(NormalTool, SidesAndSigns) {
   ASSERT_EQ(run.code, 0) << run.err;
   EXPECT_THAT(run.err, HasSubstr("3000 turned"));
   EXPECT_GT(outward(read_points(turned)), 0.999);
+}
+
+TEST_F(NormalTool, FacesTheScannerOfAPtxFile) {
+  std::string ptx = "3000\n1\n0.3 0 0\n1 0 0\n0 1 0\n0 0 1\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0.3 0 0 1\n";
+  for (std::size_t i = 0; i < rows_.size(); ++i)
+    ptx += fmt::format("{} {} {} 0.5\n", rows_.x[i] - 0.3, rows_.y[i], rows_.z[i]);
+  const std::string scan = write_file(folder_ / "scan.ptx", ptx);
+  ASSERT_EQ(run_lamina({"normal", scan, "-o", out_, "-q"}).code, 0);
+  EXPECT_EQ(outward(read_points(out_)), 0);
+  ASSERT_EQ(run_lamina({"normal", scan, "-o", out_, "--viewpoint", "none", "-q"}).code, 0);
+  EXPECT_GT(outward(read_points(out_)), 0.999);
 }
 
 TEST_F(NormalTool, CheckWarnsOfContradictions) {

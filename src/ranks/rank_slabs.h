@@ -1,0 +1,54 @@
+// A rank's part of the mesh, in unnamed files until all ranks know where theirs begin.
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "chunk/part_file.h"
+#include "surface/mesh_output.h"
+
+namespace lamina::ranks {
+
+/// Takes the finished slabs of a sweep through `span`: records of the final PLY, triangles by numbers from the part's
+/// first vertex on (PartTriangle). Keeps two megabytes.
+class RankSlabs : public SlabSink {
+ public:
+  /// Throws Error(budget) when `directory` cannot be written.
+  RankSlabs(const SlabSpan& span, MeshSinkSettings layout, const std::string& directory);
+  void write(const FinalSlab& slab, const VertexBatch& vertices) override;
+
+  [[nodiscard]] std::uint64_t vertices() const { return vertices_; }
+  [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
+  [[nodiscard]] bool any() const { return begun_; }               ///< a slab of its own had surface
+  [[nodiscard]] const SlabMark& below() const { return below_; }  ///< PartInfo::below
+  [[nodiscard]] const SlabMark& last() const { return last_; }    ///< PartInfo::last
+  [[nodiscard]] const MeshSinkSettings& layout() const { return layout_; }
+  [[nodiscard]] std::uint64_t disk_bytes() const { return records_.bytes + faces_.bytes; }
+  /// After the sweep: hands over all of it, piece by piece, in order.
+  void read_vertices(const std::function<void(std::span<const std::byte>)>& take);
+  void read_triangles(const std::function<void(std::span<const PartTriangle>)>& take);
+
+ private:
+  struct Spill {
+    Descriptor file;
+    std::vector<std::byte> waiting;
+    std::uint64_t bytes = 0;
+  };
+  void put(Spill& spill, std::span<const std::byte> bytes);
+  void flush(Spill& spill);
+  void read(Spill& spill, const std::function<void(std::span<const std::byte>)>& take, std::size_t piece);
+
+  SlabSpan span_;
+  MeshSinkSettings layout_;
+  std::string directory_;
+  Spill records_, faces_;
+  bool begun_ = false;
+  SlabMark below_, last_;
+  std::uint64_t numbered_ = 0, first_ = 0;  ///< vertices as the clusterer counts: so far, and below the part
+  std::uint64_t vertices_ = 0, triangles_ = 0;
+  std::vector<PartTriangle> relative_;
+};
+
+}  // namespace lamina::ranks

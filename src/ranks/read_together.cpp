@@ -1,0 +1,211 @@
+#include "ranks/read_together.h"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "points/gunzip.h"
+#include "points/input_file.h"
+#include "points/sniff.h"
+#include "ranks/packed_input.h"
+#include "slab_store/store_blocks.h"
+
+namespace lamina::ranks {
+namespace {
+
+/// Every rank can read it by itself, and pays for no more than the rows it wants.
+bool can_be_shared(const SurfaceSettings& settings, const PointSourceInfo& info) {
+  if (!info.random_access) return false;
+  constexpr std::size_t kStart = 4096;
+  const std::vector<PointInput> inputs = expand_inputs(input_names(settings));
+  return std::all_of(inputs.begin(), inputs.end(), [](const PointInput& input) {
+    std::error_code ignored;
+    if (input.path == "-" || !std::filesystem::is_regular_file(input.path, ignored)) return false;
+    const InputFile file{open_to_read(input.path), kStart, input.path};
+    std::array<char, kStart> start{};
+    const std::string_view bytes(start.data(), file.read(0, start.data(), start.size()));
+    // Unpacked by each, or held whole by each, it would take as much again for every rank.
+    return !is_gzip(bytes) && detect_format(bytes, input.path) != PointFormat::vdb;
+  });
+}
+
+/// In the place of an input that rank 0 reads alone.
+class NoRows : public PointSource {
+ public:
+  explicit NoRows(const PointSourceInfo& info) { info_ = info; }
+  void read(std::uint64_t, std::size_t, SampleBatch& out) override { out = {}; }
+};
+
+RowSpan share_of(std::uint64_t rows, int rank, int size) {
+  // Quotient first: rows times ranks may pass 64 bits nowhere near here, but need not.
+  const auto at = [&](int r) {
+    const auto part = static_cast<std::uint64_t>(r), parts = static_cast<std::uint64_t>(size);
+    return rows / parts * part + rows % parts * part / parts;
+  };
+  return {at(rank), at(rank + 1)};
+}
+
+class Reading {
+ public:
+  Reading(Ranks& ranks, const SurfaceSettings& settings, const std::string& directory, const RunContext& run,
+          Stopwatch& watch)
+      : ranks_(ranks), settings_(settings), directory_(directory), run_(run), watch_(watch) {}
+
+  SharedInput read() {
+    open();
+    std::optional<Survey> survey;
+    look([&] { survey = survey_part(*source_); });
+    bool complete = false;
+    if (tell(survey)) complete = fill(*survey);
+    if (complete) {
+      ranks_.together([&] { judge(census_, source_->info(), settings_.bad_samples, run_); });
+    } else {
+      ingested_.reset();
+      look([&] { survey = survey_input(*source_, settings_.bad_samples, run_); });
+      tell(survey);
+      fill(*survey);
+    }
+    SharedInput out{{source_->info(), frame_, std::move(*ingested_)}, rows_.end - rows_.first};
+    return out;
+  }
+
+ private:
+  void open() {
+    Packer words;
+    ranks_.together([&] {
+      if (!ranks_.first()) return;
+      source_ = open_inputs(settings_, directory_, run_);
+      require_samples(source_->info());
+      put(words, source_->info());
+      words.put(can_be_shared(settings_, source_->info()));
+    });
+    Bytes bytes = words.take();
+    ranks_.broadcast(bytes);
+    Unpacker in(bytes);
+    const PointSourceInfo info = get_info(in);
+    const auto shared = in.get<bool>();
+    ranks_.together([&] {
+      if (ranks_.first()) return;
+      if (shared) {
+        source_ = open_inputs(settings_, directory_, run_);
+      } else {
+        source_ = std::make_unique<NoRows>(info);
+      }
+      if (source_->info().count != info.count) {
+        throw Error(ExitCode::unreadable, info.path + ": does not look the same to all ranks; they must see one file");
+      }
+    });
+    const std::uint64_t rows = info.count;
+    if (shared) {
+      rows_ = share_of(rows, ranks_.rank(), ranks_.size());
+    } else {
+      rows_ = {0, ranks_.first() ? rows : 0};
+    }
+  }
+
+  /// On rank 0, while the others wait.
+  template <class Work>
+  void look(const Work& work) {
+    ranks_.together([&] {
+      if (ranks_.first()) watch_.time("survey", work);
+    });
+  }
+
+  /// All know what rank 0 has found; whether it has.
+  bool tell(std::optional<Survey>& survey) {
+    Packer words;
+    ranks_.together([&] {
+      if (!ranks_.first()) return;
+      words.put(survey.has_value());
+      if (!survey) return;
+      put(words, *survey);
+      put(words, choose_frame(*survey, chosen_frame(settings_)));
+    });
+    Bytes bytes = words.take();
+    ranks_.broadcast(bytes);
+    Unpacker in(bytes);
+    if (!in.get<bool>()) return false;
+    survey.emplace();
+    static_cast<Census&>(*survey) = get_census(in);
+    frame_ = get_frame(in);
+    return true;
+  }
+
+  /// Whether all samples lay where they may.
+  bool fill(const Survey& survey) {
+    ranks_.together([&] {
+      watch_.time("store", [&] {
+        ingested_.emplace(ingest(*source_, survey, frame_, settings_.radius_scale, directory_, run_, rows_));
+      });
+    });
+    std::array<std::int64_t, 1> complete{ingested_->complete ? 1 : 0};
+    ranks_.least(complete);
+    if (complete[0] == 0) return false;
+    add_up();
+    return true;
+  }
+
+  /// What all ranks have read, in the place of what this one has.
+  void add_up() {
+    Extent& e = ingested_->extent;
+    std::array<std::int64_t, 3> low{e.x_min, e.y_min, e.z_min}, high{e.x_max, e.y_max, e.z_max};
+    ranks_.least(low);
+    ranks_.most(high);
+    const auto narrow = [](std::int64_t v) { return static_cast<std::int32_t>(v); };
+    e = Extent{{narrow(low[0]), narrow(high[0]), narrow(low[1]), narrow(high[1])}, narrow(low[2]), narrow(high[2])};
+
+    Packer own;
+    put(own, ingested_->census);
+    const std::vector<Bytes> all = ranks_.gather(own.take());
+    Packer sum;
+    if (ranks_.first()) {
+      Census total;
+      for (const Bytes& bytes : all) {
+        Unpacker in(bytes);
+        total.merge(get_census(in));
+      }
+      put(sum, total);
+    }
+    Bytes bytes = sum.take();
+    ranks_.broadcast(bytes);
+    Unpacker in(bytes);
+    census_ = ingested_->census = get_census(in);
+
+    std::vector<BucketShare> shares = bucket_shares(ingested_->store);
+    std::vector<std::uint64_t> counts;
+    std::vector<std::int64_t> lower, upper;
+    for (const BucketShare& share : shares) {
+      counts.push_back(share.count);
+      lower.push_back(share.z_lower);
+      upper.push_back(share.z_upper);
+    }
+    ranks_.sum(counts);
+    ranks_.least(lower);
+    ranks_.most(upper);
+    for (std::size_t b = 0; b < shares.size(); ++b) shares[b] = {counts[b], narrow(lower[b]), narrow(upper[b])};
+    declare_shares(ingested_->store, shares);
+  }
+
+  Ranks& ranks_;
+  const SurfaceSettings& settings_;
+  const std::string& directory_;
+  const RunContext& run_;
+  Stopwatch& watch_;
+  std::unique_ptr<PointSource> source_;
+  RowSpan rows_{0, 0};
+  Frame frame_;
+  std::optional<Ingested> ingested_;
+  Census census_;
+};
+
+}  // namespace
+
+SharedInput read_together(Ranks& ranks, const SurfaceSettings& settings, const std::string& directory,
+                          const RunContext& run, Stopwatch& watch) {
+  return Reading(ranks, settings, directory, run, watch).read();
+}
+
+}  // namespace lamina::ranks

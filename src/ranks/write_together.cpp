@@ -1,0 +1,123 @@
+#include "ranks/write_together.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <limits>
+#include <optional>
+
+#include "chunk/merge_parts.h"
+#include "files/output_file.h"
+#include "lamina/error.h"
+#include "mesh_sink/mesh_header.h"
+#include "mesh_sink/records.h"
+#include "surface/sweep.h"
+
+namespace lamina::ranks {
+namespace {
+
+std::vector<Border> gather_borders(Ranks& ranks, const Border& own) {
+  Packer words;
+  words.put(own);
+  const std::vector<Bytes> all = ranks.gather(words.take());
+  std::vector<Border> borders;
+  for (const Bytes& bytes : all) borders.push_back(Unpacker(bytes).get<Border>());
+  Packer list;
+  list.put(borders);
+  Bytes bytes = list.take();
+  ranks.broadcast(bytes);
+  return Unpacker(bytes).get_list<Border>();
+}
+
+std::string make_header(const RankSlabs& part, const Place& place) {
+  return mesh_header(part.layout(), place.vertices, place.triangles);
+}
+
+void write_part(SharedFile& file, RankSlabs& part, const Place& place, bool first, const RunContext& run) {
+  const std::string header = make_header(part, place);
+  if (first) file.write(0, std::as_bytes(std::span(header)));
+  const std::uint64_t record = vertex_record_bytes(part.layout().attributes, part.layout().double_positions);
+  const auto go_on = [&] {
+    if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+    if (run.progress) run.progress({"write", 0, 0, 0, 0});
+  };
+  std::uint64_t at = header.size() + place.first_vertex * record;
+  part.read_vertices([&](std::span<const std::byte> records) {
+    file.write(at, records);
+    at += records.size();
+    go_on();
+  });
+  at = header.size() + place.vertices * record + place.first_triangle * kFaceRecordBytes;
+  std::vector<std::byte> faces;
+  part.read_triangles([&](std::span<const PartTriangle> triangles) {
+    encode_shifted(triangles, place.first_vertex, place.vertices, faces);
+    file.write(at, faces);
+    at += faces.size();
+    go_on();
+  });
+}
+
+}  // namespace
+
+Place find_place(std::span<const Border> parts, std::size_t rank, const std::string& name) {
+  Place place;
+  SlabMark below;
+  bool any = false;
+  for (std::size_t r = 0; r < parts.size(); ++r) {
+    const Border& part = parts[r];
+    if (r == rank) {
+      place.first_vertex = place.vertices;
+      place.first_triangle = place.triangles;
+    }
+    place.vertices += part.vertices;
+    place.triangles += part.triangles;
+    if (!part.any) continue;
+    // A part may begin with slabs that have no surface: then there is nothing to agree on, and it knows nothing below.
+    if (any && !(part.below == below)) {
+      throw Error(ExitCode::internal,
+                  fmt::format("ranks {} and {} do not agree on the surface between them: do all run the same program?",
+                              r - 1, r));
+    }
+    any = true;
+    below = part.last;
+  }
+  constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
+  if (place.vertices > kMost) {
+    throw Error(ExitCode::budget, fmt::format("{}: the mesh has {} vertices, a PLY's indices name at most {}; use a "
+                                              "larger cell",
+                                              name, place.vertices, kMost));
+  }
+  return place;
+}
+
+Place write_together(Ranks& ranks, const SlabSpan& span, RankSlabs& part, const std::string& output,
+                     const std::string& input, std::uint64_t samples, const RunContext& run) {
+  const std::vector<Border> borders =
+      gather_borders(ranks, {span, part.any(), part.below(), part.last(), part.vertices(), part.triangles()});
+  Place place;
+  std::optional<OutputFile> file;
+  std::string staged;
+  ranks.together([&] {
+    place = find_place(borders, static_cast<std::size_t>(ranks.rank()), output);
+    if (place.triangles == 0) no_surface(input, samples);
+    if (!ranks.first()) return;
+    file.emplace(output, std::string());
+    staged = std::filesystem::absolute(file->staged()).string();
+  });
+  Packer words;
+  words.put(staged);
+  Bytes bytes = words.take();
+  ranks.broadcast(bytes);
+  staged = Unpacker(bytes).get_text();
+  {
+    SharedFile shared(ranks, staged, output);
+    ranks.together([&] { write_part(shared, part, place, ranks.first(), run); });
+    shared.close();
+  }
+  ranks.together([&] {
+    if (file) file->publish();
+  });
+  return place;
+}
+
+}  // namespace lamina::ranks

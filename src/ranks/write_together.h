@@ -1,0 +1,38 @@
+// One mesh file, written by all ranks at their places.
+#pragma once
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "chunk/part_file.h"
+#include "ranks/rank_slabs.h"
+#include "ranks/ranks.h"
+#include "surface/slab_span.h"
+
+namespace lamina::ranks {
+
+/// What ranks must know of each other's parts: small, whatever the mesh.
+struct Border {
+  SlabSpan span;
+  bool any = false;
+  SlabMark below, last;
+  std::uint64_t vertices = 0, triangles = 0;
+};
+
+/// Where a rank's part begins in the mesh, and how large that is.
+struct Place {
+  std::uint64_t first_vertex = 0, first_triangle = 0;
+  std::uint64_t vertices = 0, triangles = 0;
+};
+
+/// The place of part `rank`. Throws Error(internal) where two parts do not agree on the surface between them, and
+/// Error(budget) beyond the vertices that a PLY's indices can name; `name`: the mesh, for the message.
+Place find_place(std::span<const Border> parts, std::size_t rank, const std::string& name);
+
+/// Writes the file; it appears under its name when all have written. The place is that of this rank. Throws
+/// Error(empty) where no rank has a triangle: for `input` with `samples`.
+Place write_together(Ranks& ranks, const SlabSpan& span, RankSlabs& part, const std::string& output,
+                     const std::string& input, std::uint64_t samples, const RunContext& run);
+
+}  // namespace lamina::ranks

@@ -1,0 +1,106 @@
+// The folder that chunks are made from.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "chunk/chunked.h"
+
+namespace lamina {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+namespace fs = std::filesystem;
+
+class KeptStore : public ::testing::Test {
+ protected:
+  KeptStore() {
+    settings_.input = test::write_cloud(test::torus_cloud(3000), folder_ / "in.ply");
+    whole_ = test::whole_bytes(settings_, folder_);
+    write_store(settings_, store_, {});
+    from_store_.input = store_;
+    from_store_.output = folder_ / "from_store.ply";
+  }
+  std::string refusal(ExitCode code) {
+    try {
+      reconstruct_surface(from_store_, {});
+    } catch (const Error& error) {
+      EXPECT_EQ(error.code(), code) << error.what();
+      return error.what();
+    }
+    ADD_FAILURE() << "ran";
+    return {};
+  }
+  test::TemporaryFolder folder_;
+  SurfaceSettings settings_, from_store_;
+  const std::string store_ = folder_ / "store";
+  std::string whole_;
+};
+
+TEST_F(KeptStore, IsAnInputLikeAFile) {
+  for (int again = 0; again < 2; ++again) {
+    reconstruct_surface(from_store_, {});
+    EXPECT_TRUE(test::read_file(from_store_.output) == whole_);
+  }
+}
+
+TEST_F(KeptStore, IsNotOverwritten) {
+  EXPECT_THROW(write_store(settings_, store_, {}), Error);
+  reconstruct_surface(from_store_, {});
+}
+
+TEST_F(KeptStore, AppearsWhenCompleteOnly) {
+  const long before = folder_.entries();
+  settings_.input = folder_ / "missing.ply";
+  EXPECT_THROW(write_store(settings_, folder_ / "other", {}), Error);
+  EXPECT_EQ(folder_.entries(), before);
+}
+
+TEST_F(KeptStore, RefusesOtherWaysOfReading) {
+  from_store_.frame = FrameMode::axis;
+  EXPECT_THAT(refusal(ExitCode::usage), AllOf(HasSubstr("--frame"), HasSubstr("pca")));
+}
+
+TEST_F(KeptStore, NamesTheFileThatIsDamaged) {
+  for (const fs::directory_entry& file : fs::directory_iterator(store_)) {
+    const std::string path = file.path().string(), bytes = test::read_file(path);
+    ASSERT_FALSE(bytes.empty());
+    const bool describes = file.path().filename() == "store.json";
+    for (const std::size_t at : {std::size_t{0}, bytes.size() / 3, bytes.size() - 2}) {
+      std::string changed = bytes;
+      changed[at] = static_cast<char>(changed[at] ^ 4);
+      test::write_file(path, changed);
+      // A description may say other things and be sound in itself.
+      if (!describes) {
+        EXPECT_THAT(refusal(ExitCode::unreadable), HasSubstr(store_)) << path;
+      }
+    }
+    test::write_file(path, bytes.substr(0, bytes.size() - 3));
+    EXPECT_THAT(refusal(ExitCode::unreadable), HasSubstr(path));
+    fs::rename(path, folder_ / "aside");
+    if (!describes) {
+      EXPECT_THAT(refusal(ExitCode::unreadable), HasSubstr(path));
+    }
+    fs::rename(folder_ / "aside", path);
+    test::write_file(path, bytes);
+  }
+  reconstruct_surface(from_store_, {});
+  EXPECT_TRUE(test::read_file(from_store_.output) == whole_);
+}
+
+TEST_F(KeptStore, ChunksOfSomethingElseAreRefused) {
+  SurfaceSettings s = from_store_;
+  s.output = folder_ / "part.lmesh";
+  EXPECT_THROW(reconstruct_chunk(s, {0, 3}, {}), Error);
+  EXPECT_THROW(reconstruct_chunk(s, {4, 3}, {}), Error);
+  s.volume.path = folder_ / "x.vdb";
+  EXPECT_THROW(reconstruct_chunk(s, {1, 3}, {}), Error);
+  s.volume.path.clear();
+  s.input = settings_.input;
+  EXPECT_THROW(reconstruct_chunk(s, {1, 3}, {}), Error);
+  EXPECT_FALSE(fs::exists(s.output));
+}
+
+}  // namespace
+}  // namespace lamina

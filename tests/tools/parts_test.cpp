@@ -1,0 +1,77 @@
+// lamina sort --store, surface --chunk, --print-tasks, --checkpoint, and merge of parts, as a queue runs them.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "support/program.h"
+#include "tools/tool_files.h"
+
+namespace lamina::tools {
+namespace {
+
+using namespace test;
+using ::testing::HasSubstr;
+
+class PartsTool : public ::testing::Test {
+ protected:
+  PartsTool() {
+    EXPECT_EQ(run_lamina({"sort", cloud_, "--store", store_, "--quiet"}).code, 0);
+    EXPECT_EQ(run_lamina({"surface", cloud_, "-o", whole_, "--steps", "2", "--quiet"}).code, 0);
+  }
+  TemporaryFolder folder_;
+  std::string cloud_ = write_points(folder_ / "cloud.ply", sphere_rows(3000, 5), sphere_columns());
+  std::string store_ = folder_ / "a store", whole_ = folder_ / "whole.ply", mesh_ = folder_ / "a mesh.ply";
+};
+
+TEST_F(PartsTool, PrintedTasksMakeTheSameMesh) {
+  const Outcome tasks = run_lamina({"surface", store_, "-o", mesh_, "--steps", "2", "--quiet", "--print-tasks", "3"});
+  ASSERT_EQ(tasks.code, 0) << tasks.err;
+  EXPECT_EQ(std::count(tasks.out.begin(), tasks.out.end(), '\n'), 4);
+  const Outcome outcome = run_shell("set -e\n" + tasks.out);
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(read_text(mesh_) == read_text(whole_));
+}
+
+TEST_F(PartsTool, TasksAsJsonSayWhatComesAfterWhat) {
+  const Outcome tasks = run_lamina({"surface", store_, "-o", mesh_, "--diffuse", "--print-tasks", "2", "--json"});
+  ASSERT_EQ(tasks.code, 0) << tasks.err;
+  const auto list = nlohmann::json::parse(tasks.out).at("tasks");
+  ASSERT_EQ(list.size(), 3u);
+  EXPECT_EQ(list[0].at("command"),
+            nlohmann::json({"lamina", "surface", store_, "--diffuse", "--chunk", "1/2", "-o", list[0].at("output")}));
+  EXPECT_EQ(list[2].at("after"), nlohmann::json({list[0].at("name"), list[1].at("name")}));
+  EXPECT_EQ(list[2].at("output"), mesh_);
+}
+
+TEST_F(PartsTool, AMissingPartIsNamed) {
+  const std::string part = folder_ / "two.lmesh";
+  ASSERT_EQ(run_lamina({"surface", store_, "--chunk", "2/2", "-o", part}).code, 0);
+  const Outcome outcome = run_lamina({"merge", part, "-o", mesh_});
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_THAT(outcome.err, HasSubstr("chunk 1 of 2 is missing"));
+  EXPECT_FALSE(std::filesystem::exists(mesh_));
+}
+
+TEST_F(PartsTool, OptionsThatCannotBeMeant) {
+  EXPECT_EQ(run_lamina({"surface", store_, "--chunk", "2", "-o", mesh_}).code, 2);
+  EXPECT_EQ(run_lamina({"surface", store_, "--chunk", "3/2", "-o", mesh_}).code, 2);
+  EXPECT_EQ(run_lamina({"surface", cloud_, "--chunk", "1/2", "-o", mesh_}).code, 2);
+  EXPECT_EQ(run_lamina({"surface", cloud_, "--resume", "-o", mesh_}).code, 2);
+  EXPECT_EQ(run_lamina({"surface", store_, "--json", "-o", mesh_}).code, 2);
+  EXPECT_EQ(run_lamina({"sort", cloud_}).code, 2);
+  EXPECT_EQ(run_lamina({"sort", cloud_, "--store", folder_ / "b", "-o", mesh_}).code, 2);
+  EXPECT_EQ(run_lamina({"sort", cloud_, cloud_, "-o", mesh_}).code, 2);
+}
+
+TEST_F(PartsTool, Checkpoint) {
+  const std::string folder = folder_ / "checkpoint";
+  const Outcome outcome = run_lamina({"surface", cloud_, "-o", mesh_, "--steps", "2", "--checkpoint", folder});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_TRUE(read_text(mesh_) == read_text(whole_));
+  EXPECT_FALSE(std::filesystem::exists(folder));
+}
+
+}  // namespace
+}  // namespace lamina::tools
