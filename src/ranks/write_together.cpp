@@ -50,7 +50,7 @@ void write_part(SharedFile& file, RankSlabs& part, const Place& place, bool firs
   at = header.size() + place.vertices * record + place.first_triangle * kFaceRecordBytes;
   std::vector<std::byte> faces;
   part.read_triangles([&](std::span<const PartTriangle> triangles) {
-    encode_shifted(triangles, place.first_vertex, place.vertices, "the part of a rank", faces);
+    encode_shifted(triangles, place.first_vertex, place.vertices, "this rank's part", faces);
     file.write(at, faces);
     at += faces.size();
     go_on();
