@@ -38,8 +38,8 @@ struct Band::Found {
 Band::Band(BandSettings settings, const Lattice& lattice)
     : settings_(std::move(settings)),
       lattice_(lattice),
-      farthest_(static_cast<float>(settings_.band) - 0.25F),
-      bricks_(settings_.channels.size()) {
+      farthest_(static_cast<float>(settings_.band) - 0.5F),
+      bricks_(std::clamp(settings_.rounds, 0, kMaxRounds), settings_.channels.size()) {
   settings_.rounds = std::clamp(settings_.rounds, 0, kMaxRounds);
 }
 

@@ -26,8 +26,8 @@ Brick& BrickMap::touch(const Block& b) {
   Brick& brick = *place;
   brick.block = b;
   brick.around.fill(nullptr);
-  brick.known.fill({});
-  brick.source.fill({});
+  std::fill_n(brick.known.begin(), rounds_ + 1, BlockMask{});
+  std::fill_n(brick.source.begin(), std::min(rounds_ + 1, kMaxRounds), BlockMask{});
   brick.contested = {};
   brick.repaired = {};
   for (std::int32_t dz = -1; dz <= 1; ++dz) {

@@ -41,8 +41,8 @@ struct Brick {
 /// The bricks of a band that moves along z.
 class BrickMap {
  public:
-  /// `channels`: beside distance and normal.
-  explicit BrickMap(std::size_t channels) : channels_(channels) {}
+  /// `rounds`: that the band grows by; `channels`: beside distance and normal.
+  BrickMap(int rounds, std::size_t channels) : rounds_(rounds), channels_(channels) {}
 
   [[nodiscard]] bool empty() const { return layers_.empty(); }
   /// The block z of the lowest bricks.
@@ -63,6 +63,7 @@ class BrickMap {
  private:
   using Layer = std::unordered_map<std::uint64_t, std::unique_ptr<Brick>>;  // by y, x
 
+  int rounds_;
   std::size_t channels_;
   std::map<std::int32_t, Layer> layers_;  ///< by block z
   std::vector<std::unique_ptr<Brick>> spare_;

@@ -111,6 +111,9 @@ BrickLeaves LeafMaker::operator()(const Brick& brick) const {
   const BlockMask& known = band.all(brick);
   const auto limit = static_cast<float>(band.settings().band);
   BlockMask active, negative;
+  for (int z = 0; z < 8; ++z)
+    for (std::uint64_t w = known.words[z]; w != 0; w &= w - 1)
+      __builtin_prefetch(&brick.plane[z * 64 + std::countr_zero(w)]);
   for (int z = 0; z < 8; ++z) {
     for (std::uint64_t w = known.words[z]; w != 0; w &= w - 1) {
       const int bit = std::countr_zero(w);

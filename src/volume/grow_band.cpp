@@ -41,38 +41,47 @@ constexpr float kSideways = 0.75F;
 /// Repaired corners count within this distance of the surface, voxels.
 constexpr float kRepaired = 1;
 
-/// Four offsets at a time; what fills the last is out of reach like the middle.
-constexpr int kFours = 7;
+/// The offsets behind the middle, four at a time; those before it are their opposites. What fills the last four is out
+/// of reach.
+constexpr int kFours = 4, kBehind = 14;
 struct FourOffsets {
   Plane x, y, z, room;  ///< `room`: what is left of kSideways
 };
-std::array<FourOffsets, kFours> make_fours() {
+constexpr std::array<FourOffsets, kFours> make_fours() {
   std::array<FourOffsets, kFours> out{};
-  for (int i = 0; i < 27; ++i) {
-    const Offset& o = kOffsets[static_cast<std::size_t>(i)];
-    FourOffsets& four = out[static_cast<std::size_t>(i / 4)];
-    four.x[i % 4] = static_cast<float>(o.x), four.y[i % 4] = static_cast<float>(o.y);
-    four.z[i % 4] = static_cast<float>(o.z), four.room[i % 4] = kSideways - o.squared;
+  for (std::size_t i = 0; i < kFours; ++i) {
+    std::array<Offset, 4> o{};
+    for (std::size_t k = 0; k < 4; ++k)
+      o[k] = 4 * i + k + kBehind < 27 ? kOffsets[4 * i + k + kBehind] : Offset{0, 0, 0, 1};
+    const auto four = [&o](auto value) { return Plane{value(o[0]), value(o[1]), value(o[2]), value(o[3])}; };
+    out[i] = {four([](const Offset& to) { return static_cast<float>(to.x); }),
+              four([](const Offset& to) { return static_cast<float>(to.y); }),
+              four([](const Offset& to) { return static_cast<float>(to.z); }),
+              four([](const Offset& to) { return kSideways - to.squared; })};
   }
   return out;
 }
-const std::array<FourOffsets, kFours> kFourOffsets = make_fours();
+constexpr std::array<FourOffsets, kFours> kFourOffsets = make_fours();
 
 /// What a voxel says to those around it.
 struct Reach {
-  std::uint32_t list = 0;  ///< the offsets it reaches
+  /// The offsets behind the middle of which either they or their opposites are reached, and which of the two.
+  std::uint32_t pairs = 0, behind = 0;
   std::array<Plane, kFours> up, weight;
 
   /// Away from the surface only: what lies towards it is a hole in the data, not a part of the band.
   explicit Reach(const Plane& plane) {
     const float away = plane[3] < 0 ? -1 : 1;
+    const auto bits_of = [](const auto& four, std::size_t i) {
+      return static_cast<std::uint32_t>(_mm_movemask_ps(std::bit_cast<__m128>(four))) << (4 * i);
+    };
     for (std::size_t i = 0; i < kFours; ++i) {
       const FourOffsets& to = kFourOffsets[i];
       up[i] = plane[0] * to.x + plane[1] * to.y + plane[2] * to.z;
       const Plane near = to.room + up[i] * up[i];
       weight[i] = near * near * near * near;
-      const auto reached = (near > 0) & (up[i] * away > 0);
-      list |= static_cast<std::uint32_t>(_mm_movemask_ps(std::bit_cast<__m128>(reached))) << (4 * i);
+      pairs |= bits_of(near > 0, i);
+      behind |= bits_of(up[i] * away > 0, i);
     }
   }
 };
@@ -232,10 +241,13 @@ class Step {
     for (const Pusher& p : pushers) {
       const Plane plane = p.from->plane[p.at];
       const Reach reach(plane);
-      for (std::uint32_t list = p.beside & reach.list; list != 0; list &= list - 1) {
-        const int o = std::countr_zero(list);
-        sums_.add(p.here + kSteps[o], reach.weight[o / 4][o % 4], plane + Plane{0, 0, 0, reach.up[o / 4][o % 4]},
-                  *p.from, p.at, channels_);
+      for (std::uint32_t list = reach.pairs; list != 0; list &= list - 1) {
+        const auto i = static_cast<std::size_t>(std::countr_zero(list));
+        const bool behind = (reach.behind >> i & 1) != 0;
+        const std::size_t o = behind ? kBehind + i : 26 - kBehind - i;
+        if ((p.beside >> o & 1) == 0) continue;
+        const float up = behind ? reach.up[i / 4][i % 4] : -reach.up[i / 4][i % 4];
+        sums_.add(p.here + kSteps[o], reach.weight[i / 4][i % 4], plane + Plane{0, 0, 0, up}, *p.from, p.at, channels_);
       }
     }
   }
