@@ -14,6 +14,7 @@
 #include "inputs.h"
 #include "lamina/error.h"
 #include "model.h"
+#include "normal_options.h"
 #include "result_file.h"
 #include "text.h"
 #include "tool.h"
@@ -68,6 +69,7 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
                      {"crossing_cells", s.crossing_cells},
                      {"general_cells", s.general_cells},
                      {"rejected_loops", s.rejected_loops}};
+  if (s.normals) j["normals"] = normals_json(*s.normals);
   if (settings.volume.wanted()) {
     j["volume"] = {{"files", s.volume.files},
                    {"voxelsize", s.volume.voxel},
@@ -223,6 +225,14 @@ void add_surface(CLI::App& app) {
       ->group(samples);
   add_length(*tool, "--max-radius", s.max_radius, "discard samples with a larger radius as undersampled; 0: none")
       ->group(samples);
+
+  tool->add_option("--normals", s.normals,
+                   "whose normals: the file's; auto: found where the file has none; estimate: all found")
+      ->transform(words<NormalsChoice>(
+          {{"file", NormalsChoice::file}, {"auto", NormalsChoice::automatic}, {"estimate", NormalsChoice::estimate}}))
+      ->option_text("file|auto|estimate [file]")
+      ->group("Normals");
+  add_normals_options(*tool, s.normal_search, "Normals");
 
   const std::string fit = "Fit";
   tool->add_option("--blend", s.blend, "H: the influence radius R is H times a sample's radius r")

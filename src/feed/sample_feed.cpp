@@ -71,7 +71,11 @@ void SampleFeed::prepare(std::int64_t z_limit, const OnReady& on_ready) {
       continue;
     }
     read_ahead();
-    estimator_->push(store_.count(pushed_) > 0 ? cache_.get(pushed_)->samples : LocalSamples{});
+    if (store_.count(pushed_) > 0) {
+      estimator_->push(cache_.get(pushed_)->samples);
+    } else {
+      estimator_->push({});
+    }
     if (++pushed_ == store_.buckets()) estimator_->finish();
   }
   read_ahead();

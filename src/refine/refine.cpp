@@ -204,19 +204,34 @@ void close_cells(const CornerBlock& leaf, int begin, int end, std::uint64_t* out
   for (int z = begin; z < end; ++z) out[z - begin] |= leaf.above.words[z];
 }
 
-void mark_sample(Window& window, const Mark& mark) {
-  const std::int32_t a = window.lattice().cell_size(mark.level);
-  const Cell c{floor_div(mark.x, a), floor_div(mark.y, a), floor_div(mark.z, a)};
-  const auto set = [&](CornerBlock& block, BlockMask CornerBlock::*mask, int offset) {
+Marker::Marker(Window& window) : window_(window) {
+  for (int level = 0; level < window.levels(); ++level) cells_.emplace_back(window.lattice().cell_size(level));
+}
+
+CornerBlock& Marker::block(int level, const Block& b) {
+  if (level != level_ || b != last_) {
+    found_ = &window_.touch_shared(level, b);
+    level_ = level;
+    last_ = b;
+  }
+  return *found_;
+}
+
+void Marker::mark(const Mark& mark) {
+  const std::int32_t a = window_.lattice().cell_size(mark.level);
+  const FloorDivider& cell_of = cells_[mark.level];
+  const Cell c{cell_of(mark.x), cell_of(mark.y), cell_of(mark.z)};
+  const auto set = [](BlockMask& mask, int offset) {
     const std::uint64_t bit = std::uint64_t{1} << (offset & 63);
-    std::atomic_ref<std::uint64_t> word((block.*mask).words[offset >> 6]);
+    const std::atomic_ref<std::uint64_t> word(mask.words[offset >> 6]);
     if ((word.load(std::memory_order_relaxed) & bit) == 0) word.fetch_or(bit, std::memory_order_relaxed);
   };
-  CornerBlock& block = window.touch_shared(mark.level, block_of(c));
-  set(block, &CornerBlock::home, offset_in_block(c));
+  const Block home = block_of(c);
+  CornerBlock& here = block(mark.level, home);
+  set(here.home, offset_in_block(c));
   const auto mark_corner = [&](const Cell& corner) {
     const Block b = block_of(corner);
-    set(b == block_of(c) ? block : window.touch_shared(mark.level, b), &CornerBlock::nearest, offset_in_block(corner));
+    set((b == home ? here : window_.touch_shared(mark.level, b)).nearest, offset_in_block(corner));
   };
   if (mark.sparse) {
     for (int i = 0; i < 8; ++i) mark_corner(c + Cell{i & 1, (i >> 1) & 1, i >> 2});

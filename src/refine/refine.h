@@ -1,7 +1,9 @@
 // Adaptive refinement: which cells of which level exist, and which corners are worth projecting (METHOD 3.4).
 #pragma once
 #include <cstdint>
+#include <vector>
 
+#include "lamina/floor_divide.h"
 #include "window/window.h"
 
 namespace lamina {
@@ -13,9 +15,22 @@ struct Mark {
   bool sparse = false;   ///< the level's cells are so small that gaps between such samples span several
 };
 
-/// Notes the sample's home cell and nearest corner; all corners of the home cell where samples are sparse. Any order,
-/// several threads at once, slabs at will ahead of refine().
-void mark_sample(Window& window, const Mark& mark);
+/// Notes samples' home cells and nearest corners; all corners of the home cell where samples are sparse. Any order, one
+/// marker per thread, slabs at will ahead of refine(). Remembers the block it was in: samples come sorted.
+class Marker {
+ public:
+  explicit Marker(Window& window);
+  void mark(const Mark& mark);
+
+ private:
+  CornerBlock& block(int level, const Block& b);
+
+  Window& window_;
+  std::vector<FloorDivider> cells_;  ///< by level
+  int level_ = -1;
+  Block last_;
+  CornerBlock* found_ = nullptr;
+};
 
 /// Fixes the octree of one slab: cells that samples reach, subdivision, taking part. Samples must be marked up to three
 /// slabs further, and the slab below be refined. A cell is split when a sample of a finer level lies within three

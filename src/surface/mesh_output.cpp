@@ -52,13 +52,12 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
     clustered_.push_back(std::move(slab));
   }
   if (last) clusterer_.finish();
-  FinalSlab done;
-  while (clusterer_.pop(done)) {
+  while (clusterer_.pop(done_)) {
     const IsoSlab* next = clustered_.size() > 1 ? clustered_[1].get() : nullptr;
-    place_vertices(done, *clustered_.front(), next, frame_, chord_, vertices_);
+    place_vertices(done_, *clustered_.front(), next, frame_, chord_, vertices_);
     sink_.append_vertices(vertices_);
-    sink_.append_triangles(done.triangles);
-    triangles_ += done.triangles.size();
+    sink_.append_triangles(done_.triangles);
+    triangles_ += done_.triangles.size();
     if (clustered_.front().use_count() == 1) {
       const std::lock_guard lock(mutex_);
       spares_.push_back(std::move(clustered_.front()));

@@ -49,6 +49,7 @@ class MeshOutput {
   Clusterer clusterer_;
   std::vector<std::shared_ptr<IsoSlab>> queued_;
   std::deque<std::shared_ptr<IsoSlab>> clustered_;  ///< by the clusterer, not yet written
+  FinalSlab done_;                                  ///< lent to the clusterer and back: its storage is kept
   VertexBatch vertices_;
   std::mutex mutex_;  ///< of spares_
   std::vector<std::shared_ptr<IsoSlab>> spares_;

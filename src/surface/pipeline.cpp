@@ -59,11 +59,12 @@ void Pipeline::mark(const ActiveBucket& bucket) {
     window_.cover(covered_);
   }
   tbb::parallel_for(std::size_t{0}, (n + kPiece - 1) / kPiece, [&](std::size_t piece) {
+    Marker marker(window_);
     for (std::size_t i = piece * kPiece; i < std::min(n, (piece + 1) * kPiece); ++i) {
       if (bucket.support[i] <= 0) continue;
       const auto cell = static_cast<float>(resolved_.lattice.cell_size(bucket.level[i]));
-      mark_sample(window_, {bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i],
-                            bucket.support[i] > kSparse * cell});
+      marker.mark({bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i],
+                   bucket.support[i] > kSparse * cell});
     }
   });
 }

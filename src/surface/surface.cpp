@@ -17,6 +17,7 @@
 #include "lamina/error.h"
 #include "lamina/mesh_sink.h"
 #include "lamina/points.h"
+#include "surface/choose_normals.h"
 #include "surface/ingest.h"
 #include "surface/pipeline.h"
 #include "surface/plan.h"
@@ -260,7 +261,9 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
     const MeshSink trial(out);
   }
 
-  const std::unique_ptr<PointSource> source = open_inputs(settings, tmp, run);
+  std::unique_ptr<PointSource> source = open_inputs(settings, tmp, run);
+  if (settings.normals != NormalsChoice::file)
+    watch.time("normals", [&] { source = choose_normals(std::move(source), settings, stats.normals, tmp, run); });
   const PointSourceInfo& info = source->info();
   Frame frame;
   std::optional<Ingested> ingested = read_input(*source, settings, tmp, run, watch, frame);

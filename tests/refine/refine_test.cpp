@@ -59,7 +59,8 @@ Marked random_marks(std::uint64_t seed, int levels) {
 }
 
 void mark_all(Window& window, const Marked& m) {
-  for (const Mark& mark : m.marks) mark_sample(window, mark);
+  Marker marker(window);
+  for (const Mark& mark : m.marks) marker.mark(mark);
 }
 
 void refine_all(Window& window, const Marked& m) {
@@ -170,9 +171,10 @@ TEST(Refine, MarkingRunsThreeSlabsAhead) {
     const Marked m = random_marks(seed + 2000, 1 + static_cast<int>(seed % 6));
     Window window(m.lattice, 0, m.bounds());
     for (std::int32_t s = m.first; s < m.end; ++s) {
+      Marker marker(window);
       for (const Mark& mark : m.marks) {
         const std::int32_t at = m.lattice.slab_of(mark.z);
-        if (at == s + 3 || (s == m.first && at < s + 3)) mark_sample(window, mark);
+        if (at == s + 3 || (s == m.first && at < s + 3)) marker.mark(mark);
       }
       refine_slab(window, s);
       place_corners(window, s);
@@ -195,7 +197,7 @@ TEST(Refine, MarkingFromSeveralThreads) {
     Window window(m.lattice, 0, table ? m.bounds() : Bounds{});
     for (std::int32_t s = m.first; s < m.end; ++s) window.cover(s);
     const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 4);
-    tbb::parallel_for(std::size_t{0}, m.marks.size(), [&](std::size_t i) { mark_sample(window, m.marks[i]); });
+    tbb::parallel_for(std::size_t{0}, m.marks.size(), [&](std::size_t i) { Marker(window).mark(m.marks[i]); });
     refine_all(window, m);
     EXPECT_EQ(all_bits(window, m.first, m.end), alone) << "table " << table;
   }

@@ -51,8 +51,9 @@ class StreamedCloud {
         first(lattice.slab_of(*std::min_element(cloud.z.begin(), cloud.z.end())) - 2),
         end(lattice.slab_of(*std::max_element(cloud.z.begin(), cloud.z.end())) + 4) {
     feed.prepare(std::numeric_limits<std::int32_t>::max(), [&](const ActiveBucket& b) {
+      Marker marker(window);
       for (std::size_t i = 0; i < b.samples.size(); ++i) {
-        if (b.support[i] > 0) mark_sample(window, {b.samples.x[i], b.samples.y[i], b.samples.z[i], b.level[i]});
+        if (b.support[i] > 0) marker.mark({b.samples.x[i], b.samples.y[i], b.samples.z[i], b.level[i]});
       }
     });
     for (std::int32_t s = first; s < end; ++s) refine_slab(window, s);

@@ -1,0 +1,97 @@
+"""Results of scripts/paper-tables as Markdown."""
+import math
+
+from paper import published
+
+UNIT = 1e5  # distances are printed in 1e-5 of the diagonal
+
+
+def table(head, rows):
+    lines = ["| " + " | ".join(head) + " |", "|" + "---|" + "---:|" * (len(head) - 1)]
+    return "\n".join(lines + ["| " + " | ".join(str(c) for c in row) + " |" for row in rows])
+
+
+def two_sided(case):
+    return math.sqrt((case["to_truth"] ** 2 + case["from_truth"] ** 2) / 2)
+
+
+def cost_cells(cost):
+    return [f"{cost['wall']:.1f}", f"{cost['cpu']:.1f}", f"{cost['memory'] / 1e6:.0f}"]
+
+
+def quality_cells(q):
+    return [f"{q['triangles'] / 1e3:.0f}", f"{q['to_truth'] * UNIT:.2f}", f"{q['from_truth'] * UNIT:.2f}",
+            f"{q['max'] * UNIT:.0f}", "yes" if q["manifold"] else "no", q["holes"], q["main_boundary_edges"], q["components"]]
+
+
+QUALITY = ["k triangles", "mesh to truth", "truth to mesh", "max", "manifold", "holes", "boundary edges, main part", "parts"]
+
+
+def diffusion_and_clustering(results):
+    """Table 1: each row's ratios are to the plain isosurface, ours and the paper's."""
+    rows = []
+    base = next(c for c in results if not c["diffuse"] and c["cluster"] == "none")
+    base_paper = published.TABLE1[False, "none"]
+    for c in results:
+        theirs = published.TABLE1[c["diffuse"], c["cluster"]]
+        cost, samples = c["cost"], c["cost"]["stats"]["samples"]
+        rows.append(["yes" if c["diffuse"] else "no", c["cluster"], *cost_cells(cost), f"{c['edge'] * UNIT:.1f}",
+                     f"{c['triangles'] / 1e3:.0f}", f"{cost['cpu'] / base['cost']['cpu']:.2f}",
+                     f"{theirs[0] / base_paper[0]:.2f}", f"{c['triangles'] / base['triangles']:.2f}",
+                     f"{theirs[2] / base_paper[2]:.2f}", f"{samples / cost['wall'] / 1e3:.0f}",
+                     f"{published.TABLE1_SAMPLES / theirs[0] / 1e3:.0f}"])
+    return table(["diffusion", "clustering", "s", "CPU s", "MB", "edge length", "k triangles", "time ratio", "paper",
+                  "triangle ratio", "paper", "k samples/s", "paper"], rows)
+
+
+def blending(results):
+    """Table 2."""
+    rows = []
+    for c in results:
+        theirs = published.TABLE2[c["blend"]]
+        cost, samples = c["cost"], c["cost"]["stats"]["samples"]
+        rows.append([c["blend"], *cost_cells(cost), f"{samples / cost['wall'] / 1e3:.0f}", f"{theirs[0]:.1f}",
+                     f"{cost['memory'] / results[0]['cost']['memory']:.2f}", f"{theirs[1] / published.TABLE2[1][1]:.2f}"])
+    return table(["H", "s", "CPU s", "MB", "k samples/s", "paper", "memory over H = 1", "paper"], rows)
+
+
+def accuracy(results):
+    """Table 3. The paper gives ratios to another method only, so both are shown over their own first row, too."""
+    rows = []
+    first = {(c["model"], c["noisy"]): two_sided(c) for c in reversed(results)}
+    for c in results:
+        theirs = published.TABLE3.get(c["name"], {}).get(c["model"])
+        base = published.TABLE3["N = 1"].get(c["model"])
+        paper = f"{theirs[c['noisy']] / base[c['noisy']]:.2f}" if theirs else "-"
+        rows.append([c["model"], "noisy" if c["noisy"] else "clean", c["name"], f"{c['to_truth'] * UNIT:.2f}",
+                     f"{c['from_truth'] * UNIT:.2f}", f"{two_sided(c) * UNIT:.2f}", f"{c['triangles'] / 1e3:.0f}",
+                     f"{two_sided(c) / first[c['model'], c['noisy']]:.2f}", paper])
+    return table(["model", "samples", "method", "mesh to truth", "truth to mesh", "both", "k triangles", "over N = 1",
+                  "paper"], rows)
+
+
+def against_peers(results):
+    """One table per model and kind of samples; below it our figures over the best peer's of each column."""
+    parts = []
+    for model, noisy in dict.fromkeys((c["model"], c["noisy"]) for c in results):
+        cases = [c for c in results if (c["model"], c["noisy"]) == (model, noisy)]
+        rows = [[c["name"], *(cost_cells(c["cost"]) + quality_cells(c) if "triangles" in c else ["failed"] + ["-"] * 10)]
+                for c in cases]
+        parts.append(f"{model}, {'noisy' if noisy else 'clean'}:\n\n" + table(["", "s", "CPU s", "MB"] + QUALITY, rows)
+                     + "\n\n" + _ratios(cases))
+    return "\n\n".join(parts)
+
+
+def _ratios(cases):
+    ours = cases[0]
+    peers = [c for c in cases if c["peer"] and "triangles" in c]
+    if not peers:
+        return "No peer is installed."
+    columns = {"wall": lambda c: c["cost"]["wall"], "CPU": lambda c: c["cost"]["cpu"],
+               "memory": lambda c: c["cost"]["memory"], "mesh to truth": lambda c: c["to_truth"],
+               "truth to mesh": lambda c: c["from_truth"], "max": lambda c: c["max"]}
+    words = []
+    for name, of in columns.items():
+        best = min(peers, key=of)
+        words.append(f"{name} {of(ours) / of(best):.2f} ({best['name']})")
+    return f"*{ours['name']}* over the best peer of each column, below 1 is better: " + ", ".join(words) + "."
