@@ -8,8 +8,8 @@
 
 namespace lamina {
 
-MeshOutput::MeshOutput(const ClusterSettings& settings, float chord, const Frame& frame, MeshSink& sink)
-    : chord_(chord), frame_(frame), sink_(sink), clusterer_(settings) {}
+MeshOutput::MeshOutput(const ClusterSettings& settings, float chord, double finest, const Frame& frame, MeshSink& sink)
+    : chord_(chord), finest_(finest), frame_(frame), sink_(sink), clusterer_(settings) {}
 
 MeshOutput::~MeshOutput() {
   tasks_.cancel();
@@ -55,6 +55,7 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
   while (clusterer_.pop(done_)) {
     const IsoSlab* next = clustered_.size() > 1 ? clustered_[1].get() : nullptr;
     place_vertices(done_, *clustered_.front(), next, frame_, chord_, vertices_);
+    if (finest_ > 0) place_levels(done_, *clustered_.front(), next, finest_, vertices_);
     sink_.append_vertices(vertices_);
     sink_.append_triangles(done_.triangles);
     triangles_ += done_.triangles.size();

@@ -248,6 +248,14 @@ void expect_time(const SurfaceSettings& settings, const PointSourceInfo& source,
   plan.seconds = elapsed + slowness * (whole - reading) / (1 + kEfficiency * (plan.threads - 1));
 }
 
+void refuse_two_levels(const SurfaceSettings& settings, const PointSourceInfo& info) {
+  const auto taken = [](const AttributeSpec& a) { return a.name == "level"; };
+  if (settings.vertex_levels && std::any_of(info.attributes.begin(), info.attributes.end(), taken)) {
+    throw Error(ExitCode::usage, fmt::format("{}: the points have an attribute called level already; leave out --level",
+                                             input_name(settings)));
+  }
+}
+
 SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run) {
   SurfaceStats stats;
   Stopwatch watch;
@@ -284,6 +292,7 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
       stats.rejected.push_back({describe(static_cast<Defect>(k)), census.rejected[k], census.first_row[k]});
     }
   }
+  refuse_two_levels(settings, info);
   run.info(describe(resolved.plan, settings));
   constexpr std::uint64_t kLargestTables = std::uint64_t{1} << 30;  // a scan of 380 million samples needs a few MB
   if (is_out_of_reach(resolved.plan, settings.blend) || table_bytes(resolved.lattice, *ingested) > kLargestTables) {
@@ -302,6 +311,7 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
   stats.disk_bytes = ingested->store.disk_bytes();
   if (!settings.dry_run) {
     out.attributes = info.attributes;
+    if (settings.vertex_levels) out.attributes.push_back({"level", ScalarType::uint8});
     out.double_positions = needs_double(census, resolved.plan.finest_cell);
     MeshSink sink(out);
     SampleFeed feed(ingested->store, resolved.lattice, resolved.feed, resolved.radii, info.has_radius);
