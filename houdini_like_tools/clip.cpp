@@ -1,4 +1,4 @@
-// lamina clip: the part of points or a mesh inside a box or before planes.
+// lamina clip: the part of points, a mesh or volumes inside a box or before planes.
 #include "lamina/clip.h"
 
 #include <fmt/format.h>
@@ -10,6 +10,7 @@
 #include "inputs.h"
 #include "lamina/edit_points.h"
 #include "lamina/error.h"
+#include "lamina/volume_edit.h"
 #include "numbers.h"
 #include "text.h"
 #include "tool.h"
@@ -52,6 +53,11 @@ void clip_triangles(const ClipOptions& o, const RunContext& context) {
       fmt::format("{} triangles of {}", count_text(clipped.triangles.size()), count_text(mesh.triangles.size())));
 }
 
+void clip_grids(const ClipOptions& o, const RunContext& context) {
+  const VolumeEditStats stats = clip_volume(o.input, o.region, o.keep, o.output, context);
+  context.info(volume_text("kept", stats));
+}
+
 void run_clip(const ClipOptions& o) {
   require_sane(o.region);
   const RunContext context = make_context(o.run);
@@ -61,7 +67,7 @@ void run_clip(const ClipOptions& o) {
     case FileContent::mesh:
       return clip_triangles(o, context);
     case FileContent::volume:
-      throw Error(ExitCode::usage, o.input + ": volumes cannot be clipped; convert it to a mesh first");
+      return clip_grids(o, context);
   }
 }
 
@@ -70,7 +76,8 @@ void run_clip(const ClipOptions& o) {
 void add_clip(CLI::App& app) {
   auto* tool = app.add_subcommand("clip", "Keep what lies inside a box or before planes");
   auto o = std::make_shared<ClipOptions>();
-  add_files(*tool, o->input, "Points (streamed) or mesh (triangles are cut)", o->output, "File of the same kind");
+  add_files(*tool, o->input, "Points (streamed), mesh (triangles are cut) or .vdb (voxels are kept or not)", o->output,
+            "File of the same kind");
   add_numbers(*tool, "--box", ',', 6, "X0,Y0,Z0,X1,Y1,Z1", "Keep what lies in this box, given by two corners",
               [o](const auto& v) {
                 o->region.box = Box{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
@@ -95,7 +102,8 @@ void add_clip(CLI::App& app) {
   add_run_options(*tool, o->run);
   add_examples(*tool,
                "  lamina clip scan.ply --box -1,0,-1,1,0.8,1 -o part.ply\n"
-               "  lamina clip mesh.ply --plane 0,0,0,0,1,0 -o upper.ply");
+               "  lamina clip mesh.ply --plane 0,0,0,0,1,0 -o upper.ply\n"
+               "  lamina clip mesh.vdb --plane 0,0,0,0,1,0 -o upper.vdb");
   tool->callback([o] { run_clip(*o); });
 }
 

@@ -58,6 +58,7 @@ void run_compare(const CompareOptions& o) {
   const nlohmann::ordered_json j{{"a", o.a},
                                  {"b", o.b},
                                  {"seed", o.settings.seed},
+                                 {"vertices", o.settings.vertices},
                                  {"diagonal", r.diagonal},
                                  {"a_to_b", as_json(r.a_to_b, r.diagonal)},
                                  {"b_to_a", as_json(r.b_to_a, r.diagonal)}};
@@ -72,6 +73,7 @@ void add_compare(CLI::App& app) {
   tool->add_option("A", o->a, "mesh (or points) to judge")->required();
   tool->add_option("B", o->b, "the truth: mesh (or points); relative figures divide by its box's diagonal")->required();
   tool->add_option("--count", o->settings.count, "samples per side, spread by area")->capture_default_str();
+  tool->add_flag("--vertices", o->settings.vertices, "measure at the vertices instead: what of the error is their own");
   tool->add_option("--seed", o->settings.seed)->capture_default_str();
   tool->add_option("--threads", o->run.threads, "0: all")->capture_default_str();
   tool->add_flag("--json", o->json, "print JSON");

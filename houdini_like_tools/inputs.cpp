@@ -69,6 +69,12 @@ std::string shown_name(const std::string& path) {
   return path == "-" ? "standard input" : path;
 }
 
+std::string volume_text(std::string_view verb, const VolumeEditStats& stats) {
+  return fmt::format("{} {} grid{} of {} voxels{}, {}", verb, stats.grids, stats.grids == 1 ? "" : "s",
+                     count_text(stats.voxels), stats.points > 0 ? " and " + count_text(stats.points) + " points" : "",
+                     bytes_text(stats.bytes));
+}
+
 TriangleMesh read_mesh_input(const std::string& path, const RunContext& context, NonFinite non_finite) {
   const std::string name = pipe_name(path);
   if (name == "-") content_of(name, context.tmp_dir);

@@ -9,6 +9,7 @@
 #include "lamina/error.h"
 #include "lamina/info.h"
 #include "lamina/points.h"
+#include "lamina/volume_fog.h"
 #include "lamina/volume_info.h"
 #include "lamina/volume_points.h"
 #include "text.h"
@@ -21,7 +22,7 @@ constexpr std::size_t kBatch = std::size_t{1} << 20;  // points held at a time
 class StreamedPoints : public Model {
  public:
   StreamedPoints(const std::string& path, const RunContext& context)
-      : source_(open_points(path, context.tmp_dir)), context_(context) {
+      : source_(open_point_input(path, {}, context)), context_(context) {
     if (source_->info().count == 0) throw Error(ExitCode::empty, fmt::format("{}: no points to draw", path));
   }
   void frame(Renderer& renderer) override {
@@ -85,6 +86,19 @@ class HeldLevelSet : public Model {
   LevelSet level_set_;
 };
 
+class HeldFog : public Model {
+ public:
+  explicit HeldFog(FogVolume fog) : fog_(std::move(fog)) {}
+  void frame(Renderer& renderer) override { renderer.frame(fog_); }
+  void draw(Renderer& renderer) override { renderer.draw(fog_); }
+  [[nodiscard]] std::string what() const override {
+    return fmt::format("fog {}, voxels of {:.4g}", fog_.name(), fog_.voxel());
+  }
+
+ private:
+  FogVolume fog_;
+};
+
 /// A mesh file's vertices, where it has nothing but vertices.
 PointArrays as_points(TriangleMesh& mesh) {
   PointArrays points;
@@ -143,6 +157,8 @@ std::unique_ptr<Model> volume_model(const std::string& path, const ModelOptions&
   const auto of_that_name = [&](const GridInfo& g) { return g.name == options.grid; };
   const auto chosen = std::find_if(info.grids.begin(), info.grids.end(), of_that_name);
   const auto is_points = [](const GridInfo& g) { return g.points; };
+  const auto is_fog = [](const GridInfo& g) { return g.grid_class == "fog volume"; };
+  const auto is_level_set = [](const GridInfo& g) { return g.grid_class == "level set"; };
   const bool points = options.grid.empty() ? std::all_of(info.grids.begin(), info.grids.end(), is_points)
                                            : chosen != info.grids.end() && chosen->points;
   if (points) {
@@ -150,6 +166,17 @@ std::unique_ptr<Model> volume_model(const std::string& path, const ModelOptions&
     if (volume.points.samples.size() == 0) throw Error(ExitCode::empty, fmt::format("{}: no points to draw", path));
     const std::string what = count_text(volume.points.samples.size()) + " points";
     return std::make_unique<HeldPoints>(std::move(volume.points), what);
+  }
+  const bool fog = options.grid.empty() ? std::none_of(info.grids.begin(), info.grids.end(), is_level_set) &&
+                                              std::any_of(info.grids.begin(), info.grids.end(), is_fog)
+                                        : chosen != info.grids.end() && is_fog(*chosen);
+  if (fog) {
+    if (options.as_triangles || !options.paint.what.empty()) {
+      throw Error(ExitCode::usage, fmt::format("{}: a fog has no triangles: --flat, --wireframe, --mark-boundary and "
+                                               "--paint are for meshes and level sets",
+                                               path));
+    }
+    return std::make_unique<HeldFog>(read_fog(path, options.grid));
   }
   LevelSet level_set = read_level_set(path, options.grid);
   if (!options.as_triangles && options.paint.what.empty()) return std::make_unique<HeldLevelSet>(std::move(level_set));

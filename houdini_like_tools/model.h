@@ -1,4 +1,4 @@
-// What a picture shows: points, a mesh or a level set, whichever a file holds.
+// What a picture shows: points, a mesh, a level set or a fog, whichever a file holds.
 #pragma once
 #include <memory>
 #include <optional>
@@ -32,14 +32,14 @@ struct PaintOptions {
 };
 
 struct ModelOptions {
-  std::string grid;           ///< of a .vdb; empty: its level set, else its points
+  std::string grid;           ///< of a .vdb; empty: its level set, else its fog, else its points
   bool as_triangles = false;  ///< mesh a level set before drawing: it is to be flat, or to show lines or its boundary
   PaintOptions paint;
 };
 
-/// Points are streamed from the file for every frame; meshes, level sets and points grids are held. What is painted, or
-/// has to have triangles, becomes a mesh. Throws what the readers throw, and Error: usage (something to paint that is
-/// not there), empty (nothing to draw).
+/// Points are streamed from the file for every frame; meshes, level sets, fogs and points grids are held. What is
+/// painted, or has to have triangles, becomes a mesh. Throws what the readers throw, and Error: usage (something to
+/// paint that is not there), empty (nothing to draw).
 std::unique_ptr<Model> open_model(const std::string& path, const ModelOptions& options, const RunContext& context);
 
 /// A mesh file too large to be held: its vertices, streamed as points.

@@ -1,4 +1,4 @@
-// lamina render: a picture of a mesh, a point cloud or a level set.
+// lamina render: a picture of a mesh, a point cloud, a level set or a fog.
 #include "lamina/render.h"
 
 #include <fmt/format.h>
@@ -143,8 +143,8 @@ void add_render(CLI::App& app) {
   auto o = std::make_shared<RenderOptions>();
   tool->add_option(
           "INPUT", o->input,
-          "Mesh (.ply .obj .off .stl, each also as .gz), points (- for standard input), or volume (.vdb: level set "
-          "or points)")
+          "Mesh (.ply .obj .off .stl, each also as .gz), points (- for standard input), or volume (.vdb: level set, "
+          "fog or points)")
       ->required()
       ->type_name("");
   tool->add_option("-o,--output", o->output, "Picture to write: PNG, - for standard output")
@@ -170,7 +170,8 @@ void add_render(CLI::App& app) {
   add_camera_options(*tool, o->settings);
   add_look_options(*tool, o->settings);
   add_paint_options(*tool, o->model.paint);
-  tool->add_option("--grid", o->model.grid, "Name of the grid to draw, of a .vdb [its level set, else its points]")
+  tool->add_option("--grid", o->model.grid,
+                   "Name of the grid to draw, of a .vdb [its level set, else its fog, else its points]")
       ->type_name("NAME")
       ->group("Look");
   add_run_options(*tool, o->run);

@@ -292,6 +292,9 @@ void add_surface(CLI::App& app) {
   tool->add_option("--chord", s.chord, "outward shift of clustered vertices, times curvature and cell squared")
       ->capture_default_str()
       ->group(mesh);
+  tool->add_flag("--level", s.vertex_levels,
+                 "give vertices their octree level, 0 the finest, as property level; 'lamina render --paint level'")
+      ->group(mesh);
 
   add_volume_options(*tool, s.volume);
   add_parts_options(*tool, o->parts);

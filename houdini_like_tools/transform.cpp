@@ -1,4 +1,4 @@
-// lamina transform: move, turn and scale points or a mesh.
+// lamina transform: move, turn and scale points, a mesh or volumes.
 #include "lamina/transform.h"
 
 #include <fmt/format.h>
@@ -9,6 +9,7 @@
 #include "inputs.h"
 #include "lamina/edit_points.h"
 #include "lamina/error.h"
+#include "lamina/volume_edit.h"
 #include "numbers.h"
 #include "text.h"
 #include "tool.h"
@@ -66,6 +67,10 @@ void transform_triangles(const TransformOptions& o, const Eigen::Affine3d& trans
   context.info(fmt::format("moved {} vertices", count_text(mesh.positions.size())));
 }
 
+void transform_grids(const TransformOptions& o, const Eigen::Affine3d& transform, const RunContext& context) {
+  context.info(volume_text("moved", transform_volume(o.input, transform, o.output, context)));
+}
+
 void run_transform(const TransformOptions& o) {
   const Eigen::Affine3d transform = affine(o);
   const RunContext context = make_context(o.run);
@@ -75,7 +80,7 @@ void run_transform(const TransformOptions& o) {
     case FileContent::mesh:
       return transform_triangles(o, transform, context);
     case FileContent::volume:
-      throw Error(ExitCode::usage, o.input + ": volumes cannot be transformed; convert it to a mesh first");
+      return transform_grids(o, transform, context);
   }
 }
 
@@ -86,9 +91,10 @@ Eigen::Vector3d vector(const std::vector<double>& v) {
 }  // namespace
 
 void add_transform(CLI::App& app) {
-  auto* tool = app.add_subcommand("transform", "Move, turn and scale points or a mesh, normals with them");
+  auto* tool = app.add_subcommand("transform", "Move, turn and scale points, a mesh or volumes, normals with them");
   auto o = std::make_shared<TransformOptions>();
-  add_files(*tool, o->input, "Points (streamed) or mesh", o->output, "File of the same kind");
+  add_files(*tool, o->input, "Points (streamed), mesh or .vdb (by its transforms; nothing is resampled)", o->output,
+            "File of the same kind");
   const std::string group = "Transform";
   tool->add_option_function<std::string>(
           "--scale",
@@ -127,7 +133,8 @@ void add_transform(CLI::App& app) {
   add_run_options(*tool, o->run);
   add_examples(*tool,
                "  lamina transform scan.ply --scale 0.001 --rotate -90,0,0 -o metres_y_up.ply\n"
-               "  lamina transform mesh.ply --translate -10,0,2.5 -o moved.obj");
+               "  lamina transform mesh.ply --translate -10,0,2.5 -o moved.obj\n"
+               "  lamina transform mesh.vdb --scale 0.01 -o metres.vdb");
   tool->callback([o] { run_transform(*o); });
 }
 

@@ -46,12 +46,12 @@ struct MergedParts {
 /// Whether a file claims to be a part.
 bool is_part(const std::string& path);
 
-/// Joins all the parts of one reconstruction, given in any order, to the mesh `output` ("-": standard output). Memory
-/// does not grow with the mesh. `tmp_dir` is for what goes to standard output; empty: the system's.
+/// Joins all the parts (`paths`) of one reconstruction, given in any order, to the mesh `output` ("-": standard
+/// output). Memory does not grow with the mesh. `tmp_dir` is for what goes to standard output; empty: the system's.
 /// Throws Error(unreadable) naming the part that is missing, there twice, truncated, damaged, of another run or of a
 /// version this program does not know; Error(empty) when no part has surface; Error(budget) when the mesh has more than
 /// 2^32 - 1 vertices or cannot be written.
-MergedParts merge_parts(const std::vector<std::string>& parts, const std::string& output, const RunContext& run);
+MergedParts merge_parts(const std::vector<std::string>& paths, const std::string& output, const RunContext& run);
 
 struct Checkpoint {
   std::string directory;  ///< holds the store and the finished parts; made where it is not there, removed at the end

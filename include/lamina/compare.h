@@ -12,6 +12,7 @@ namespace lamina {
 struct CompareSettings {
   std::uint64_t count = 1'000'000;  ///< samples per side, > 0; stratified, uniform by area
   std::uint64_t seed = 1;
+  bool vertices = false;  ///< the samples are each side's vertices that triangles use: what of the error is their own
 };
 
 /// Distances from one surface's samples to the other surface, world units.

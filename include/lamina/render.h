@@ -1,4 +1,4 @@
-// Pictures of meshes, point clouds and level sets, drawn in software: to look at a result on a machine without a
+// Pictures of meshes, point clouds, level sets and fogs, drawn in software: to look at a result on a machine without a
 // screen.
 #pragma once
 #include <array>
@@ -12,6 +12,7 @@
 #include "lamina/mesh.h"
 #include "lamina/run.h"
 #include "lamina/sample.h"
+#include "lamina/volume_fog.h"
 #include "lamina/volume_level_set.h"
 
 namespace lamina {
@@ -66,6 +67,7 @@ class Renderer {
   void frame(const TriangleMesh& mesh);
   void frame(const SampleBatch& points);
   void frame(const LevelSet& level_set);
+  void frame(const FogVolume& fog);
 
   /// Begins picture `frame` of RenderSettings::frames, 0 first: it is empty again, the camera stands 360/frames degrees
   /// further around for each frame. Throws Error(usage) when there is no such frame.
@@ -79,6 +81,9 @@ class Renderer {
   /// The band's rim is not drawn where the level set is open. Triangles' lines, flat shading and boundary edges need a
   /// mesh: see mesh_level_set().
   void draw(const LevelSet& level_set);
+  /// Marches a ray per sample through the densities; a thirty-sixth of the fog's box at density 1 lets a third of the
+  /// light through. Shaded where the density changes, in the colours of the file's grid `Cd`.
+  void draw(const FogVolume& fog);
 
   /// Boundary edges drawn so far (per mesh, not per view); 0 unless RenderSettings::mark_boundary.
   [[nodiscard]] std::uint64_t boundary_edges() const;

@@ -50,7 +50,8 @@ struct SurfaceSettings {
   double boundary = 0;  ///< isovertices whose corners' projections lie farther than this from the average of
                         ///< their samples (in R) are rejected; 0: no limit
   ClusterMode cluster = ClusterMode::preserving;
-  double chord = 0.17;   ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
+  double chord = 0.17;         ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
+  bool vertex_levels = false;  ///< give vertices an attribute `level`: of the octree, 0 the finest
   int window = 1;        ///< slabs that each stage advances at once, >= 1: more is faster on many cores, takes memory
   bool dry_run = false;  ///< plan only: reads the input, writes nothing
   VolumeExport volume;   ///< grids to write beside the mesh

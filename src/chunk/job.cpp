@@ -12,7 +12,7 @@ std::string mesh_settings(const SurfaceSettings& settings) {
   // Every setting by name: one that is added must be dealt with here, or this does not compile. What follows `chord`
   // does not change the mesh; names of files are not settings of it.
   const auto& [input, more_inputs, columns, output, frame, bad_samples, normals, normal_search, radius_scale, density,
-               max_radius, blend, steps, fit, diffuse, cell, levels, boundary, cluster, chord, window, dry_run,
+               max_radius, blend, steps, fit, diffuse, cell, levels, boundary, cluster, chord, vertex_levels, window, dry_run,
                volume] = settings;
   (void)input, (void)more_inputs, (void)output, (void)normals, (void)normal_search, (void)window, (void)dry_run;
   const std::string frame_word = frame             ? fmt::format("{}", static_cast<int>(*frame))
@@ -21,10 +21,10 @@ std::string mesh_settings(const SurfaceSettings& settings) {
   return fmt::format(
       "columns {}\nframe {}\nbad_samples {}\nnormals {}\nparticlescale {}\ndensity {}\nmax_radius {}\nblend {}\nsteps "
       "{}\nfit {}\n"
-      "diffuse {}\ncell {}\nlevels {}\nboundary {}\ncluster {}\nchord {}\n",
+      "diffuse {}\ncell {}\nlevels {}\nboundary {}\ncluster {}\nchord {}\nlevel {}\n",
       columns, frame_word, static_cast<int>(bad_samples), normals_words(settings), radius_scale, density,
       to_string(max_radius), blend, steps, static_cast<int>(fit), diffuse, to_string(cell), levels, boundary,
-      static_cast<int>(cluster), chord);
+      static_cast<int>(cluster), chord, vertex_levels);
 }
 
 std::uint64_t job_hash(const SurfaceSettings& settings, const std::string& input_id, const Resolved& resolved) {

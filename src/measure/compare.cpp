@@ -25,12 +25,14 @@ class SideSampler {
         areas_(mesh),
         seed_(settings.seed * 2 + stream),
         count_(mesh.triangles.empty() ? mesh.positions.size() : settings.count) {
+    if (settings.vertices && !mesh.triangles.empty()) list_vertices();
     if (!mesh.triangles.empty() && !(areas_.total_area() > 0))
       throw Error(ExitCode::unreadable, "compare: a mesh whose triangles have no area cannot be sampled");
   }
   [[nodiscard]] std::uint64_t count() const { return count_; }
   [[nodiscard]] Vec3 at(std::uint64_t i) const {
     if (mesh_.triangles.empty()) return mesh_.positions[i];
+    if (!vertices_.empty()) return mesh_.positions[vertices_[i]];
     CounterRng rng(seed_, i);
     const double u = (static_cast<double>(i) + rng.uniform()) / static_cast<double>(count_);
     const double v = rng.uniform(), w = rng.uniform();
@@ -38,9 +40,19 @@ class SideSampler {
   }
 
  private:
+  void list_vertices() {
+    std::vector<bool> used(mesh_.positions.size(), false);
+    for (const auto& t : mesh_.triangles)
+      for (const auto v : t) used[v] = true;
+    for (std::uint32_t v = 0; v < used.size(); ++v)
+      if (used[v]) vertices_.push_back(v);
+    count_ = vertices_.size();
+  }
+
   const TriangleMesh& mesh_;
   AreaSampler areas_;
   std::uint64_t seed_, count_;
+  std::vector<std::uint32_t> vertices_;  ///< the samples, where these are asked for
 };
 
 DistanceStats measure_side(const TriangleMesh& from, const TriangleMesh& to, const CompareSettings& settings,

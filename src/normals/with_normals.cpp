@@ -64,7 +64,7 @@ Scale scale_of(const NormalsSettings& settings, const SlabStore& store, const Fr
   s.directions.radius = settings.radius > 0 ? static_cast<float>(steps(settings.radius / frame.step)) : 0.0F;
   // A density radius is about twice the spacing, and sixteen neighbours lie within 1.2 of it.
   const double usual = std::sqrt(std::max(settings.k, 16) / 16.0) * double{radii.high};
-  constexpr double kReach = 8;
+  constexpr double kReach = 5;
   s.directions.reach = static_cast<float>(steps(std::max(kReach * usual, double{s.directions.radius})));
   s.window.reach = static_cast<std::int32_t>(s.directions.reach);
   const double in_patch = std::max(kLeastPatch, static_cast<double>(store.total()) / kPatches);

@@ -105,7 +105,7 @@ class Job {
     rank_run_.keep_warnings();
     const double before = Stopwatch::now().wall;
     ranks_.together([&] {
-      part.emplace(span, mesh_layout(input, resolved), directory_);
+      part.emplace(span, mesh_layout(settings_, input, resolved), directory_);
       if (!span.empty()) sweep(settings_, input, resolved, span, *part, nullptr, run_, watch_, stats_);
     });
     own_.sweeping = Stopwatch::now().wall - before;

@@ -43,6 +43,14 @@ float decode(std::uint8_t encoded) {
   return tables().decode[encoded];
 }
 
+void Canvas::blend(int x, int y, float depth, const Rgb& light, float opacity) {
+  const auto& before = colour_[index(x, y)];
+  Rgb mixed;
+  for (std::size_t c = 0; c < 3; ++c)
+    mixed[c] = light[c] + (1 - opacity) * (before[3] != 0 ? decode(before[c]) : kBackground[c]);
+  set(x, y, depth, mixed);
+}
+
 bool Canvas::blank() const {
   return std::none_of(colour_.begin(), colour_.end(), [](const auto& sample) { return sample[3] != 0; });
 }

@@ -36,6 +36,8 @@ class Canvas {
     depth_[index(x, y)] = depth;
     colour_[index(x, y)] = {encode(colour[0]), encode(colour[1]), encode(colour[2]), 1};
   }
+  /// Light that something gives off, over what it lets through of what is there.
+  void blend(int x, int y, float depth, const Rgb& light, float opacity);
   void clear() {
     std::fill(depth_.begin(), depth_.end(), -kOverEverything);
     std::fill(colour_.begin(), colour_.end(), std::array<std::uint8_t, 4>{});

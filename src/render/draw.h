@@ -8,6 +8,7 @@
 #include "lamina/mesh.h"
 #include "lamina/render.h"
 #include "lamina/sample.h"
+#include "lamina/volume_fog.h"
 #include "lamina/volume_level_set.h"
 #include "render/boundary.h"
 #include "render/canvas.h"
@@ -35,5 +36,11 @@ void visit_surface(const LevelSet& level_set, const std::function<void(const std
 
 /// One ray per sample, by OpenVDB's level set ray intersector; shaded by the distances' gradient.
 void draw_level_set(const LevelSet& level_set, const RenderSettings& settings, const View& view, Canvas& canvas);
+
+/// World positions of the fog's voxels.
+void visit_fog(const FogVolume& fog, const std::function<void(const std::array<double, 3>&)>& visit);
+
+/// One ray per sample through the fog, by OpenVDB's volume ray intersector; what is behind shines through.
+void draw_fog(const FogVolume& fog, const RenderSettings& settings, const View& view, Canvas& canvas);
 
 }  // namespace lamina::render_detail

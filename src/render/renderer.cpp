@@ -139,6 +139,10 @@ void Renderer::frame(const LevelSet& level_set) {
   impl_->frame([&](const auto& add) { visit_surface(level_set, add); });
 }
 
+void Renderer::frame(const FogVolume& fog) {
+  impl_->frame([&](const auto& add) { visit_fog(fog, add); });
+}
+
 void Renderer::turn(int frame) {
   const RenderSettings& s = impl_->settings;
   if (frame < 0 || frame >= s.frames)
@@ -173,6 +177,10 @@ void Renderer::draw(const SampleBatch& points, const AttributeLayout& layout) {
 
 void Renderer::draw(const LevelSet& level_set) {
   impl_->draw([&](const View& view) { draw_level_set(level_set, impl_->settings, view, impl_->canvas); });
+}
+
+void Renderer::draw(const FogVolume& fog) {
+  impl_->draw([&](const View& view) { draw_fog(fog, impl_->settings, view, impl_->canvas); });
 }
 
 std::uint64_t Renderer::boundary_edges() const {

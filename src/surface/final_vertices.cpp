@@ -78,4 +78,13 @@ void place_vertices(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* n
   });
 }
 
+void place_levels(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, double finest, VertexBatch& out) {
+  std::vector<float>& levels = out.attributes.emplace_back();
+  levels.reserve(slab.vertices.size());
+  for (const FinalVertex& v : slab.vertices) {
+    const IsoSlab& s = v.corner.next() ? *next : here;
+    levels.push_back(static_cast<float>(std::lround(std::log2(s.corners[v.corner.index()].cell / finest))));
+  }
+}
+
 }  // namespace lamina

@@ -13,4 +13,8 @@ namespace lamina {
 void place_vertices(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, const Frame& frame, float chord,
                     VertexBatch& out);
 
+/// Adds an attribute behind those of place_vertices(): the octree level of the finest cell around the vertex's corner,
+/// 0 the finest. `finest`: that level's cell, in steps.
+void place_levels(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, double finest, VertexBatch& out);
+
 }  // namespace lamina

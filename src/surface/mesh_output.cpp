@@ -8,8 +8,8 @@
 
 namespace lamina {
 
-MeshOutput::MeshOutput(const ClusterSettings& settings, float chord, const Frame& frame, SlabSink& sink)
-    : chord_(chord), frame_(frame), sink_(sink), clusterer_(settings) {}
+MeshOutput::MeshOutput(const ClusterSettings& settings, float chord, double finest, const Frame& frame, SlabSink& sink)
+    : chord_(chord), finest_(finest), frame_(frame), sink_(sink), clusterer_(settings) {}
 
 MeshOutput::~MeshOutput() {
   tasks_.cancel();
@@ -60,6 +60,7 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
   while (clusterer_.pop(done_)) {
     const IsoSlab* next = clustered_.size() > 1 ? clustered_[1].get() : nullptr;
     place_vertices(done_, *clustered_.front(), next, frame_, chord_, vertices_);
+    if (finest_ > 0) place_levels(done_, *clustered_.front(), next, finest_, vertices_);
     sink_.write(done_, vertices_);
     triangles_ += done_.triangles.size();
     if (clustered_.front().use_count() == 1) {

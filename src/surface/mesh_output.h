@@ -45,8 +45,9 @@ class MeshFileSlabs : public SlabSink {
 /// start().
 class MeshOutput {
  public:
-  /// `chord`: SurfaceSettings::chord. The sink is the caller's; nobody else may write to it.
-  MeshOutput(const ClusterSettings& settings, float chord, const Frame& frame, SlabSink& sink);
+  /// `chord`: SurfaceSettings::chord. `finest`: the finest level's cell where vertices are to have their level as the
+  /// last attribute, else 0. The sink is the caller's; nobody else may write to it.
+  MeshOutput(const ClusterSettings& settings, float chord, double finest, const Frame& frame, SlabSink& sink);
   /// Drops what is not written yet.
   ~MeshOutput();
   MeshOutput(const MeshOutput&) = delete;
@@ -71,6 +72,7 @@ class MeshOutput {
   void work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last);
 
   float chord_;
+  double finest_;
   const Frame& frame_;
   SlabSink& sink_;
   Clusterer clusterer_;

@@ -191,6 +191,14 @@ void expect_time(const SurfaceSettings& settings, const PointSourceInfo& source,
   plan.seconds = elapsed + slowness * (whole - reading) / (1 + kEfficiency * (plan.threads - 1));
 }
 
+void refuse_two_levels(const SurfaceSettings& settings, const PointSourceInfo& info) {
+  const auto taken = [](const AttributeSpec& a) { return a.name == "level"; };
+  if (settings.vertex_levels && std::any_of(info.attributes.begin(), info.attributes.end(), taken)) {
+    throw Error(ExitCode::usage, fmt::format("{}: the points have an attribute called level already; leave out --level",
+                                             input_name(settings)));
+  }
+}
+
 }  // namespace
 
 /// Next to the output unless told otherwise; the system's temporary folder for standard output, pipes and devices.
@@ -290,6 +298,7 @@ Resolved plan_surface(const SurfaceSettings& settings, const SweepInput& input, 
       stats.rejected.push_back({describe(static_cast<Defect>(k)), census.rejected[k], census.first_row[k]});
     }
   }
+  refuse_two_levels(settings, info);
   run.info(describe(resolved.plan, settings));
   constexpr std::uint64_t kLargestTables = std::uint64_t{1} << 30;  // a scan of 380 million samples needs a few MB
   if (is_out_of_reach(resolved.plan, settings.blend) ||
@@ -309,9 +318,10 @@ Resolved plan_surface(const SurfaceSettings& settings, const SweepInput& input, 
   return resolved;
 }
 
-MeshSinkSettings mesh_layout(const SweepInput& input, const Resolved& resolved) {
+MeshSinkSettings mesh_layout(const SurfaceSettings& settings, const SweepInput& input, const Resolved& resolved) {
   MeshSinkSettings out;
   out.attributes = input.info.attributes;
+  if (settings.vertex_levels) out.attributes.push_back({"level", ScalarType::uint8});
   out.double_positions = needs_double(input.ingested.census, resolved.plan.finest_cell);
   return out;
 }
@@ -372,7 +382,7 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
   SweepInput input = read_surface_input(settings, tmp, /*keep=*/false, run, watch, stats);
   const Resolved resolved = plan_surface(settings, input, run, watch, Stopwatch::now().wall - began.wall, stats);
   if (!settings.dry_run) {
-    out = mesh_layout(input, resolved);
+    out = mesh_layout(settings, input, resolved);
     out.path = settings.output;
     out.tmp_dir = tmp;
     MeshSink sink(out);

@@ -59,7 +59,7 @@ Resolved plan_surface(const SurfaceSettings& settings, const SweepInput& input, 
                       double elapsed, SurfaceStats& stats);
 
 /// The mesh file's layout, without its name.
-MeshSinkSettings mesh_layout(const SweepInput& input, const Resolved& resolved);
+MeshSinkSettings mesh_layout(const SurfaceSettings& settings, const SweepInput& input, const Resolved& resolved);
 
 /// The sweep through `span` of all_slabs(): finished slabs go to the sink (see Pipeline). Fills in the stats of stages.
 void sweep(const SurfaceSettings& settings, SweepInput& input, const Resolved& resolved, const SlabSpan& span,

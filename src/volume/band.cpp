@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "project/corner_value.h"
@@ -16,10 +17,6 @@ namespace {
 
 constexpr std::int32_t kBatch = 8;  ///< planes worth a round
 constexpr float kBeyond = 1;        ///< voxels outside of the band that tell the side of its neighbours
-
-std::int16_t packed(float n) {
-  return packed_normal(std::clamp(n, -1.0F, 1.0F) * Brick::kUnit);
-}
 
 /// What a corner's value says in a channel of the window; attributes lie behind.
 float channel_of(const CornerValue& v, const std::vector<float>& attributes, int channel) {
@@ -39,30 +36,11 @@ struct Band::Found {
 };
 
 Band::Band(BandSettings settings, const Lattice& lattice)
-    : settings_(std::move(settings)), lattice_(lattice), farthest_(static_cast<float>(settings_.band) - 0.25F) {
+    : settings_(std::move(settings)),
+      lattice_(lattice),
+      farthest_(static_cast<float>(settings_.band) - 0.5F),
+      bricks_(std::clamp(settings_.rounds, 0, kMaxRounds), settings_.channels.size()) {
   settings_.rounds = std::clamp(settings_.rounds, 0, kMaxRounds);
-}
-
-std::uint64_t Band::key_of(const Block& b) {
-  return std::uint64_t{static_cast<std::uint32_t>(b.y)} << 32 | static_cast<std::uint32_t>(b.x);
-}
-
-Brick* Band::find(const Block& b) const {
-  const auto layer = layers_.find(b.z);
-  if (layer == layers_.end()) return nullptr;
-  const auto found = layer->second.find(key_of(b));
-  return found == layer->second.end() ? nullptr : found->second.get();
-}
-
-Brick& Band::touch(const Block& b) {
-  std::unique_ptr<Brick>& brick = layers_[b.z][key_of(b)];
-  if (brick == nullptr) {
-    // Values are written before they are read, where the masks say so.
-    brick = std::make_unique_for_overwrite<Brick>();
-    brick->block = b;
-    brick->extra.resize(512 * settings_.channels.size());
-  }
-  return *brick;
 }
 
 void Band::collect(const Window& window, std::int32_t slab) {
@@ -95,7 +73,7 @@ void Band::collect_level(const Window& window, std::int32_t slab) {
     const int begin = std::max(0, first - t.block.z * 8), end = std::min(8, begin + lattice_.layers(level));
     std::uint64_t any = 0;
     for (int z = begin; z < end; ++z) any |= t.leaf->valued.words[z];
-    if (any != 0) jobs.push_back({t.leaf, &touch(t.block), begin, end});
+    if (any != 0) jobs.push_back({t.leaf, &bricks_.touch(t.block), begin, end});
   }
   const float per_voxel = 1.0F / static_cast<float>(lattice_.cell_size(level));
   tbb::parallel_for(std::size_t{0}, jobs.size(), [&](std::size_t j) {
@@ -113,8 +91,8 @@ void Band::collect_level(const Window& window, std::int32_t slab) {
         const float d = values.channel(kDistance)[i] * per_voxel;
         brick->known[0].set(at);
         if (std::abs(d) < farthest_) brick->source[0].set(at);
-        brick->distance[at] = d;
-        for (int k = 0; k < 3; ++k) brick->normal[k][at] = packed(values.channel(kNormalX + k)[i]);
+        brick->plane[at] =
+            Plane{values.channel(kNormalX)[i], values.channel(kNormalX + 1)[i], values.channel(kNormalX + 2)[i], d};
         for (std::size_t c = 0; c < settings_.channels.size(); ++c)
           brick->extra[c * 512 + at] = values.channel(settings_.channels[c])[i];
       }
@@ -123,13 +101,12 @@ void Band::collect_level(const Window& window, std::int32_t slab) {
 }
 
 void Band::put(const Found& f) {
-  Brick& brick = touch(block_of(f.at));
+  Brick& brick = bricks_.touch(block_of(f.at));
   const int at = offset_in_block(f.at);
   if (brick.known[0].test(at)) return;
   brick.known[0].set(at);
   if (std::abs(f.distance) < farthest_) brick.source[0].set(at);
-  brick.distance[at] = f.distance;
-  for (std::size_t k = 0; k < 3; ++k) brick.normal[k][at] = packed(f.normal[k]);
+  brick.plane[at] = Plane{f.normal[0], f.normal[1], f.normal[2], f.distance};
   for (std::size_t c = 0; c < f.extra.size(); ++c) brick.extra[c * 512 + at] = f.extra[c];
 }
 
@@ -248,29 +225,25 @@ void Band::make_room(std::int32_t begin, std::int32_t end) {
   const std::uint64_t high_y = r >= 8 ? ~std::uint64_t{0} : ~((std::uint64_t{1} << (8 * (8 - r))) - 1);
   std::vector<Block> wanted;
   for (std::int32_t bz = begin >> 3; bz <= (end - 1) >> 3; ++bz) {
-    const auto layer = layers_.find(bz);
-    if (layer == layers_.end()) continue;
-    for (const auto& [key, brick] : layer->second) {
+    bricks_.for_each(bz, [&](const Brick& brick) {
       std::array<std::uint64_t, 3> planes{};  // near the lower end, all, near the upper end
       for (int z = std::max(0, begin - bz * 8); z < std::min(8, end - bz * 8); ++z) {
-        const std::uint64_t w = brick->known[0].words[z];
+        const std::uint64_t w = brick.known[0].words[z];
         if (z < r) planes[0] |= w;
         if (z >= 8 - r) planes[2] |= w;
         planes[1] |= w;
       }
-      for (int dz = -1; dz <= 1; ++dz) {
-        for (int dy = -1; dy <= 1; ++dy) {
-          for (int dx = -1; dx <= 1; ++dx) {
-            std::uint64_t w = planes[dz + 1];
-            if (dy != 0) w &= dy < 0 ? low_y : high_y;
-            if (dx != 0) w &= dx < 0 ? low_x : high_x;
-            if (w != 0) wanted.push_back({brick->block.x + dx, brick->block.y + dy, bz + dz});
-          }
-        }
+      for (int i = 0; i < 27; ++i) {
+        if (brick.around[i] != nullptr) continue;
+        const int dx = i % 3 - 1, dy = i / 3 % 3 - 1, dz = i / 9 - 1;
+        std::uint64_t w = planes[dz + 1];
+        if (dy != 0) w &= dy < 0 ? low_y : high_y;
+        if (dx != 0) w &= dx < 0 ? low_x : high_x;
+        if (w != 0) wanted.push_back({brick.block.x + dx, brick.block.y + dy, bz + dz});
       }
-    }
+    });
   }
-  for (const Block& b : wanted) touch(b);
+  for (const Block& b : wanted) bricks_.touch(b);
 }
 
 void Band::advance(bool end) {
@@ -291,15 +264,13 @@ std::vector<std::unique_ptr<Brick>> Band::pop(bool end) {
   advance(end);
   std::vector<std::unique_ptr<Brick>> out;
   // A layer's last plane is still read by the round of the plane above.
-  while (!layers_.empty() && begun_ &&
-         (end || layers_.begin()->first * 8 + 8 < done_[settings_.rounds] - (settings_.rounds > 0 ? 1 : 0))) {
-    const auto first = static_cast<std::ptrdiff_t>(out.size());
-    for (auto& [key, brick] : layers_.begin()->second)
-      if (all(*brick).any()) out.push_back(std::move(brick));
-    layers_.erase(layers_.begin());
-    std::sort(out.begin() + first, out.end(), [](const auto& a, const auto& b) {
-      return std::pair(a->block.y, a->block.x) < std::pair(b->block.y, b->block.x);
-    });
+  const std::int32_t done = done_[settings_.rounds] - (settings_.rounds > 0 ? 1 : 0);
+  while (!bricks_.empty() && begun_ && (end || bricks_.lowest() * 8 + 8 < done)) {
+    std::vector<std::unique_ptr<Brick>> layer = bricks_.take_lowest();
+    const auto full = std::stable_partition(layer.begin(), layer.end(), [&](const auto& b) { return all(*b).any(); });
+    std::move(layer.begin(), full, std::back_inserter(out));
+    layer.erase(layer.begin(), full);
+    bricks_.give_back(std::move(layer));
   }
   return out;
 }

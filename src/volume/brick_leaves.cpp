@@ -111,10 +111,13 @@ BrickLeaves LeafMaker::operator()(const Brick& brick) const {
   const BlockMask& known = band.all(brick);
   const auto limit = static_cast<float>(band.settings().band);
   BlockMask active, negative;
+  for (int z = 0; z < 8; ++z)
+    for (std::uint64_t w = known.words[z]; w != 0; w &= w - 1)
+      __builtin_prefetch(&brick.plane[z * 64 + std::countr_zero(w)]);
   for (int z = 0; z < 8; ++z) {
     for (std::uint64_t w = known.words[z]; w != 0; w &= w - 1) {
       const int bit = std::countr_zero(w);
-      const float d = brick.distance[z * 64 + bit];
+      const float d = brick.distance(static_cast<std::size_t>(z * 64 + bit));
       active.words[z] |= std::uint64_t{std::abs(d) < limit} << bit;
       negative.words[z] |= std::uint64_t{d < 0} << bit;
     }
@@ -146,7 +149,7 @@ BrickLeaves LeafMaker::operator()(const Brick& brick) const {
   std::array<float, 3 * 512> values;
   const std::span<const float> scalars{values.data(), count}, vectors{values.data(), 3 * count};
   const auto voxel = static_cast<float>(grid.voxel);
-  for (std::size_t i = 0; i < count; ++i) values[i] = brick.distance[order[i]] * voxel;
+  for (std::size_t i = 0; i < count; ++i) values[i] = brick.distance(order[i]) * voxel;
   out.leaves.push_back(pack(origin, masks, scalars, 1, half));
   out.leaves.back().faces = face_votes(masks.active, masks.inside);
 
@@ -172,8 +175,8 @@ BrickLeaves LeafMaker::operator()(const Brick& brick) const {
       if (extra.kind == ExtraGrid::Kind::vector) {
         for (std::size_t k = 0; k < 3; ++k) v[k] = value(k, at);
       } else {
-        const Eigen::Vector3d n = rotation.transpose() * Eigen::Vector3d(brick.normal_at(0, at), brick.normal_at(1, at),
-                                                                         brick.normal_at(2, at));
+        const Plane& plane = brick.plane[static_cast<std::size_t>(at)];
+        const Eigen::Vector3d n = rotation.transpose() * Eigen::Vector3d(plane[0], plane[1], plane[2]);
         for (int k = 0; k < 3; ++k) v[k] = static_cast<float>(n[k]);
       }
     }

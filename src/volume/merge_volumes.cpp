@@ -12,7 +12,7 @@
 #include "lamina/volume_points.h"
 #include "meshes/with_threads.h"
 #include "volume/points_grid.h"
-#include "volume/streamed_vdb.h"
+#include "volume/sign_tiles.h"
 #include "volume/vdb_file.h"
 
 namespace lamina {
@@ -56,28 +56,6 @@ void unite_open(FloatTree& to, FloatTree& from) {
   to.merge(from, MERGE_ACTIVE_STATES);
 }
 
-void sign_tiles(FloatGrid& grid) {
-  std::vector<volume::LeafVotes> votes;
-  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
-    const Coord o = leaf->origin();
-    votes.push_back({{o[0] >> 3, o[1] >> 3, o[2] >> 3}, volume::face_votes(*leaf)});
-  }
-  const volume::TileSigns signs(votes);
-  auto tile = grid.tree().beginValueOff();
-  tile.setMaxDepth(FloatTree::ValueOffIter::LEAF_DEPTH - 1);
-  for (; tile; ++tile) {
-    const Coord o = tile.getCoord();
-    const volume::TileSigns::Place node{o[0] >> 7, o[1] >> 7, o[2] >> 7};
-    bool inside = signs.inside(node);
-    if (tile.getLevel() == 1) {
-      const std::uint8_t* const tiles = signs.inside_tiles(node);
-      const int slot = ((o[0] >> 3 & 15) * 16 + (o[1] >> 3 & 15)) * 16 + (o[2] >> 3 & 15);
-      inside = tiles != nullptr && tiles[slot] != 0;
-    }
-    tile.setValue(inside ? -grid.background() : grid.background());
-  }
-}
-
 void unite_level_sets(FloatGrid& to, FloatGrid& from) {
   if (volume::is_open(to) || volume::is_open(from)) {
     unite_open(to.tree(), from.tree());
@@ -109,7 +87,7 @@ GridBase::Ptr merge_grids(const std::vector<Source>& sources) {
                                                first->getName(), sources[0].path, sources[i].path, first->type()));
     }
   }
-  if (level_set && sources.size() > 1 && volume::is_open(*first)) sign_tiles(*gridPtrCast<FloatGrid>(first));
+  if (level_set && sources.size() > 1 && volume::is_open(*first)) volume::sign_tiles(*gridPtrCast<FloatGrid>(first));
   return first;
 }
 

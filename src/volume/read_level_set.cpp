@@ -43,14 +43,6 @@ GridBase::Ptr choose(const std::string& path, const openvdb::GridPtrVec& grids, 
   return *found;
 }
 
-FloatGrid::Ptr as_float(const GridBase::Ptr& grid) {
-  if (auto floats = openvdb::gridPtrCast<FloatGrid>(grid)) return floats;
-  const auto doubles = openvdb::gridPtrCast<DoubleGrid>(grid);
-  auto out = std::make_shared<FloatGrid>(*doubles);
-  out->setTransform(doubles->transformPtr());
-  return out;
-}
-
 }  // namespace
 
 LevelSet::LevelSet(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
@@ -82,11 +74,8 @@ LevelSet read_level_set(const std::string& path, const std::string& name) {
   data->name = grid->getName();
   data->path = path;
   data->open = volume::is_open(*grid);
-  data->grid = as_float(grid);
-  for (const GridBase::Ptr& other : file.grids) {
-    if (other->getName() == "Cd" && other->transform().isLinear())
-      data->colours = openvdb::gridPtrCast<openvdb::Vec3SGrid>(other);
-  }
+  data->grid = volume::as_float(grid);
+  data->colours = volume::colours_of(file.grids);
   if (!(data->grid->background() > 0)) {
     throw Error(ExitCode::unreadable, fmt::format("{}: grid {} is no level set: outside its band stands {}, not the "
                                                   "band's width",

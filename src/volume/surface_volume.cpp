@@ -144,7 +144,7 @@ void SurfaceVolume::Impl::begin_file() {
 }
 
 void SurfaceVolume::Impl::emit(LevelGrid& level, bool end) {
-  const std::vector<std::unique_ptr<Brick>> bricks = level.band.pop(end);
+  std::vector<std::unique_ptr<Brick>> bricks = level.band.pop(end);
   if (bricks.empty()) return;
   constexpr std::uint64_t kLeafBytes = 512 * sizeof(float) + 112;
   if (settings.split > 0 && files.back()->leaves() * kLeafBytes >= settings.split) {
@@ -155,6 +155,7 @@ void SurfaceVolume::Impl::emit(LevelGrid& level, bool end) {
   const LeafMaker make(level.band, level.frame, extras, frame.rotation, half);
   std::vector<BrickLeaves> leaves(bricks.size());
   tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t i) { leaves[i] = make(*bricks[i]); });
+  level.band.give_back(std::move(bricks));
   for (const BrickLeaves& b : leaves) {
     if (!b.any) continue;
     stats.voxels += b.leaves[0].active;

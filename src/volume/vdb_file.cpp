@@ -80,6 +80,23 @@ std::string list_of(const openvdb::GridPtrVec& grids) {
   return text;
 }
 
+openvdb::FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid) {
+  if (auto floats = openvdb::gridPtrCast<openvdb::FloatGrid>(grid)) return floats;
+  const auto doubles = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid);
+  if (doubles == nullptr) return nullptr;
+  auto out = std::make_shared<openvdb::FloatGrid>(*doubles);
+  out->setTransform(doubles->transformPtr());
+  return out;
+}
+
+openvdb::Vec3SGrid::ConstPtr colours_of(const openvdb::GridPtrVec& grids) {
+  for (const auto& grid : grids) {
+    if (grid->getName() != "Cd" || !grid->transform().isLinear()) continue;
+    if (auto colours = openvdb::gridPtrCast<openvdb::Vec3SGrid>(grid)) return colours;
+  }
+  return nullptr;
+}
+
 bool is_open(const openvdb::GridBase& grid) {
   const auto open = grid.getMetadata<openvdb::BoolMetadata>(kOpenMetadata);
   return open != nullptr && open->value();

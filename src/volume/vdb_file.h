@@ -21,6 +21,12 @@ std::string kind_of(const openvdb::GridBase& grid);
 /// "surface (a level set), Cd (vec3s values)".
 std::string list_of(const openvdb::GridPtrVec& grids);
 
+/// A float or double grid as floats; null when it is neither.
+openvdb::FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid);
+
+/// The colours among the grids, `Cd`; null where there are none.
+openvdb::Vec3SGrid::ConstPtr colours_of(const openvdb::GridPtrVec& grids);
+
 /// The metadata that says where a level set is known.
 inline constexpr const char* kOpenMetadata = "open";
 bool is_open(const openvdb::GridBase& grid);

@@ -24,7 +24,11 @@ for ((round = 0; round < rounds; ++round)); do
   for ((turn = 0; turn < 1 + RANDOM % 2; ++turn)); do
     "$lamina" surface "$points" -o "$work/out.ply" --checkpoint "$work/dir" --resume --quiet 2> "$work/err" &
     id=$!
-    sleep "$(awk -v most="$took" -v r="$RANDOM" 'BEGIN { print most * r / 32768 / 1000 }')"
+    # Half of the kills come after a part was finished: then there is something to go on with.
+    if [ $((RANDOM % 2)) = 0 ]; then
+      while kill -0 "$id" 2> /dev/null && ! ls "$work/dir"/part_*.lmesh > /dev/null 2>&1; do sleep 0.01; done
+    fi
+    sleep "$(awk -v most="$took" -v r="$RANDOM" 'BEGIN { print 0.6 * most * r / 32768 / 1000 }')"
     kill -s "$signal" "$id" 2> /dev/null && kills=$((kills + 1))
     wait "$id" 2> /dev/null
     code=$?

@@ -49,6 +49,18 @@ TEST(Compare, SquareMovedAcrossItselfAndAside) {
   EXPECT_NEAR(q.a_to_b->max, 0.5, 1e-3);
 }
 
+TEST(Compare, VerticesAloneLieOnASurfaceThatTheirTrianglesCutInside) {
+  // Every second meridian and parallel: the coarse sphere's vertices are the fine one's.
+  const TriangleMesh coarse = sphere(1, 15, 22), fine = sphere(1, 30, 44);
+  CompareSettings s = samples(20000);
+  EXPECT_GT(compare(coarse, fine, s).a_to_b->rms, 2e-3);
+  s.vertices = true;
+  const CompareResult r = compare(coarse, fine, s);
+  EXPECT_LT(r.a_to_b->max, 1e-12);
+  EXPECT_GT(r.b_to_a->rms, 2e-3);
+  EXPECT_LT(r.a_to_b->samples, r.b_to_a->samples);
+}
+
 TEST(Compare, BitsDoNotDependOnThreads) {
   RunContext one, four;
   one.threads = 1;

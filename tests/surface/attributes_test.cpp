@@ -109,6 +109,33 @@ TEST(SurfaceAttributes, ConstantsStayExact) {
   }
 }
 
+// A sixteenth of the density is four times the spacing, and cells two levels coarser.
+TEST(SurfaceAttributes, VerticesCarryTheirOctreeLevel) {
+  Cloud cloud = test::sphere_cloud(12000, [](const Point3& v) { return v[2] > 0 ? 1.0 : 1.0 / 16; });
+  cloud.add_property("heat", ScalarType::uint8, [](const Point3&) { return 7; });
+  SurfaceSettings s;
+  s.vertex_levels = true;
+  for (const ClusterMode cluster : {ClusterMode::none, ClusterMode::preserving}) {
+    s.cluster = cluster;
+    const Reconstruction r = reconstruct(cloud, s);
+    ASSERT_EQ(r.mesh.layout.size(), 2U);
+    EXPECT_EQ(r.mesh.layout[1].name, "level");
+    EXPECT_EQ(r.mesh.layout[1].type, ScalarType::uint8);
+    std::array<double, 2> sum{}, count{};
+    for (std::size_t i = 0; i < r.mesh.positions.size(); ++i) {
+      ASSERT_EQ(r.mesh.attributes[0][i], 7);
+      const float level = r.mesh.attributes[1][i];
+      ASSERT_LT(level, static_cast<float>(r.stats.plan.levels));
+      const double z = r.mesh.positions[i][2];
+      if (std::abs(z) < 0.6) continue;  // cells pass from one size to the other
+      sum[z > 0 ? 0 : 1] += static_cast<double>(level), ++count[z > 0 ? 0 : 1];
+    }
+    EXPECT_NEAR(sum[1] / count[1] - sum[0] / count[0], 2, 0.5);
+  }
+  cloud.add_property("level", ScalarType::uint8, [](const Point3&) { return 1; });
+  EXPECT_THROW(reconstruct(cloud, s), Error);
+}
+
 // Other programs write NaN where a sample has no value; the mesh must hold numbers all the same.
 TEST(SurfaceAttributes, ValuesThatAreNoNumbersAreReplacedAndCounted) {
   Cloud cloud = test::sphere_cloud(4000);

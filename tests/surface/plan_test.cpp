@@ -119,6 +119,23 @@ TEST(SurfacePlan, CountsTheVolume) {
   EXPECT_GT(memory("out.vdb"), memory("") + 1'000'000);
 }
 
+// Fewer levels are chosen where memory is short: the volume's must not count, or the mesh would differ with one.
+TEST(SurfacePlan, TheVolumeDoesNotChooseTheLevels) {
+  Cloud cloud = test::sphere_cloud(20000);
+  cloud.add_property("heat", ScalarType::float32, [](const Point3& p) { return p[2]; });
+  const auto without = plan_of(cloud, [](auto& s) { s.frame = FrameMode::axis; });
+  const auto with = plan_of(cloud, [](auto& s) {
+    s.volume.path = "unused.vdb";
+    s.volume.grids.assign(300, "heat");
+  });
+  constexpr std::uint64_t kRoomy = std::uint64_t{256} << 20;
+  ASSERT_LT(without.memory_bytes, kRoomy);
+  ASSERT_GT(with.memory_bytes, kRoomy);
+  EXPECT_EQ(with.levels, without.levels);
+  EXPECT_EQ(with.finest_cell, without.finest_cell);
+  EXPECT_EQ(with.slab_height, without.slab_height);
+}
+
 TEST(SurfacePlan, TimeGrowsWithSamplesStepsAndCells) {
   const auto seconds = [](std::size_t samples, const std::function<void(SurfaceSettings&)>& change) {
     SurfaceSettings s;

@@ -81,9 +81,12 @@ TEST_F(RenderTool, DrawsVolumes) {
   EXPECT_THAT(run_lamina({"render", points, "-o", picture_, "--size", "48x48"}).err, HasSubstr("drew 3 points"));
   const std::string fog = folder_ / "fog.vdb";
   ASSERT_EQ(run_lamina({"convert", volume, "--fog", "-o", fog}).code, 0);
-  const auto refused = run_lamina({"render", fog, "-o", folder_ / "fog.png"});
-  EXPECT_EQ(refused.code, 3);
-  EXPECT_THAT(refused.err, HasSubstr("density (a fog volume)"));
+  const auto smoke = run_lamina({"render", fog, "-o", picture_, "--size", "48x48"});
+  EXPECT_EQ(smoke.code, 0) << smoke.err;
+  EXPECT_THAT(smoke.err, HasSubstr("drew fog density, voxels of 0.1"));
+  const auto refused = run_lamina({"render", fog, "-o", folder_ / "fog.png", "--wireframe"});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("a fog has no triangles"));
   EXPECT_EQ(run_lamina({"render", volume, "--grid", "none", "-o", picture_}).code, 3);
 }
 

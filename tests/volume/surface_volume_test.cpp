@@ -235,6 +235,20 @@ TEST_F(SurfaceVolumes, AreTheSameBytesForThreadsAndWindows) {
   EXPECT_TRUE(bytes() == one);
 }
 
+TEST_F(SurfaceVolumes, LeaveTheMeshAsItIs) {
+  Cloud cloud = test::sphere_cloud(6000, [](const Point3& v) { return std::exp2(v[2] - 1); });
+  cloud.add_property("heat", ScalarType::float32, [](const Point3& p) { return p[2]; });
+  settings_.frame = FrameMode::axis;
+  settings_.input = test::write_cloud(cloud, folder_ / "in.ply");
+  settings_.output = folder_ / "with.ply";
+  settings_.volume.points = folder_ / "points.vdb";
+  reconstruct_surface(settings_, {});
+  settings_.volume = {};
+  settings_.output = folder_ / "without.ply";
+  reconstruct_surface(settings_, {});
+  EXPECT_TRUE(test::read_text(folder_ / "with.ply") == test::read_text(folder_ / "without.ply"));
+}
+
 TEST_F(SurfaceVolumes, WriteTheProjectedCorners) {
   Cloud cloud = test::sphere_cloud(5000);
   cloud.add_property("red", ScalarType::uint8, [](const Point3&) { return 200; });

@@ -1,0 +1,15 @@
+// What a FogVolume holds.
+#pragma once
+#include <openvdb/openvdb.h>
+
+#include "lamina/volume_fog.h"
+
+namespace lamina {
+
+struct FogVolume::Data {
+  openvdb::FloatGrid::ConstPtr grid;
+  openvdb::Vec3SGrid::ConstPtr colours;  ///< the file's grid Cd, sRGB in 0..1; null where there is none
+  std::string name;
+};
+
+}  // namespace lamina
