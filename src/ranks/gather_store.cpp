@@ -167,6 +167,7 @@ SlabStore gather_buckets(Ranks& ranks, const SlabStore& store, const std::vector
     for (std::size_t b = wanted[own].begin; b < wanted[own].end; ++b) needed += store.count(b);
   });
   std::vector<Outgoing> outgoing;
+  outgoing.reserve(size);
   for (const BucketSpan& span : wanted) outgoing.emplace_back(store, span);
   std::exception_ptr failure;
   const auto attempt = [&](const auto& work) {

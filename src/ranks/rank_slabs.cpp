@@ -14,6 +14,8 @@ namespace {
 
 constexpr std::size_t kBufferBytes = 1 << 20;
 constexpr std::size_t kEncoded = 4096;  ///< vertices encoded at once
+/// Read back at once: what is made of it stays in the cache.
+constexpr std::size_t kVertexBytes = 256 << 10, kTriangleBytes = 64 << 10;
 
 }  // namespace
 
@@ -79,7 +81,7 @@ void RankSlabs::read(Spill& spill, const std::function<void(std::span<const std:
 }
 
 void RankSlabs::read_vertices(const std::function<void(std::span<const std::byte>)>& take) {
-  read(records_, take, kBufferBytes);
+  read(records_, take, kVertexBytes);
 }
 
 void RankSlabs::read_triangles(const std::function<void(std::span<const PartTriangle>)>& take) {
@@ -89,7 +91,7 @@ void RankSlabs::read_triangles(const std::function<void(std::span<const PartTria
     std::memcpy(triangles.data(), bytes.data(), bytes.size());
     take(triangles);
   };
-  read(faces_, unpack, kBufferBytes / sizeof(PartTriangle) * sizeof(PartTriangle));
+  read(faces_, unpack, kTriangleBytes / sizeof(PartTriangle) * sizeof(PartTriangle));
 }
 
 }  // namespace lamina::ranks

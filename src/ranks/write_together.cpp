@@ -21,6 +21,7 @@ std::vector<Border> gather_borders(Ranks& ranks, const Border& own) {
   words.put(own);
   const std::vector<Bytes> all = ranks.gather(words.take());
   std::vector<Border> borders;
+  borders.reserve(all.size());
   for (const Bytes& bytes : all) borders.push_back(Unpacker(bytes).get<Border>());
   Packer list;
   list.put(borders);
