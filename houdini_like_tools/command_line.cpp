@@ -6,6 +6,7 @@
 #include <new>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 #include "console.h"
 #include "lamina/error.h"
@@ -95,6 +96,12 @@ int run_program(int argc, const char* const* argv, const std::vector<AddTool>& t
   } catch (const std::bad_alloc&) {
     fmt::print(stderr, "lamina: out of memory; free some, or see --max-memory to plan the job\n");
     return exit_code(ExitCode::budget);
+  } catch (const std::system_error& e) {
+    // Threads, too, take memory.
+    const bool short_of =
+        e.code() == std::errc::resource_unavailable_try_again || e.code() == std::errc::not_enough_memory;
+    fmt::print(stderr, "lamina: {}{}\n", short_of ? "out of memory or threads: " : "internal error: ", e.what());
+    return exit_code(short_of ? ExitCode::budget : ExitCode::internal);
   } catch (const std::exception& e) {
     fmt::print(stderr, "lamina: internal error: {}\n", e.what());
     return exit_code(ExitCode::internal);

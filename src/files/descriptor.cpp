@@ -82,9 +82,10 @@ Descriptor open_unlinked(const std::string& directory) {
     if (file) ::unlink(name.c_str());
   }
   if (!file) {
-    throw Error(ExitCode::budget,
-                fmt::format("{}: cannot make a temporary file here: {}; choose another folder for temporary files",
-                            directory, system_message(errno)));
+    throw Error(
+        ExitCode::budget,
+        fmt::format("{}: cannot make a temporary file here: {}; choose another folder for temporary files (--tmp-dir)",
+                    directory, system_message(errno)));
   }
   return file;
 }

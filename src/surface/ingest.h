@@ -27,6 +27,6 @@ struct Ingested {
 /// Reads the whole input into the store; samples with a defect are left out. After a survey of all rows the result is
 /// always complete; after one of a part it need not be.
 Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, double radius_scale,
-                const std::string& directory, const RunContext& run);
+                const std::string& directory, const RunContext& run, const RowPick& pick = {});
 
 }  // namespace lamina

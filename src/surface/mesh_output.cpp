@@ -8,8 +8,8 @@
 
 namespace lamina {
 
-MeshOutput::MeshOutput(const ClusterSettings& settings, float chord, const Frame& frame, MeshSink& sink)
-    : chord_(chord), frame_(frame), sink_(sink), clusterer_(settings) {}
+MeshOutput::MeshOutput(const ClusterSettings& settings, float chord, const Frame& frame, MeshSink& sink, Pruner* pruner)
+    : chord_(chord), frame_(frame), sink_(sink), pruner_(pruner), clusterer_(settings) {}
 
 MeshOutput::~MeshOutput() {
   tasks_.cancel();
@@ -55,8 +55,12 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
   while (clusterer_.pop(done_)) {
     const IsoSlab* next = clustered_.size() > 1 ? clustered_[1].get() : nullptr;
     place_vertices(done_, *clustered_.front(), next, frame_, chord_, vertices_);
-    sink_.append_vertices(vertices_);
-    sink_.append_triangles(done_.triangles);
+    if (pruner_ != nullptr) {
+      pruner_->add(vertices_, done_.triangles);
+    } else {
+      sink_.append_vertices(vertices_);
+      sink_.append_triangles(done_.triangles);
+    }
     triangles_ += done_.triangles.size();
     if (clustered_.front().use_count() == 1) {
       const std::lock_guard lock(mutex_);
@@ -64,6 +68,7 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
     }
     clustered_.pop_front();
   }
+  if (last && pruner_ != nullptr) pruner_->finish();
 }
 
 }  // namespace lamina

@@ -13,6 +13,7 @@
 #include "lamina/frame.h"
 #include "lamina/iso_mesh.h"
 #include "lamina/mesh_sink.h"
+#include "surface/pruner.h"
 
 namespace lamina {
 
@@ -20,8 +21,10 @@ namespace lamina {
 /// start().
 class MeshOutput {
  public:
-  /// `chord`: SurfaceSettings::chord. The sink is the caller's; nobody else may append to it.
-  MeshOutput(const ClusterSettings& settings, float chord, const Frame& frame, MeshSink& sink);
+  /// `chord`: SurfaceSettings::chord. The sink is the caller's; nobody else may append to it. With a pruner everything
+  /// goes through it.
+  MeshOutput(const ClusterSettings& settings, float chord, const Frame& frame, MeshSink& sink,
+             Pruner* pruner = nullptr);
   /// Drops what is not written yet.
   ~MeshOutput();
   MeshOutput(const MeshOutput&) = delete;
@@ -46,6 +49,7 @@ class MeshOutput {
   float chord_;
   const Frame& frame_;
   MeshSink& sink_;
+  Pruner* pruner_;
   Clusterer clusterer_;
   std::vector<std::shared_ptr<IsoSlab>> queued_;
   std::deque<std::shared_ptr<IsoSlab>> clustered_;  ///< by the clusterer, not yet written

@@ -29,7 +29,7 @@ ProjectSettings project_settings(const SurfaceSettings& s) {
 }  // namespace
 
 Pipeline::Pipeline(const SurfaceSettings& settings, const Resolved& resolved, const Frame& frame, const Extent& extent,
-                   SampleFeed& feed, std::size_t attributes, MeshSink& sink, SurfaceVolume* volume)
+                   SampleFeed& feed, std::size_t attributes, MeshSink& sink, SurfaceVolume* volume, Pruner* pruner)
     : settings_(settings),
       resolved_(resolved),
       feed_(feed),
@@ -37,7 +37,7 @@ Pipeline::Pipeline(const SurfaceSettings& settings, const Resolved& resolved, co
       kernel_(select_kernel()),
       window_(resolved.lattice, static_cast<int>(attributes), extent),
       projector_(project_settings(settings), kernel_),
-      output_(ClusterSettings{settings.cluster}, static_cast<float>(settings.chord), frame, sink),
+      output_(ClusterSettings{settings.cluster}, static_cast<float>(settings.chord), frame, sink, pruner),
       first_(resolved.lattice.slab_of(extent.z_min) - kReachSlabs),
       last_(resolved.lattice.slab_of(extent.z_max) + kReachSlabs),
       refined_(first_),

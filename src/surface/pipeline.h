@@ -20,7 +20,8 @@ namespace lamina {
 class Pipeline {
  public:
   Pipeline(const SurfaceSettings& settings, const Resolved& resolved, const Frame& frame, const Extent& extent,
-           SampleFeed& feed, std::size_t attributes, MeshSink& sink, SurfaceVolume* volume = nullptr);
+           SampleFeed& feed, std::size_t attributes, MeshSink& sink, SurfaceVolume* volume = nullptr,
+           Pruner* pruner = nullptr);
   void run(const RunContext& run, Stopwatch& watch);
   void report(SurfaceStats& stats) const;
 

@@ -17,9 +17,12 @@
 #include "lamina/error.h"
 #include "lamina/mesh_sink.h"
 #include "lamina/points.h"
+#include "surface/clean_ingested.h"
 #include "surface/ingest.h"
+#include "surface/local_shift.h"
 #include "surface/pipeline.h"
 #include "surface/plan.h"
+#include "surface/pruner.h"
 #include "surface/stopwatch.h"
 #include "surface/survey.h"
 #include "volume/surface_volume.h"
@@ -112,10 +115,11 @@ std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const 
 
 /// Float positions keep a hundredth of a cell as long as the coordinates are below some ten thousand cells;
 /// georeferenced ones are not. Nor can float hold the very large and the very small.
-bool needs_double(const Census& census, double finest_cell) {
+bool needs_double(const Census& census, const std::array<double, 3>& shift, double finest_cell) {
   constexpr double kLargest = 1e37;
   constexpr double kSmallestCell = 1e-35;
-  const double largest = std::max(census.low.cwiseAbs().maxCoeff(), census.high.cwiseAbs().maxCoeff());
+  const Eigen::Vector3d by(shift[0], shift[1], shift[2]);
+  const double largest = std::max((census.low - by).cwiseAbs().maxCoeff(), (census.high - by).cwiseAbs().maxCoeff());
   return largest * 0x1p-24 > 0.01 * finest_cell || largest > kLargest || finest_cell < kSmallestCell;
 }
 
@@ -210,10 +214,12 @@ Ingested read_input(PointSource& source, const SurfaceSettings& settings, const 
   std::optional<Ingested> ingested;
   const auto fill = [&](const Survey& survey) {
     frame = choose_frame(survey, frame_mode(settings));
-    watch.time("store", [&] { ingested.emplace(ingest(source, survey, frame, settings.radius_scale, tmp, run)); });
+    watch.time("store", [&] {
+      ingested.emplace(ingest(source, survey, frame, settings.radius_scale, tmp, run, settings.clean.pick));
+    });
   };
   std::optional<Survey> survey;
-  watch.time("survey", [&] { survey = survey_part(source); });
+  watch.time("survey", [&] { survey = survey_part(source, settings.clean.pick); });
   if (survey) {
     fill(*survey);
     if (ingested->complete) {
@@ -222,7 +228,7 @@ Ingested read_input(PointSource& source, const SurfaceSettings& settings, const 
     }
     ingested.reset();
   }
-  watch.time("survey", [&] { survey = survey_input(source, settings.bad_samples, run); });
+  watch.time("survey", [&] { survey = survey_input(source, settings.bad_samples, run, settings.clean.pick); });
   fill(*survey);
   return std::move(*ingested);
 }
@@ -247,6 +253,30 @@ void expect_time(const SurfaceSettings& settings, const PointSourceInfo& source,
   plan.seconds = elapsed + slowness * (whole - reading) / (1 + kEfficiency * (plan.threads - 1));
 }
 
+/// What is to be left out before anything is measured.
+void clean(Ingested& in, const SurfaceSettings& settings, double step, const std::string& tmp, const RunContext& run,
+           Stopwatch& watch, std::uint64_t rows, SurfaceStats& stats) {
+  stats.cleaned.clipped = in.census.clipped;
+  stats.cleaned.skipped = in.census.skipped;
+  if (settings.clean.looks_around()) {
+    watch.time("clean",
+               [&] { clean_ingested(in, settings.clean, step, input_name(settings), tmp, stats.cleaned, run); });
+  }
+  if (const std::string said = describe(stats.cleaned); !said.empty())
+    run.info(fmt::format("{} of {} samples left: {}", in.store.total(), rows, said));
+}
+
+void report_pruning(const PruneCounts& counts, const std::string& name, SurfaceStats& stats, const RunContext& run) {
+  stats.pruned = counts;
+  if (counts.kept == 0 && counts.removed > 0) {
+    throw Error(ExitCode::empty, fmt::format("{}: all {} connected parts of the mesh are too small for --prune or "
+                                             "--prune-size",
+                                             name, counts.removed));
+  }
+  run.info(fmt::format("{} connected parts, {} small ones left out with {} triangles", counts.kept, counts.removed,
+                       counts.removed_triangles));
+}
+
 SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run) {
   SurfaceStats stats;
   Stopwatch watch;
@@ -265,6 +295,9 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
   Frame frame;
   std::optional<Ingested> ingested = read_input(*source, settings, tmp, run, watch, frame);
   const Census& census = ingested->census;
+  clean(*ingested, settings, frame.step, tmp, run, watch, info.count, stats);
+  if (settings.local) stats.shift = local_shift(census);
+  const Frame written_frame = shifted(frame, stats.shift);
   const auto plan_for = [&](const SurfaceSettings& s) {
     Resolved r = resolve_plan(s, frame, ingested->store, ingested->extent, info.has_radius, info.attributes.size());
     r.plan.memory_bytes += table_bytes(r.lattice, *ingested);
@@ -299,14 +332,24 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
   stats.disk_bytes = ingested->store.disk_bytes();
   if (!settings.dry_run) {
     out.attributes = info.attributes;
-    out.double_positions = needs_double(census, resolved.plan.finest_cell);
+    out.double_positions = needs_double(census, stats.shift, resolved.plan.finest_cell);
+    if (settings.local) {
+      out.comments.push_back("shift " + shift_text(stats.shift));
+      run.info(fmt::format("coordinates are written less {}", shift_text(stats.shift)));
+    }
     MeshSink sink(out);
     SampleFeed feed(ingested->store, resolved.lattice, resolved.feed, resolved.radii, info.has_radius);
     std::optional<SurfaceVolume> volume;
-    if (settings.volume.wanted())
-      volume.emplace(settings.volume, frame, resolved.lattice, resolved.main_level, info.attributes, tmp);
-    Pipeline pipeline(settings, resolved, frame, ingested->extent, feed, info.attributes.size(), sink,
-                      volume ? &*volume : nullptr);
+    VolumeExport grids = settings.volume;
+    if (settings.local) grids.shift = stats.shift;
+    if (grids.wanted())
+      volume.emplace(grids, written_frame, resolved.lattice, resolved.main_level, info.attributes, tmp);
+    const PruneRule rule{settings.prune_triangles,
+                         resolve(settings.prune_size, resolved.plan.radius_median, settings.blend)};
+    std::optional<Pruner> pruner;
+    if (rule.triangles > 0 || rule.size > 0) pruner.emplace(rule, tmp, sink);
+    Pipeline pipeline(settings, resolved, written_frame, ingested->extent, feed, info.attributes.size(), sink,
+                      volume ? &*volume : nullptr, pruner ? &*pruner : nullptr);
     pipeline.run(run, watch);
     pipeline.report(stats);
     warn_of_contradictions(stats, input_name(settings), run);
@@ -315,6 +358,7 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
       run.info(fmt::format("{} of {} samples discarded as undersampled: radius above --max-radius",
                            feed.counts().undersampled, info.count));
     }
+    if (pruner) report_pruning(pruner->counts(), input_name(settings), stats, run);
     if (sink.triangles() == 0) {
       throw Error(ExitCode::empty,
                   fmt::format("{}: no surface came out of {} samples; they lie too far apart for their radii, or on no "
