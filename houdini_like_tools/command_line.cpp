@@ -73,6 +73,14 @@ int answer_parse_error(const CLI::App& app, const CLI::ParseError& error) {
   return exit_code(ExitCode::usage);
 }
 
+/// Threads take memory, too: the standard library says so by a code, TBB by its words.
+bool is_short_of_memory(const std::exception& e) {
+  if (const auto* system = dynamic_cast<const std::system_error*>(&e); system != nullptr)
+    return system->code() == std::errc::resource_unavailable_try_again ||
+           system->code() == std::errc::not_enough_memory;
+  return std::string_view(e.what()).starts_with("pthread_create");
+}
+
 }  // namespace
 
 int run_program(int argc, const char* const* argv, const std::vector<AddTool>& tools) {
@@ -96,15 +104,10 @@ int run_program(int argc, const char* const* argv, const std::vector<AddTool>& t
   } catch (const std::bad_alloc&) {
     fmt::print(stderr, "lamina: out of memory; free some, or see --max-memory to plan the job\n");
     return exit_code(ExitCode::budget);
-  } catch (const std::system_error& e) {
-    // Threads, too, take memory.
-    const bool short_of =
-        e.code() == std::errc::resource_unavailable_try_again || e.code() == std::errc::not_enough_memory;
-    fmt::print(stderr, "lamina: {}{}\n", short_of ? "out of memory or threads: " : "internal error: ", e.what());
-    return exit_code(short_of ? ExitCode::budget : ExitCode::internal);
   } catch (const std::exception& e) {
-    fmt::print(stderr, "lamina: internal error: {}\n", e.what());
-    return exit_code(ExitCode::internal);
+    const bool short_of = is_short_of_memory(e);
+    fmt::print(stderr, "lamina: {}: {}\n", short_of ? "out of memory for threads" : "internal error", e.what());
+    return exit_code(short_of ? ExitCode::budget : ExitCode::internal);
   }
 }
 

@@ -21,6 +21,7 @@ int main(int argc, char** argv) {
       add_clip,
       add_transform,
       add_sort,
+      add_normal,
       add_radius,
       add_attribtransfer,
       add_completion,

@@ -10,6 +10,7 @@
 
 #include "console.h"
 #include "inputs.h"
+#include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "lamina/volume_merge.h"
 #include "text.h"
@@ -70,8 +71,15 @@ void merge_grids(const MergeOptions& o, const std::vector<PointInput>& inputs, c
       fmt::format("{} grids, {} voxels{}, {}", stats.grids, count_text(stats.voxels), points, bytes_text(stats.bytes)));
 }
 
+void merge_chunks(const MergeOptions& o, const RunContext& context) {
+  const MergedParts merged = merge_parts(o.inputs, o.output, context);
+  context.info(fmt::format("{} vertices, {} triangles of {} parts", count_text(merged.vertices),
+                           count_text(merged.triangles), merged.parts));
+}
+
 void run_merge(const MergeOptions& o) {
   const RunContext context = make_context(o.run);
+  if (std::any_of(o.inputs.begin(), o.inputs.end(), is_part)) return merge_chunks(o, context);
   const auto word = [](FileContent content) {
     return content == FileContent::points ? "points" : content == FileContent::mesh ? "a mesh" : "a volume";
   };
@@ -94,7 +102,7 @@ void run_merge(const MergeOptions& o) {
 }  // namespace
 
 void add_merge(CLI::App& app) {
-  auto* tool = app.add_subcommand("merge", "Put several clouds, meshes or volumes into one file");
+  auto* tool = app.add_subcommand("merge", "Put several clouds, meshes, volumes or the parts of a mesh into one file");
   auto o = std::make_shared<MergeOptions>();
   tool->add_option_function<std::vector<std::string>>(
           "INPUT",
@@ -102,7 +110,9 @@ void add_merge(CLI::App& app) {
             for (const std::string& name : names) o->inputs.push_back(pipe_name(name));
           },
           "Points (streamed) or meshes, in the order in which they are to stand: files, folders, patterns, scan lists "
-          "(.conf), FILE@POSE.txt; - for PLY on standard input")
+          "(.conf), FILE@POSE.txt; - for PLY on standard input. Or all parts of a mesh that 'lamina surface --chunk' "
+          "made, "
+          "in any order")
       ->required()
       ->expected(1, 1000000)
       ->type_name("");

@@ -3,9 +3,12 @@
 
 #include <map>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "console.h"
 #include "inputs.h"
+#include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "lamina/sort_points.h"
 #include "text.h"
@@ -15,19 +18,38 @@ namespace lamina::tools {
 namespace {
 
 struct SortOptions {
-  std::string input, output, columns;
+  std::vector<std::string> inputs;
+  std::string output, columns, store;
+  SurfaceSettings reading;  ///< of the store
   SortSettings settings;
   Precision precision = Precision::automatic;
   RunOptions run;
 };
 
-void run_sort(const SortOptions& o) {
+/// For chunks of a reconstruction.
+void run_store(const SortOptions& o) {
+  SurfaceSettings settings = o.reading;
+  settings.input = o.inputs.front();
+  settings.more_inputs.assign(o.inputs.begin() + 1, o.inputs.end());
+  settings.columns = o.columns;
+  settings.bad_samples = o.settings.bad_samples;
   const RunContext context = make_context(o.run);
-  const auto source = open_point_input(o.input, o.columns, context);
+  const SurfaceStats stats = write_store(settings, o.store, context);
+  context.info(
+      fmt::format("{}: {} samples, {}", o.store, count_text(stats.plan.samples), bytes_text(stats.disk_bytes)));
+}
+
+void run_sort(const SortOptions& o) {
+  if (!o.store.empty()) return run_store(o);
+  if (o.output.empty()) throw Error(ExitCode::usage, "--output is required, or --store");
+  if (o.inputs.size() > 1)
+    throw Error(ExitCode::usage, "several inputs go into a --store only; put them into one file first: lamina merge");
+  const RunContext context = make_context(o.run);
+  const auto source = open_point_input(o.inputs.front(), o.columns, context);
   const auto writer = open_points_writer(o.output, with_precision(columns_of(source->info()), o.precision),
                                          {.count = {}, .tmp_dir = o.run.tmp_dir});
   const EditReport report = sort_points(*source, *writer, o.settings, context);
-  warn_of_bad_rows(report, shown_name(o.input), context);
+  warn_of_bad_rows(report, shown_name(o.inputs.front()), context);
   writer->commit();
   context.info(fmt::format("sorted {} points", count_text(report.written)));
 }
@@ -37,7 +59,20 @@ void run_sort(const SortOptions& o) {
 void add_sort(CLI::App& app) {
   auto* tool = app.add_subcommand("sort", "Put points into another order, more of them than memory holds");
   auto o = std::make_shared<SortOptions>();
-  add_files(*tool, o->input, "Points", o->output, "Points");
+  tool->add_option_function<std::vector<std::string>>(
+          "INPUT",
+          [o](const std::vector<std::string>& names) {
+            for (const std::string& name : names) o->inputs.push_back(pipe_name(name));
+          },
+          "Points; - for PLY on standard input. With --store several files, folders, patterns or scan lists")
+      ->required()
+      ->expected(1, 1000000)
+      ->type_name("");
+  auto* output = tool->add_option_function<std::string>(
+                         "-o,--output", [o](const std::string& name) { o->output = pipe_name(name); },
+                         "Points; - for PLY on standard output")
+                     ->type_name("FILE")
+                     ->group("Output");
   const std::map<std::string, SortKey> words{{"x", SortKey::x},
                                              {"y", SortKey::y},
                                              {"z", SortKey::z},
@@ -61,12 +96,33 @@ void add_sort(CLI::App& app) {
       ->excludes(by)
       ->group("Order");
   tool->add_flag("--reverse", o->settings.reverse, "Largest first")->group("Order");
+  const std::string store = "Store";
+  auto* folder = tool->add_option("--store", o->store,
+                                  "Make a new folder instead, sorted along the sweep axis, from which lamina surface "
+                                  "reconstructs chunk by chunk on many machines")
+                     ->type_name("DIR")
+                     ->excludes(output)
+                     ->excludes(by)
+                     ->group(store);
+  tool->add_option_function<std::string>(
+          "--frame",
+          [o](const std::string& word) { o->reading.frame = word == "axis" ? FrameMode::axis : FrameMode::pca; },
+          "Of the store: sweep along the dominant axis, or along the longest input axis [pca]")
+      ->check(CLI::IsMember({"pca", "axis"}).description(""))
+      ->type_name("pca|axis")
+      ->needs(folder)
+      ->group(store);
+  tool->add_option("--particlescale", o->reading.radius_scale, "Multiplies the radii that the input gives")
+      ->capture_default_str()
+      ->needs(folder)
+      ->group(store);
   add_columns(*tool, o->columns);
   add_bad_samples(*tool, o->settings.bad_samples);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);
   add_examples(*tool,
                "  lamina sort scan.ply --by sweep -o swept.ply\n"
+               "  lamina sort scan.ply --store scan.store\n"
                "  lamina sort scan.ply --attribute confidence --reverse -o best_first.ply");
   tool->callback([o] { run_sort(*o); });
 }

@@ -15,7 +15,9 @@
 #include "inputs.h"
 #include "lamina/error.h"
 #include "model.h"
+#include "normal_options.h"
 #include "result_file.h"
+#include "surface_parts.h"
 #include "text.h"
 #include "tool.h"
 
@@ -26,6 +28,7 @@ struct SurfaceOptions {
   std::vector<std::string> inputs;
   SurfaceSettings settings;
   RunOptions run;
+  PartsOptions parts;
   std::string stats, preview;
 };
 
@@ -86,6 +89,7 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
                      {"crossing_cells", s.crossing_cells},
                      {"general_cells", s.general_cells},
                      {"rejected_loops", s.rejected_loops}};
+  if (s.normals) j["normals"] = normals_json(*s.normals);
   if (settings.volume.wanted()) {
     j["volume"] = {{"files", s.volume.files},
                    {"voxelsize", s.volume.voxel},
@@ -139,6 +143,8 @@ void run_surface(const SurfaceOptions& o) {
   }
   if (!o.preview.empty() && settings.output == "-")
     throw Error(ExitCode::usage, "--preview draws the mesh file; give --output one");
+  if (!o.preview.empty() && o.parts.chunked)
+    throw Error(ExitCode::usage, "--preview draws a mesh, --chunk makes only a part of one");
   if (!o.preview.empty() && o.preview == settings.output)
     throw Error(ExitCode::usage, "--preview and --output name the same file");
   if (!o.preview.empty() && !settings.dry_run)
@@ -152,7 +158,7 @@ void run_surface(const SurfaceOptions& o) {
   }
   std::optional<ResultFile> stats_file;
   if (!o.stats.empty()) stats_file.emplace(o.stats);
-  const SurfaceStats stats = reconstruct_surface(settings, context);
+  const SurfaceStats stats = run_parts(settings, o.parts, context);
   if (!settings.dry_run) {
     context.info(fmt::format("{} vertices, {} triangles in {:.1f} s ({:.2f} M samples per CPU second, {:.0f} MB)",
                              stats.vertices, stats.triangles, stats.wall,
@@ -243,6 +249,13 @@ void add_surface(CLI::App& app) {
       ->group(samples);
 
   add_clean_options(*tool, s.clean, "Cleaning");
+  tool->add_option("--normals", s.normals,
+                   "whose normals: the file's; auto: found where the file has none; estimate: all found")
+      ->transform(words<NormalsChoice>(
+          {{"file", NormalsChoice::file}, {"auto", NormalsChoice::automatic}, {"estimate", NormalsChoice::estimate}}))
+      ->option_text("file|auto|estimate [file]")
+      ->group("Normals");
+  add_normals_options(*tool, s.normal_search, "Normals");
 
   const std::string fit = "Fit";
   tool->add_option("--blend", s.blend, "H: the influence radius R is H times a sample's radius r")
@@ -287,6 +300,7 @@ void add_surface(CLI::App& app) {
       ->group(mesh);
 
   add_volume_options(*tool, s.volume);
+  add_parts_options(*tool, o->parts);
 
   tool->add_option("--window", s.window, "slabs each stage advances at once")->capture_default_str()->group("Run");
   auto* dry =
@@ -302,7 +316,8 @@ void add_surface(CLI::App& app) {
   add_examples(*tool,
                "  lamina surface scan.ply -o mesh_of_scan.ply\n"
                "  lamina surface scan.ply --dry-run");
-  tool->callback([o, output, dry] {
+  tool->callback([o, tool, output, dry] {
+    if (o->parts.tasks > 0) return print_tasks(*tool, o->inputs.front(), o->settings.output, o->parts);
     if (output->count() == 0 && dry->count() == 0) throw CLI::RequiredError("--output");
     run_surface(*o);
   });

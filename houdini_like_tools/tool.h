@@ -20,6 +20,7 @@ void add_clean(CLI::App& app);
 void add_clip(CLI::App& app);
 void add_transform(CLI::App& app);
 void add_sort(CLI::App& app);
+void add_normal(CLI::App& app);
 void add_radius(CLI::App& app);
 void add_attribtransfer(CLI::App& app);
 /// Not in the help: made for packagers.

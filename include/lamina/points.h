@@ -12,6 +12,19 @@
 
 namespace lamina {
 
+/// Rows from `first` on, up to the next part's, were measured together.
+struct ScanPart {
+  enum class Scanner : std::uint8_t {
+    unknown,
+    position,     ///< it stood at `at`
+    direction,    ///< it stood far away in this direction
+    pose_origin,  ///< `at` is where the pose puts the file's origin: there may have been the scanner
+  };
+  std::uint64_t first = 0;
+  Scanner scanner = Scanner::unknown;
+  std::array<double, 3> at{};  ///< input coordinates
+};
+
 struct PointSourceInfo {
   std::string path;               ///< as given by the user, for messages
   std::uint64_t count = 0;        ///< rows read() gives
@@ -23,6 +36,7 @@ struct PointSourceInfo {
   bool random_access = false;     ///< read() may be called for any row, from several threads
   bool double_precision = false;  ///< positions need more than float32
   bool geographic = false;        ///< x and y are degrees of longitude and latitude: no job can measure in them
+  std::vector<ScanPart> scans;    ///< ascending, the first begins with row 0; empty: one part, nothing known
   AttributeLayout attributes;     ///< every other scalar property of the points, file order (colours keep their type)
   std::vector<std::string> remarks;  ///< what the user should know: guesses, things left out; one line each
 };
@@ -77,6 +91,7 @@ struct PointInput {
   std::string path;
   bool posed = false;
   Pose pose{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
+  bool seen_along_z = false;  ///< its scanner looked down its own z axis, as those of Stanford's scan lists do
 };
 
 /// What the user named, as files in order: a folder is every point file in it (by ending, sorted by name, not its
@@ -86,9 +101,12 @@ struct PointInput {
 /// Throws Error(unreadable) naming what is missing, empty or malformed, Error(usage) for an empty list.
 std::vector<PointInput> expand_inputs(const std::vector<std::string>& names);
 
-/// The same points in a pose: normals by the inverse transpose, radii by the cube root of the volume change.
+/// The same points in a pose: normals by the inverse transpose, radii by the cube root of the volume change, scanners
+/// moved along. Where nothing is known of these, the origin may have been one, or with `seen_along_z` one was far away
+/// on the source's z axis.
 /// Throws Error(unreadable) for a pose that is singular or not finite.
-std::unique_ptr<PointSource> pose_points(std::unique_ptr<PointSource> source, const Pose& pose);
+std::unique_ptr<PointSource> pose_points(std::unique_ptr<PointSource> source, const Pose& pose,
+                                         bool seen_along_z = false);
 
 /// Several sources as one, rows in order. Attributes are the union by name, in the widest type that a source has
 /// (colours are rescaled between 8 bits, 16 bits and 0-1); what a source lacks is 0, quality 1. Normals and radii must

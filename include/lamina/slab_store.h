@@ -37,6 +37,7 @@ struct StoreSettings {
   std::size_t buffer_bytes = 32u << 20;  ///< memory for all unwritten samples together, compression included; in
                                          ///< random order 32 KB per bucket make blocks of about 1200 coloured samples,
                                          ///< 8 KB of 280 (a block costs 16 bytes of index)
+  bool keep = false;                     ///< named files that stay, with checksums: SlabStore::save() completes them
 };
 
 /// What the finished store holds. Order inside a bucket is the order of append().
@@ -45,6 +46,15 @@ class SlabStore {
   ~SlabStore();
   SlabStore(SlabStore&&) noexcept;
   SlabStore& operator=(SlabStore&&) noexcept;
+  /// Opens a store that was kept and saved in `directory`. Nothing of it is changed or given back. Throws
+  /// Error(unreadable) naming the file that is missing, damaged or of another version.
+  static SlabStore open(const std::string& directory, const StoreLayout& layout);
+  /// Writes a kept store's index; returns a checksum over it and, through it, all the store's blocks. Throws
+  /// Error(budget) when it cannot be written.
+  [[nodiscard]] std::uint32_t save() const;
+  /// The same of the index as it was saved.
+  [[nodiscard]] std::uint32_t checksum() const;
+
   [[nodiscard]] const StoreLayout& layout() const;
   [[nodiscard]] std::size_t buckets() const;
   [[nodiscard]] std::uint64_t count(std::size_t bucket) const;
@@ -56,7 +66,7 @@ class SlabStore {
   [[nodiscard]] std::uint64_t disk_bytes() const;  ///< not given back
   [[nodiscard]] std::size_t files() const;         ///< that the buckets are in, each a run of them
   /// Decompresses one bucket into `out` (resized to it); safe from several threads. Throws Error(budget) naming the
-  /// directory when the file cannot be read or is damaged.
+  /// directory when the file cannot be read or is damaged; of a kept store Error(unreadable) naming the file.
   void read(std::size_t bucket, LocalSamples& out) const;
   /// Leaves samples out for good: keep[b][i] says whether sample i of bucket b stays, as read() has given it so far.
   /// Counts and bounds become those of the samples that stay. Their disk space is not given back. Reads every bucket
@@ -65,7 +75,7 @@ class SlabStore {
   /// Says that a bucket will be read soon, so that a slow disk begins to.
   void will_read(std::size_t bucket) const;
   /// Says that buckets before this one will not be read again. Their disk space is given back, a file at a
-  /// time.
+  /// time, unless the store is kept.
   void release_before(std::size_t bucket);
 
  private:

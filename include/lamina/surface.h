@@ -6,9 +6,11 @@
 #include <string>
 #include <vector>
 
+#include "lamina/bad_samples.h"
 #include "lamina/clean.h"
 #include "lamina/cluster.h"
 #include "lamina/length.h"
+#include "lamina/normals.h"
 #include "lamina/run.h"
 #include "lamina/volume_export.h"
 
@@ -19,7 +21,11 @@ enum class FrameMode {
   axis,  ///< sweep along the input's longest axis: the lattice stays aligned with the input's axes
 };
 enum class FitMode { plane, sphere };  ///< METHOD 3.2; algebraic sphere of Guennebaud & Gross 2007
-enum class BadSamples { drop, refuse };
+enum class NormalsChoice {
+  file,       ///< the input's; an input without any is refused
+  automatic,  ///< the input's where they are usable, found for the others (NormalsMode::complete)
+  estimate,   ///< all found, whatever the input has
+};
 
 /// Lengths are in the input's units, or multiples of the radius (length.h).
 struct SurfaceSettings {
@@ -30,12 +36,14 @@ struct SurfaceSettings {
 
   std::optional<FrameMode> frame;  ///< unset: pca, or axis where grids are asked for (they have the input's axes then)
   BadSamples bad_samples = BadSamples::drop;  ///< non-finite, without a normal, with a radius <= 0
-  double radius_scale = 1;                    ///< > 0: multiplies every sample's radius, given or estimated
-  std::uint32_t density = 16;  ///< samples a counting cell must hold to give a radius (paper, section 3.1), >= 2
-  CleanSettings clean;         ///< what is left out before radii are estimated
-  Length max_radius;           ///< samples with a larger radius are discarded as undersampled; 0: none
-  double blend = 1.2;          ///< H > 0: R = H r (paper, section 3.2)
-  int steps = 1;               ///< N in 1..16: projection steps
+  NormalsChoice normals = NormalsChoice::file;
+  NormalsSettings normal_search;  ///< how those that are found are; mode and bad_samples follow the others
+  double radius_scale = 1;        ///< > 0: multiplies every sample's radius, given or estimated
+  std::uint32_t density = 16;     ///< samples a counting cell must hold to give a radius (paper, section 3.1), >= 2
+  CleanSettings clean;            ///< what is left out before radii are estimated
+  Length max_radius;              ///< samples with a larger radius are discarded as undersampled; 0: none
+  double blend = 1.2;             ///< H > 0: R = H r (paper, section 3.2)
+  int steps = 1;                  ///< N in 1..16: projection steps
   FitMode fit = FitMode::sphere;
   bool diffuse = false;  ///< project cell centres, then corners by their cells (paper, section 3.3)
   Length cell{0.9,
@@ -44,10 +52,10 @@ struct SurfaceSettings {
   double boundary = 0;  ///< isovertices whose corners' projections lie farther than this from the average of
                         ///< their samples (in R) are rejected; 0: no limit
   ClusterMode cluster = ClusterMode::preserving;
-  double chord = 0.17;   ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
+  double chord = 0.17;                ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
   std::uint64_t prune_triangles = 0;  ///< connected parts of the mesh with fewer triangles are left out
-  Length prune_size;  ///< parts whose box has a shorter diagonal, too; `r`, `R`: of the median sample; 0: none
-  bool local = false;  ///< write coordinates less a shift (SurfaceStats::shift), which floats then hold
+  Length prune_size;     ///< parts whose box has a shorter diagonal, too; `r`, `R`: of the median sample; 0: none
+  bool local = false;    ///< write coordinates less a shift (SurfaceStats::shift), which floats then hold
   int window = 1;        ///< slabs that each stage advances at once, >= 1: more is faster on many cores, takes memory
   bool dry_run = false;  ///< plan only: reads the input, writes nothing
   VolumeExport volume;   ///< grids to write beside the mesh
@@ -91,7 +99,7 @@ struct SurfaceStats {
   std::uint64_t samples_read = 0;
   CleanCounts cleaned;
   PruneCounts pruned;
-  std::array<double, 3> shift{};  ///< SurfaceSettings::local: add it to the coordinates written
+  std::array<double, 3> shift{};          ///< SurfaceSettings::local: add it to the coordinates written
   std::vector<Rejected> rejected;         ///< samples left out, by reason
   std::uint64_t replaced_attributes = 0;  ///< attribute values that were NaN or out of range
   std::uint64_t vertices = 0, triangles = 0;
@@ -104,7 +112,8 @@ struct SurfaceStats {
   std::uint64_t isovertices = 0, isotriangles = 0, rejected_loops = 0, general_cells = 0, crossing_cells = 0;
   std::vector<std::uint64_t> leaf_cells;  ///< by level, finest first
   ClusterCounts clusters;
-  VolumeExportStats volume;  ///< where grids were asked for
+  std::optional<NormalsReport> normals;  ///< where they were found
+  VolumeExportStats volume;              ///< where grids were asked for
   std::vector<StageTime> stages;
   double wall = 0, cpu = 0;
   std::uint64_t peak_memory = 0;  ///< bytes, of the process

@@ -24,7 +24,11 @@ std::uint8_t level_for(double size, const Lattice& lattice) {
 
 SampleFeed::SampleFeed(SlabStore& store, const Lattice& lattice, const FeedSettings& settings,
                        const RadiiSettings& radii, bool given_radii)
-    : store_(store), lattice_(lattice), settings_(settings), cache_(store, lattice, settings.cache_bytes) {
+    : store_(store),
+      lattice_(lattice),
+      settings_(settings),
+      counting_height_(std::int64_t{radii.finest_cell} << (radii.levels - 1)),
+      cache_(store, lattice, settings.cache_bytes) {
   if (!given_radii) estimator_ = std::make_unique<RadiusEstimator>(radii);
   // A radius that asks for cells larger than the coarsest level has gives no more than that level can use.
   const double coarsest = 2.0 * lattice.cell_size(lattice.levels - 1) / settings.cell_ratio;
@@ -41,6 +45,22 @@ FeedCounts SampleFeed::counts() const {
 std::size_t SampleFeed::next_filled(std::size_t bucket) const {
   while (bucket < store_.buckets() && store_.count(bucket) == 0) ++bucket;
   return bucket;
+}
+
+void SampleFeed::begin_at(std::int64_t z) {
+  const auto first_reaching = [&](std::int64_t from) {
+    std::size_t bucket = 0;
+    while (bucket < store_.buckets() && (store_.count(bucket) == 0 || store_.z_upper(bucket) < from)) ++bucket;
+    return bucket;
+  };
+  std::size_t first = first_reaching(z);
+  if (estimator_ != nullptr && first < store_.buckets()) {
+    // A radius depends on the counting cells above and below the sample's own.
+    const std::int64_t low = store_.z_lower(first);
+    const std::int64_t cell = low / counting_height_ - (low % counting_height_ < 0 ? 1 : 0);
+    first = first_reaching((cell - 1) * counting_height_);
+  }
+  pushed_ = announced_ = ready_ = first_ = first;
 }
 
 void SampleFeed::prepare(std::int64_t z_limit, const OnReady& on_ready) {

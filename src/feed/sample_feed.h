@@ -44,6 +44,10 @@ class SampleFeed {
   SampleFeed(SlabStore& store, const Lattice& lattice, const FeedSettings& settings, const RadiiSettings& radii,
              bool given_radii);
 
+  /// Leaves out what lies below, before anything else is asked for: buckets with a sample at or above z get the radii,
+  /// and so come in the batches, of a feed that begins at the bottom; buckets below may have other radii.
+  void begin_at(std::int64_t z);
+
   /// Called for every bucket in ascending order once its radii are known.
   using OnReady = std::function<void(const ActiveBucket&)>;
   /// Makes sure the radii of all samples with z < limit are known.
@@ -74,6 +78,7 @@ class SampleFeed {
   SlabStore& store_;
   Lattice lattice_;
   FeedSettings settings_;
+  std::int64_t counting_height_;                ///< of the coarsest counting cells, steps
   std::unique_ptr<RadiusEstimator> estimator_;  ///< null when the input gave radii
   float support_limit_;
   float radius_limit_;

@@ -98,7 +98,7 @@ std::vector<PointInput> read_scan_list(const InputFile& list, const std::string&
     }
     std::array<double, 7> numbers{};
     std::copy(values.begin(), values.end(), numbers.begin());
-    scans.push_back({(folder / fs::path(words[1])).string(), true, pose_of(numbers, place)});
+    scans.push_back({(folder / fs::path(words[1])).string(), true, pose_of(numbers, place), true});
   }
   if (scans.empty()) refuse(path, "names no scans; bmesh lines expected");
   return scans;

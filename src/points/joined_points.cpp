@@ -48,6 +48,7 @@ class JoinedPoints final : public PointSource {
     info_.count = 0;
     info_.attributes.clear();
     info_.remarks.clear();
+    info_.scans.clear();
     for (auto& source : sources) add(std::move(source));
     if (sources.size() > 1) info_.path = fmt::format("{} and {} more", info_.path, sources.size() - 1);
     for (const Part& part : parts_) {
@@ -110,6 +111,12 @@ class JoinedPoints final : public PointSource {
     }
     const std::uint64_t first = info_.count;
     info_.count += from.count;
+    std::vector<ScanPart> scans = from.scans;
+    if (scans.empty()) scans.resize(1);
+    for (ScanPart& scan : scans) {
+      scan.first += first;
+      info_.scans.push_back(scan);
+    }
     parts_.push_back({first, std::move(source), {}});
   }
 

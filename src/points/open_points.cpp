@@ -45,7 +45,7 @@ std::unique_ptr<PointSource> open_points(const std::vector<std::string>& names, 
   std::vector<std::unique_ptr<PointSource>> sources;
   for (const PointInput& input : expand_inputs(names)) {
     std::unique_ptr<PointSource> source = open_points(input.path, settings);
-    if (input.posed) source = pose_points(std::move(source), input.pose);
+    if (input.posed) source = pose_points(std::move(source), input.pose, input.seen_along_z);
     sources.push_back(std::move(source));
   }
   return join_points(std::move(sources));

@@ -39,6 +39,13 @@ PoseTransform::PoseTransform(const Pose& pose, const std::string& name) : pose_(
   radius_ = std::cbrt(std::abs(volume));
 }
 
+std::array<double, 3> PoseTransform::moved(const std::array<double, 3>& p, bool direction) const {
+  std::array<double, 3> q{};
+  for (std::size_t r = 0; r < 3; ++r)
+    q[r] = pose_[r][0] * p[0] + pose_[r][1] * p[1] + pose_[r][2] * p[2] + (direction ? 0 : pose_[r][3]);
+  return q;
+}
+
 void PoseTransform::apply(SampleBatch& batch, std::size_t begin, std::size_t end) const {
   for (std::size_t i = begin; i < end; ++i) {
     const double x = batch.x[i];
@@ -65,10 +72,18 @@ namespace {
 
 class PosedPoints final : public PointSource {
  public:
-  PosedPoints(std::unique_ptr<PointSource> source, const Pose& pose)
+  PosedPoints(std::unique_ptr<PointSource> source, const Pose& pose, bool seen_along_z)
       : source_(std::move(source)), transform_(pose, source_->info().path) {
     info_ = source_->info();
     info_.double_precision = true;
+    if (info_.scans.empty()) info_.scans.resize(1);
+    for (ScanPart& scan : info_.scans) {
+      if (scan.scanner == ScanPart::Scanner::unknown) {
+        scan.scanner = seen_along_z ? ScanPart::Scanner::direction : ScanPart::Scanner::pose_origin;
+        scan.at = {0, 0, seen_along_z ? 1.0 : 0.0};
+      }
+      scan.at = transform_.moved(scan.at, scan.scanner == ScanPart::Scanner::direction);
+    }
   }
 
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
@@ -83,8 +98,8 @@ class PosedPoints final : public PointSource {
 
 }  // namespace
 
-std::unique_ptr<PointSource> pose_points(std::unique_ptr<PointSource> source, const Pose& pose) {
-  return std::make_unique<PosedPoints>(std::move(source), pose);
+std::unique_ptr<PointSource> pose_points(std::unique_ptr<PointSource> source, const Pose& pose, bool seen_along_z) {
+  return std::make_unique<PosedPoints>(std::move(source), pose, seen_along_z);
 }
 
 }  // namespace lamina

@@ -1,5 +1,6 @@
 // Points moved into a pose.
 #pragma once
+#include <array>
 #include <cstddef>
 #include <string>
 
@@ -13,6 +14,8 @@ class PoseTransform {
   PoseTransform(const Pose& pose, const std::string& name);
   /// Moves rows [begin, end) of the batch.
   void apply(SampleBatch& batch, std::size_t begin, std::size_t end) const;
+  /// A point, or a direction, which stays where it is.
+  [[nodiscard]] std::array<double, 3> moved(const std::array<double, 3>& p, bool direction) const;
 
  private:
   Pose pose_;

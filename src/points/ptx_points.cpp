@@ -147,6 +147,8 @@ class PtxPoints final : public PointSource {
         }
         if (!is_missing(line)) scan.rows.add(lines);
       }
+      if (scan.rows.count() > 0)
+        info_.scans.push_back({info_.count, ScanPart::Scanner::position, {pose[0][3], pose[1][3], pose[2][3]}});
       info_.count += scan.rows.count();
       if (scan.rows.count() > 0) scans_.push_back(std::move(scan));
     }

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "lamina/error.h"
 #include "slab_store/store_impl.h"
 
 namespace lamina {
@@ -65,6 +64,7 @@ std::size_t SlabStore::files() const {
 
 void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
   const auto& blocks = impl_->buckets[bucket].blocks;
+  const auto& checksums = impl_->buckets[bucket].checksums;
   const auto& keep = impl_->buckets[bucket].keep;
   const auto& columns = impl_->columns;
   const TempFile& file = impl_->file_of(bucket);
@@ -76,13 +76,9 @@ void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       bytes.resize(blocks[i].bytes);
       file.read(blocks[i].offset, bytes);
-      if (!decode_block(columns, bytes, blocks[i].count, out, first[i])) {
-        throw Error(
-            ExitCode::budget,
-            fmt::format("the temporary file in '{}' is damaged at byte {} (samples of bucket {}); check the disk "
-                        "or choose another with --tmp-dir",
-                        file.directory(), blocks[i].offset, bucket));
-      }
+      const bool whole = checksums.empty() || block_checksum(bytes) == checksums[i];
+      if (!whole || !decode_block(columns, bytes, blocks[i].count, out, first[i]))
+        file.report_damage(blocks[i].offset, fmt::format("samples of bucket {}", bucket));
     }
   });
   if (!keep.empty()) compact(out, keep);
@@ -129,6 +125,7 @@ void SlabStore::will_read(std::size_t bucket) const {
 }
 
 void SlabStore::release_before(std::size_t bucket) {
+  if (!impl_->directory.empty()) return;
   while (impl_->released < impl_->files.size()) {
     const std::size_t end =
         ((impl_->released + 1) * impl_->buckets.size() + impl_->files.size() - 1) / impl_->files.size();

@@ -59,7 +59,8 @@ void find_z_range(const SampleColumns& columns, Piece& piece) {
 struct SlabStoreWriter::Impl {
   Impl(const StoreLayout& layout, const StoreSettings& s)
       : settings(s),
-        store(new SlabStore::Impl{SampleColumns(layout), layout, make_files(s), std::vector<BucketIndex>(s.buckets)}),
+        store(new SlabStore::Impl{SampleColumns(layout), layout, make_files(s), std::vector<BucketIndex>(s.buckets), 0,
+                                  0, s.keep ? s.directory : std::string()}),
         buffers(store->columns, s.buckets, s.buffer_bytes - s.buffer_bytes / 4),
         block_rows(block_rows_for(s.buffer_bytes / 4 / (store->columns.row_bytes() + sizeof(std::uint32_t)))) {}
 
@@ -70,7 +71,9 @@ struct SlabStoreWriter::Impl {
   [[nodiscard]] static std::vector<TempFile> make_files(const StoreSettings& s) {
     std::vector<TempFile> files;
     const std::size_t n = std::clamp<std::size_t>(s.buckets / kBucketsPerFile, 1, kFiles);
-    while (files.size() < n) files.emplace_back(s.directory);
+    while (files.size() < n) {
+      s.keep ? files.emplace_back(s.directory, store_file_name(files.size())) : files.emplace_back(s.directory);
+    }
     return files;
   }
   void pack(const LocalSamples& samples);
@@ -162,6 +165,7 @@ void SlabStoreWriter::Impl::flush(std::span<const std::size_t> which) {
   };
   const auto write = [&](Piece* piece) {
     BucketIndex& index = store->buckets[piece->bucket];
+    if (settings.keep) index.checksums.push_back(block_checksum({piece->block.get(), piece->bytes}));
     const std::uint64_t offset = store->file_of(piece->bucket).append({piece->block.get(), piece->bytes}, disk);
     index.blocks.push_back(
         {offset, static_cast<std::uint32_t>(piece->bytes), static_cast<std::uint32_t>(piece->count)});

@@ -2,6 +2,8 @@
 #pragma once
 #include <cstdint>
 #include <limits>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "slab_store/block_codec.h"
@@ -11,12 +13,18 @@
 namespace lamina {
 
 struct BucketIndex {
-  std::vector<BlockEntry> blocks;  ///< in the order of append()
+  std::vector<BlockEntry> blocks;        ///< in the order of append()
+  std::vector<std::uint32_t> checksums;  ///< of the blocks, where the store is kept
   std::uint64_t count = 0;
   std::vector<bool> keep{};  ///< of the samples in the blocks, which stay; empty: all
   std::int32_t z_lower = std::numeric_limits<std::int32_t>::max();
   std::int32_t z_upper = std::numeric_limits<std::int32_t>::min();
 };
+
+/// CRC-32 of a block as it lies in the file.
+std::uint32_t block_checksum(std::span<const std::byte> block);
+/// Name of a kept store's file.
+std::string store_file_name(std::size_t file);
 
 struct SlabStore::Impl {
   SampleColumns columns;
@@ -25,6 +33,7 @@ struct SlabStore::Impl {
   std::vector<BucketIndex> buckets;
   std::uint64_t total = 0;
   std::size_t released = 0;  ///< files before this one are gone
+  std::string directory;     ///< where the store is kept; empty: it is not
 
   [[nodiscard]] TempFile& file_of(std::size_t bucket) { return files[bucket * files.size() / buckets.size()]; }
 };

@@ -25,6 +25,38 @@ std::uint64_t file_bytes(int descriptor) {
 TempFile::TempFile(std::string directory)
     : directory_(directory.empty() ? "." : std::move(directory)), file_(open_unlinked(directory_)) {}
 
+TempFile::TempFile(std::string directory, std::string name, Descriptor file)
+    : directory_(std::move(directory)), name_(std::move(name)), file_(std::move(file)) {}
+
+TempFile::TempFile(std::string directory, std::string name)
+    : TempFile(std::move(directory), std::move(name), Descriptor()) {
+  const std::string path = directory_ + "/" + name_;
+  file_ = Descriptor(::open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
+  if (!file_) throw Error(ExitCode::budget, fmt::format("{}: cannot be written: {}", path, system_message(errno)));
+}
+
+TempFile TempFile::open(std::string directory, std::string name) {
+  const std::string path = directory + "/" + name;
+  Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (!file) {
+    throw Error(ExitCode::unreadable,
+                fmt::format("{}: cannot be read: {}; make the store again", path, system_message(errno)));
+  }
+  TempFile out(std::move(directory), std::move(name), std::move(file));
+  out.written_ = file_bytes(out.file_.get());
+  return out;
+}
+
+void TempFile::report_damage(std::uint64_t offset, const std::string& what) const {
+  if (kept()) {
+    throw Error(ExitCode::unreadable, fmt::format("{}/{}: is damaged at byte {} ({}); make the store again", directory_,
+                                                  name_, offset, what));
+  }
+  throw Error(ExitCode::budget, fmt::format("the temporary file in '{}' is damaged at byte {} ({}); check the disk "
+                                            "or choose another with --tmp-dir",
+                                            directory_, offset, what));
+}
+
 void TempFile::will_read(std::uint64_t offset, std::uint64_t bytes) const {
   if (bytes > 0)
     ::posix_fadvise(file_.get(), static_cast<off_t>(offset), static_cast<off_t>(bytes), POSIX_FADV_WILLNEED);
@@ -59,6 +91,10 @@ void TempFile::flush(BackgroundWriter& writer) {
 
 void TempFile::check(int error) const {
   if (error == 0) return;
+  if (kept()) {
+    throw Error(ExitCode::budget, fmt::format("{}/{}: cannot grow beyond {} bytes: {}; free space there", directory_,
+                                              name_, file_bytes(file_.get()), system_message(error)));
+  }
   throw Error(ExitCode::budget,
               fmt::format("the temporary file in '{}' cannot grow beyond {} bytes: {}; free space there or choose "
                           "another with --tmp-dir",
@@ -70,6 +106,7 @@ void TempFile::read(std::uint64_t offset, std::span<std::byte> bytes) const {
     const ssize_t got = ::pread(file_.get(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
     if (got < 0 && errno == EINTR) continue;
     if (got <= 0) {
+      if (kept()) report_damage(offset, got < 0 ? system_message(errno) : "it ends there");
       throw Error(
           ExitCode::budget,
           fmt::format("the temporary file in '{}' cannot be read back at byte {}: {}; choose another with --tmp-dir",

@@ -1,4 +1,4 @@
-// A temporary file without a name: gone when it is closed, however the program ends.
+// A file of a store: temporary and without a name, gone when it is closed, however the program ends; or named and kept.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -16,6 +16,10 @@ class TempFile {
 
   /// Throws Error(budget) naming the directory when no file can be made in it.
   explicit TempFile(std::string directory);
+  /// A file that stays, made anew. Throws as above.
+  TempFile(std::string directory, std::string name);
+  /// One that stayed, for reading. Throws Error(unreadable) naming it where it is not there.
+  static TempFile open(std::string directory, std::string name);
 
   /// Adds bytes at the end and returns their offset. They are written in large pieces at whole pages: small writes cost
   /// the kernel twice the work, by `writer` (buffers of kBufferBytes) and later. Throws Error(budget) naming the
@@ -33,10 +37,14 @@ class TempFile {
   /// Gives the disk space back; nothing can be appended or read any more.
   void discard();
   [[nodiscard]] std::uint64_t size() const { return written_ + held_bytes_; }
-  [[nodiscard]] const std::string& directory() const { return directory_; }
+  /// Throws that bytes at `offset` are not what was written; `what`: they hold.
+  [[noreturn]] void report_damage(std::uint64_t offset, const std::string& what) const;
+  [[nodiscard]] bool kept() const { return !name_.empty(); }
 
  private:
-  std::string directory_;
+  TempFile(std::string directory, std::string name, Descriptor file);
+
+  std::string directory_, name_;  ///< no name: temporary
   Descriptor file_;
   std::uint64_t written_ = 0;
   BackgroundWriter::Buffer held_;

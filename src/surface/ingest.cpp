@@ -153,13 +153,14 @@ void widen(Extent& b, const Extent& by) {
   b.z_max = std::max(b.z_max, by.z_max);
 }
 
-StoreSettings store_settings(const Survey& survey, const Frame& frame, const std::string& directory) {
+StoreSettings store_settings(const Survey& survey, const Frame& frame, const StorePlace& place) {
   // The rotated bounding box bounds the samples' z.
   const Eigen::Vector3d half = 0.5 * (survey.high - survey.low) / frame.step;
   constexpr double kMargin = 1.0625;  // where only a part of the samples has been seen, others lie a little outside
   const double reach = kMargin * frame.rotation.row(2).cwiseAbs().dot(half.transpose()) + 1;
   StoreSettings s;
-  s.directory = directory;
+  s.directory = place.directory;
+  s.keep = place.keep;
   s.z_min = static_cast<std::int32_t>(-std::ceil(reach));
   const std::uint64_t wanted = std::clamp<std::uint64_t>(survey.usable / kBucketSamples, 1, kMaxBuckets);
   s.bucket_height = static_cast<std::int32_t>(std::ceil(2 * reach / static_cast<double>(wanted))) + 1;
@@ -170,9 +171,9 @@ StoreSettings store_settings(const Survey& survey, const Frame& frame, const std
 }  // namespace
 
 Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, double radius_scale,
-                const std::string& directory, const RunContext& run, const RowPick& pick) {
+                const StorePlace& place, const RunContext& run, const RowPick& pick) {
   const PointSourceInfo& info = source.info();
-  const StoreSettings buckets = store_settings(survey, frame, directory);
+  const StoreSettings buckets = store_settings(survey, frame, place);
   SlabStoreWriter writer({info.has_radius, info.has_quality, info.attributes}, buckets);
   Extent extent = kNothing;
   Census census;

@@ -1,6 +1,8 @@
 // From the input's samples to the slab store: validated, rotated, fixed-point, bucketed along the sweep axis.
 #pragma once
 #include <optional>
+#include <string>
+#include <utility>
 
 #include "lamina/frame.h"
 #include "lamina/points.h"
@@ -24,9 +26,16 @@ struct Ingested {
   bool complete = true;  ///< false: a sample lies too far outside the box surveyed, and reading stopped there
 };
 
+/// Where a store's files go, and whether they have names and stay (StoreSettings::keep).
+struct StorePlace {
+  std::string directory;
+  bool keep = false;
+  StorePlace(std::string in, bool stays = false) : directory(std::move(in)), keep(stays) {}
+};
+
 /// Reads the whole input into the store; samples with a defect are left out. After a survey of all rows the result is
 /// always complete; after one of a part it need not be.
 Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, double radius_scale,
-                const std::string& directory, const RunContext& run, const RowPick& pick = {});
+                const StorePlace& place, const RunContext& run, const RowPick& pick = {});
 
 }  // namespace lamina

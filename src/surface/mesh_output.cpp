@@ -8,8 +8,8 @@
 
 namespace lamina {
 
-MeshOutput::MeshOutput(const ClusterSettings& settings, float chord, const Frame& frame, MeshSink& sink, Pruner* pruner)
-    : chord_(chord), frame_(frame), sink_(sink), pruner_(pruner), clusterer_(settings) {}
+MeshOutput::MeshOutput(const ClusterSettings& settings, float chord, const Frame& frame, SlabSink& sink)
+    : chord_(chord), frame_(frame), sink_(sink), clusterer_(settings) {}
 
 MeshOutput::~MeshOutput() {
   tasks_.cancel();
@@ -31,6 +31,11 @@ void MeshOutput::start() {
     return;
   }
   tasks_.run([this, slabs = std::exchange(queued_, {})] { work(slabs, false); });
+}
+
+void MeshOutput::wait() {
+  tasks_.wait();
+  work(std::exchange(queued_, {}), false);
 }
 
 void MeshOutput::finish() {
@@ -55,12 +60,7 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
   while (clusterer_.pop(done_)) {
     const IsoSlab* next = clustered_.size() > 1 ? clustered_[1].get() : nullptr;
     place_vertices(done_, *clustered_.front(), next, frame_, chord_, vertices_);
-    if (pruner_ != nullptr) {
-      pruner_->add(vertices_, done_.triangles);
-    } else {
-      sink_.append_vertices(vertices_);
-      sink_.append_triangles(done_.triangles);
-    }
+    sink_.write(done_, vertices_);
     triangles_ += done_.triangles.size();
     if (clustered_.front().use_count() == 1) {
       const std::lock_guard lock(mutex_);
@@ -68,7 +68,6 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
     }
     clustered_.pop_front();
   }
-  if (last && pruner_ != nullptr) pruner_->finish();
 }
 
 }  // namespace lamina

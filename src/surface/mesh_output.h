@@ -13,18 +13,40 @@
 #include "lamina/frame.h"
 #include "lamina/iso_mesh.h"
 #include "lamina/mesh_sink.h"
-#include "surface/pruner.h"
 
 namespace lamina {
+
+/// Where finished slabs go, in ascending order, by one thread at a time.
+class SlabSink {
+ public:
+  SlabSink() = default;
+  virtual ~SlabSink() = default;
+  SlabSink(const SlabSink&) = delete;
+  SlabSink& operator=(const SlabSink&) = delete;
+  /// `vertices` are those of `slab`; its triangles name them, and those of the slab before, by numbers from the first
+  /// vertex written on.
+  virtual void write(const FinalSlab& slab, const VertexBatch& vertices) = 0;
+};
+
+/// One mesh file.
+class MeshFileSlabs : public SlabSink {
+ public:
+  explicit MeshFileSlabs(MeshSink& sink) : sink_(sink) {}
+  void write(const FinalSlab& slab, const VertexBatch& vertices) override {
+    sink_.append_vertices(vertices);
+    sink_.append_triangles(slab.triangles);
+  }
+
+ private:
+  MeshSink& sink_;
+};
 
 /// Slabs go in by ascending number; what comes out does not depend on when. With one thread everything happens inside
 /// start().
 class MeshOutput {
  public:
-  /// `chord`: SurfaceSettings::chord. The sink is the caller's; nobody else may append to it. With a pruner everything
-  /// goes through it.
-  MeshOutput(const ClusterSettings& settings, float chord, const Frame& frame, MeshSink& sink,
-             Pruner* pruner = nullptr);
+  /// `chord`: SurfaceSettings::chord. The sink is the caller's; nobody else may write to it.
+  MeshOutput(const ClusterSettings& settings, float chord, const Frame& frame, SlabSink& sink);
   /// Drops what is not written yet.
   ~MeshOutput();
   MeshOutput(const MeshOutput&) = delete;
@@ -34,6 +56,8 @@ class MeshOutput {
   void push(std::shared_ptr<IsoSlab> slab);
   /// Waits for what was started before, then starts on the slabs handed over since. Throws what the sink threw.
   void start();
+  /// Works off the slabs handed over since and waits: all that they decide is in the sink when this returns.
+  void wait();
   /// Everything is in the sink when this returns: no more slabs come.
   void finish();
   /// An empty slab, with the storage of one that was written where there is any.
@@ -48,8 +72,7 @@ class MeshOutput {
 
   float chord_;
   const Frame& frame_;
-  MeshSink& sink_;
-  Pruner* pruner_;
+  SlabSink& sink_;
   Clusterer clusterer_;
   std::vector<std::shared_ptr<IsoSlab>> queued_;
   std::deque<std::shared_ptr<IsoSlab>> clustered_;  ///< by the clusterer, not yet written

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "diffuse/diffuse.h"
 #include "lamina/error.h"
@@ -11,9 +12,6 @@
 
 namespace lamina {
 namespace {
-
-/// Slabs a cell can be touched from: three cells of the coarsest level, each a slab high.
-constexpr std::int32_t kReachSlabs = 3;
 
 /// Samples whose support is more than so many of their cells leave gaps of several cells between them.
 constexpr float kSparse = 1.6F;
@@ -29,7 +27,8 @@ ProjectSettings project_settings(const SurfaceSettings& s) {
 }  // namespace
 
 Pipeline::Pipeline(const SurfaceSettings& settings, const Resolved& resolved, const Frame& frame, const Extent& extent,
-                   SampleFeed& feed, std::size_t attributes, MeshSink& sink, SurfaceVolume* volume, Pruner* pruner)
+                   SampleFeed& feed, std::size_t attributes, SlabSink& sink, const SlabSpan& span,
+                   SurfaceVolume* volume)
     : settings_(settings),
       resolved_(resolved),
       feed_(feed),
@@ -37,18 +36,26 @@ Pipeline::Pipeline(const SurfaceSettings& settings, const Resolved& resolved, co
       kernel_(select_kernel()),
       window_(resolved.lattice, static_cast<int>(attributes), extent),
       projector_(project_settings(settings), kernel_),
-      output_(ClusterSettings{settings.cluster}, static_cast<float>(settings.chord), frame, sink, pruner),
-      first_(resolved.lattice.slab_of(extent.z_min) - kReachSlabs),
-      last_(resolved.lattice.slab_of(extent.z_max) + kReachSlabs),
-      refined_(first_),
-      placed_(first_),
-      projected_(first_),
-      finished_(first_),
-      numbered_(first_),
-      triangulated_(first_),
-      held_(first_),
-      covered_(first_),
-      leaf_cells_(static_cast<std::size_t>(resolved.lattice.levels), 0) {}
+      output_(ClusterSettings{settings.cluster}, static_cast<float>(settings.chord), frame, sink),
+      all_(all_slabs(resolved.lattice, extent)),
+      stages_(stage_spans(span, all_, settings.diffuse)),
+      refined_(stages_.refined.begin),
+      placed_(stages_.placed.begin),
+      projected_(stages_.projected.begin),
+      finished_(stages_.finished.begin),
+      numbered_(stages_.numbered.begin),
+      triangulated_(stages_.triangulated.begin),
+      held_(stages_.triangulated.begin),
+      covered_(stages_.refined.begin),
+      leaf_cells_(static_cast<std::size_t>(resolved.lattice.levels), 0) {
+  const Lattice& lattice = resolved.lattice;
+  const double ahead = static_cast<double>(feed_.support_limit()) + static_cast<double>(projector_.margin(lattice));
+  if (span.begin > all_.begin) {
+    feed_.begin_at(std::min(std::int64_t{stages_.marked.begin} * lattice.slab_height(),
+                            std::int64_t{stages_.projected.begin} * lattice.slab_height() -
+                                static_cast<std::int64_t>(std::ceil(ahead)) - 1));
+  }
+}
 
 void Pipeline::mark(const ActiveBucket& bucket) {
   constexpr std::size_t kPiece = 4096;
@@ -70,7 +77,7 @@ void Pipeline::mark(const ActiveBucket& bucket) {
 }
 
 void Pipeline::refine_to(std::int32_t slab) {
-  for (; refined_ <= std::min(slab, last_); ++refined_) {
+  for (; refined_ < std::min(slab + 1, stages_.refined.end); ++refined_) {
     refine_slab(window_, refined_);
     for (int level = 0; level < window_.levels(); ++level) {
       leaf_cells_[static_cast<std::size_t>(level)] += count_cells(window_, level, refined_);
@@ -80,20 +87,20 @@ void Pipeline::refine_to(std::int32_t slab) {
 }
 
 void Pipeline::project_to(std::int32_t slab) {
-  for (; projected_ <= std::min(slab, last_); ++projected_) {
+  for (; projected_ < std::min(slab + 1, stages_.projected.end); ++projected_) {
     projector_.project(window_, projected_, feed_);
     if (settings_.diffuse) diffuse_slab(window_, projected_);
   }
 }
 
 void Pipeline::finish_to(std::int32_t slab) {
-  for (; finished_ <= std::min(slab, last_); ++finished_) {
+  for (; finished_ < std::min(slab + 1, stages_.finished.end); ++finished_) {
     finish_slab(window_, finished_, kernel_, static_cast<float>(settings_.boundary));
   }
 }
 
 void Pipeline::number_to(std::int32_t slab, Stopwatch& watch) {
-  for (; numbered_ <= std::min(slab, last_); ++numbered_) {
+  for (; numbered_ < std::min(slab + 1, stages_.numbered.end); ++numbered_) {
     IsoSlab* below = iso_.empty() ? nullptr : iso_.back().get();
     std::shared_ptr<IsoSlab> here = output_.spare();
     number_edges(window_, numbered_, below, *here);
@@ -101,13 +108,13 @@ void Pipeline::number_to(std::int32_t slab, Stopwatch& watch) {
     if (volume_ != nullptr) watch.time("volume", [&] { volume_->add(window_, *here, numbered_); });
     iso_.push_back(std::move(here));
     // Corners of the next slab are extended from this one's values, but no farther back.
-    if (numbered_ > first_) window_.retire_values(numbered_ - 1);
+    if (numbered_ > all_.begin) window_.retire_values(numbered_ - 1);
   }
 }
 
 void Pipeline::triangulate_to(std::int32_t slab) {
   IsoSlab nothing;
-  for (; triangulated_ <= std::min(slab, last_); ++triangulated_) {
+  for (; triangulated_ < std::min(slab + 1, stages_.triangulated.end); ++triangulated_) {
     const auto at = static_cast<std::size_t>(triangulated_ - held_);
     IsoSlab& here = *iso_[at];
     triangulate(window_, triangulated_, here, at + 1 < iso_.size() ? *iso_[at + 1] : nothing, extracted_);
@@ -115,7 +122,8 @@ void Pipeline::triangulate_to(std::int32_t slab) {
     isotriangles_ += here.triangles.size();
     if (at > 0) hand_over();
   }
-  if (triangulated_ > last_ && !iso_.empty()) hand_over();
+  // The last one: nothing above it, or nothing that the slabs asked for still depend on.
+  if (triangulated_ == stages_.triangulated.end && !iso_.empty()) hand_over();
 }
 
 void Pipeline::hand_over() {
@@ -136,10 +144,12 @@ void Pipeline::run(const RunContext& run, Stopwatch& watch) {
   const Lattice& lattice = resolved_.lattice;
   const std::int64_t height = lattice.slab_height();
   const double ahead = static_cast<double>(feed_.support_limit()) + static_cast<double>(projector_.margin(lattice));
-  for (std::int32_t step = first_; step <= last_; step += settings_.window) {
-    const std::int32_t top = std::min(step + settings_.window - 1, last_);  // slabs to triangulate in this step
-    const std::int64_t marked = (std::int64_t{top} + 3 + kReachSlabs + 1) * height;
-    const std::int64_t needed = (std::int64_t{top} + 3 + 1) * height + static_cast<std::int64_t>(ahead) + 1;
+  const auto [first, end] = stages_.triangulated;
+  for (std::int32_t step = first; step < end; step += settings_.window) {
+    const std::int32_t top = std::min(step + settings_.window, end) - 1;  // slabs to triangulate in this step
+    const std::int64_t above = std::min(top + 3, stages_.projected.end - 1) + 1;
+    const std::int64_t marked = (above + kReachSlabs) * height;
+    const std::int64_t needed = above * height + static_cast<std::int64_t>(ahead) + 1;
     watch.time("radii", [&] {
       feed_.prepare(std::max(marked, needed), [&](const ActiveBucket& b) { watch.time("mark", [&] { mark(b); }); });
     });
@@ -152,10 +162,10 @@ void Pipeline::run(const RunContext& run, Stopwatch& watch) {
     note_disk();
     retire();
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
-    if (run.progress)
-      run.progress({"surface", feed_.released(), resolved_.plan.samples, top - first_ + 1, last_ - first_ + 1});
+    if (run.progress) run.progress({"surface", feed_.released(), resolved_.plan.samples, top - first + 1, end - first});
   }
-  watch.time("cluster and write", [&] { output_.finish(); });
+  const bool complete = end == all_.end;  // else slabs follow that are not asked for
+  watch.time("cluster and write", [&] { complete ? output_.finish() : output_.wait(); });
   note_disk();
 }
 
@@ -169,7 +179,7 @@ void Pipeline::report(SurfaceStats& stats) const {
   stats.corners_seen = projector_.counts().seen;
   stats.corners_good = projector_.counts().good;
   stats.corners_torn = projector_.counts().torn;
-  stats.torn_slab = projector_.counts().torn_slab - first_;
+  stats.torn_slab = projector_.counts().torn_slab - all_.begin;
   stats.torn_share = projector_.counts().torn_share;
   stats.isovertices = isovertices_;
   stats.isotriangles = isotriangles_;

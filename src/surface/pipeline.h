@@ -6,10 +6,10 @@
 
 #include "extract/extract.h"
 #include "feed/sample_feed.h"
-#include "lamina/mesh_sink.h"
 #include "project/project.h"
 #include "surface/mesh_output.h"
 #include "surface/plan.h"
+#include "surface/slab_span.h"
 #include "surface/stopwatch.h"
 #include "volume/surface_volume.h"
 #include "window/window.h"
@@ -19,9 +19,11 @@ namespace lamina {
 /// Refine, project, finish, number, triangulate, cluster, write: run() takes the slabs through all of them.
 class Pipeline {
  public:
+  /// The sink gets the finished slabs of `span`, and a few below it whose vertices but for the last of these slabs are
+  /// not those of a sweep through all. With a volume the span is all_slabs().
   Pipeline(const SurfaceSettings& settings, const Resolved& resolved, const Frame& frame, const Extent& extent,
-           SampleFeed& feed, std::size_t attributes, MeshSink& sink, SurfaceVolume* volume = nullptr,
-           Pruner* pruner = nullptr);
+           SampleFeed& feed, std::size_t attributes, SlabSink& sink, const SlabSpan& span,
+           SurfaceVolume* volume = nullptr);
   void run(const RunContext& run, Stopwatch& watch);
   void report(SurfaceStats& stats) const;
 
@@ -44,7 +46,8 @@ class Pipeline {
   Window window_;
   Projector projector_;
   MeshOutput output_;
-  std::int32_t first_, last_;  ///< slabs that can hold surface
+  SlabSpan all_;       ///< slabs that can hold surface
+  StageSpans stages_;  ///< slabs each stage has to do
 
   // Next slab of each stage.
   std::int32_t refined_, placed_, projected_, finished_, numbered_, triangulated_;

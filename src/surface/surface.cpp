@@ -17,14 +17,17 @@
 #include "lamina/error.h"
 #include "lamina/mesh_sink.h"
 #include "lamina/points.h"
+#include "surface/choose_normals.h"
 #include "surface/clean_ingested.h"
 #include "surface/ingest.h"
+#include "surface/kept_input.h"
 #include "surface/local_shift.h"
 #include "surface/pipeline.h"
 #include "surface/plan.h"
 #include "surface/pruner.h"
 #include "surface/stopwatch.h"
 #include "surface/survey.h"
+#include "surface/sweep.h"
 #include "volume/surface_volume.h"
 
 namespace lamina {
@@ -54,49 +57,6 @@ void warn_of_contradictions(const SurfaceStats& stats, const std::string& input,
                   input, 100 * share, 100 * stats.torn_share, stats.torn_slab));
 }
 
-/// Next to the output unless told otherwise; the system's temporary folder for standard output, pipes and devices.
-std::string temporary_directory(const SurfaceSettings& settings, const RunContext& run) {
-  if (!run.tmp_dir.empty()) return run.tmp_dir;
-  std::error_code ignored;
-  const auto kind = std::filesystem::status(settings.output, ignored).type();
-  const bool beside = kind == std::filesystem::file_type::regular || kind == std::filesystem::file_type::not_found;
-  if (settings.output.empty() || settings.output == "-" || !beside) return system_tmp_dir();
-  const std::string parent = std::filesystem::path(settings.output).parent_path().string();
-  return parent.empty() ? "." : parent;
-}
-
-std::vector<std::string> input_names(const SurfaceSettings& settings) {
-  std::vector<std::string> names{settings.input};
-  names.insert(names.end(), settings.more_inputs.begin(), settings.more_inputs.end());
-  return names;
-}
-
-/// Volume tools like a lattice aligned with the input's axes.
-FrameMode frame_mode(const SurfaceSettings& settings) {
-  return settings.frame.value_or(settings.volume.wanted() ? FrameMode::axis : FrameMode::pca);
-}
-
-/// A mesh in the place of its points would cost the user the scan.
-void require_two_files(const SurfaceSettings& settings) {
-  std::error_code ignored;
-  const std::vector<PointInput> inputs = expand_inputs(input_names(settings));
-  const auto is_input = [&](const std::string& name) {
-    return std::filesystem::is_regular_file(name, ignored) &&
-           std::any_of(inputs.begin(), inputs.end(),
-                       [&](const PointInput& input) { return std::filesystem::equivalent(input.path, name, ignored); });
-  };
-  for (const std::string& grids : {settings.volume.path, settings.volume.points}) {
-    if (grids.empty()) continue;
-    if (grids == settings.output || is_input(grids))
-      throw Error(ExitCode::usage, fmt::format("{}: is named twice; give the grids a file of their own", grids));
-  }
-  if (settings.output == "-" || settings.output.empty()) return;
-  if (is_input(settings.output)) {
-    throw Error(ExitCode::usage,
-                fmt::format("{}: is input and output; give the mesh another name with --output", settings.output));
-  }
-}
-
 /// Everything named, as one stream; says what the readers found worth saying.
 std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const std::string& tmp_dir,
                                          const RunContext& run) {
@@ -115,11 +75,10 @@ std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const 
 
 /// Float positions keep a hundredth of a cell as long as the coordinates are below some ten thousand cells;
 /// georeferenced ones are not. Nor can float hold the very large and the very small.
-bool needs_double(const Census& census, const std::array<double, 3>& shift, double finest_cell) {
+bool needs_double(const Census& census, double finest_cell) {
   constexpr double kLargest = 1e37;
   constexpr double kSmallestCell = 1e-35;
-  const Eigen::Vector3d by(shift[0], shift[1], shift[2]);
-  const double largest = std::max((census.low - by).cwiseAbs().maxCoeff(), (census.high - by).cwiseAbs().maxCoeff());
+  const double largest = std::max(census.low.cwiseAbs().maxCoeff(), census.high.cwiseAbs().maxCoeff());
   return largest * 0x1p-24 > 0.01 * finest_cell || largest > kLargest || finest_cell < kSmallestCell;
 }
 
@@ -208,14 +167,14 @@ std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceS
 
 /// Fills the store. A large input is read once, in a frame chosen by a part of its rows; twice where samples lie
 /// outside what these promised.
-Ingested read_input(PointSource& source, const SurfaceSettings& settings, const std::string& tmp, const RunContext& run,
-                    Stopwatch& watch, Frame& frame) {
+Ingested read_input(PointSource& source, const SurfaceSettings& settings, const StorePlace& place,
+                    const RunContext& run, Stopwatch& watch, Frame& frame) {
   require_samples(source.info());
   std::optional<Ingested> ingested;
   const auto fill = [&](const Survey& survey) {
-    frame = choose_frame(survey, frame_mode(settings));
+    frame = choose_frame(survey, chosen_frame(settings));
     watch.time("store", [&] {
-      ingested.emplace(ingest(source, survey, frame, settings.radius_scale, tmp, run, settings.clean.pick));
+      ingested.emplace(ingest(source, survey, frame, settings.radius_scale, place, run, settings.clean.pick));
     });
   };
   std::optional<Survey> survey;
@@ -266,6 +225,162 @@ void clean(Ingested& in, const SurfaceSettings& settings, double step, const std
     run.info(fmt::format("{} of {} samples left: {}", in.store.total(), rows, said));
 }
 
+/// What is left out is not written down with samples that are kept for several runs.
+void require_uncleaned(const SurfaceSettings& settings) {
+  if (settings.clean.looks_around() || !settings.clean.pick.takes_all())
+    throw Error(ExitCode::usage,
+                "samples that are kept for several runs cannot be cleaned as they are read; clean the "
+                "points before, with lamina clean");
+}
+
+}  // namespace
+
+/// Next to the output unless told otherwise; the system's temporary folder for standard output, pipes and devices.
+std::string temporary_directory(const SurfaceSettings& settings, const RunContext& run) {
+  if (!run.tmp_dir.empty()) return run.tmp_dir;
+  std::error_code ignored;
+  const auto kind = std::filesystem::status(settings.output, ignored).type();
+  const bool beside = kind == std::filesystem::file_type::regular || kind == std::filesystem::file_type::not_found;
+  if (settings.output.empty() || settings.output == "-" || !beside) return system_tmp_dir();
+  const std::string parent = std::filesystem::path(settings.output).parent_path().string();
+  return parent.empty() ? "." : parent;
+}
+
+std::vector<std::string> input_names(const SurfaceSettings& settings) {
+  std::vector<std::string> names{settings.input};
+  names.insert(names.end(), settings.more_inputs.begin(), settings.more_inputs.end());
+  return names;
+}
+
+/// A mesh in the place of its points would cost the user the scan.
+void require_two_files(const SurfaceSettings& settings) {
+  std::error_code ignored;
+  const bool kept = settings.more_inputs.empty() && is_kept_input(settings.input);
+  const std::vector<PointInput> inputs = kept ? std::vector<PointInput>{} : expand_inputs(input_names(settings));
+  const auto is_input = [&](const std::string& name) {
+    return std::filesystem::is_regular_file(name, ignored) &&
+           std::any_of(inputs.begin(), inputs.end(),
+                       [&](const PointInput& input) { return std::filesystem::equivalent(input.path, name, ignored); });
+  };
+  for (const std::string& grids : {settings.volume.path, settings.volume.points}) {
+    if (grids.empty()) continue;
+    if (grids == settings.output || is_input(grids))
+      throw Error(ExitCode::usage, fmt::format("{}: is named twice; give the grids a file of their own", grids));
+  }
+  if (settings.output == "-" || settings.output.empty()) return;
+  if (is_input(settings.output)) {
+    throw Error(ExitCode::usage,
+                fmt::format("{}: is input and output; give the mesh another name with --output", settings.output));
+  }
+}
+
+/// Volume tools like a lattice aligned with the input's axes.
+FrameMode chosen_frame(const SurfaceSettings& settings) {
+  return settings.frame.value_or(settings.volume.wanted() ? FrameMode::axis : FrameMode::pca);
+}
+
+SweepInput read_surface_input(const SurfaceSettings& settings, const std::string& directory, bool keep,
+                              const RunContext& run, Stopwatch& watch, SurfaceStats& stats) {
+  const bool kept = settings.more_inputs.empty() && is_kept_input(settings.input);
+  if (keep || kept) require_uncleaned(settings);
+  if (kept && !keep) return open_kept_input(settings.input, settings);
+  const std::string scratch = keep ? temporary_directory(settings, run) : directory;
+  std::unique_ptr<PointSource> source = open_inputs(settings, scratch, run);
+  if (settings.normals != NormalsChoice::file)
+    watch.time("normals", [&] { source = choose_normals(std::move(source), settings, stats.normals, scratch, run); });
+  Frame frame;
+  Ingested ingested = read_input(*source, settings, {directory, keep}, run, watch, frame);
+  clean(ingested, settings, frame.step, scratch, run, watch, source->info().count, stats);
+  return {source->info(), frame, std::move(ingested)};
+}
+
+Resolved plan_surface(const SurfaceSettings& settings, const SweepInput& input, const RunContext& run, Stopwatch& watch,
+                      double elapsed, SurfaceStats& stats) {
+  const PointSourceInfo& info = input.info;
+  const Census& census = input.ingested.census;
+  const auto plan_for = [&](const SurfaceSettings& s) {
+    Resolved r = resolve_plan(s, input.frame, input.ingested.store, input.ingested.extent, info.has_radius,
+                              info.attributes.size());
+    r.plan.memory_bytes += table_bytes(r.lattice, input.ingested);
+    return r;
+  };
+  Resolved resolved;
+  watch.time("plan", [&] { resolved = plan_for(settings); });
+  expect_time(settings, info, resolved, watch, elapsed);
+  stats.plan = resolved.plan;
+  stats.samples_read = info.count;
+  stats.replaced_attributes = census.unusable_attributes;
+  for (int k = 1; k < kDefects; ++k) {
+    if (census.rejected[k] > 0) {
+      stats.rejected.push_back({describe(static_cast<Defect>(k)), census.rejected[k], census.first_row[k]});
+    }
+  }
+  run.info(describe(resolved.plan, settings));
+  constexpr std::uint64_t kLargestTables = std::uint64_t{1} << 30;  // a scan of 380 million samples needs a few MB
+  if (is_out_of_reach(resolved.plan, settings.blend) ||
+      table_bytes(resolved.lattice, input.ingested) > kLargestTables) {
+    throw Error(ExitCode::empty,
+                fmt::format("{}: some of the {} samples lie so far away from the others ({:.3g}, r {:.3g}) that the "
+                            "lattice cannot hold both; remove them",
+                            input_name(settings), resolved.plan.samples,
+                            *std::max_element(resolved.plan.extent.begin(), resolved.plan.extent.end()),
+                            resolved.plan.radius_median));
+  }
+  if (run.max_memory > 0 && resolved.plan.memory_bytes > run.max_memory) {
+    refuse_memory(settings, resolved.plan.levels, resolved.plan.memory_bytes, run.max_memory,
+                  [&](const SurfaceSettings& s) { return plan_for(s).plan.memory_bytes; });
+  }
+  stats.disk_bytes = input.ingested.store.disk_bytes();
+  return resolved;
+}
+
+MeshSinkSettings mesh_layout(const SweepInput& input, const Resolved& resolved) {
+  MeshSinkSettings out;
+  out.attributes = input.info.attributes;
+  out.double_positions = needs_double(input.ingested.census, resolved.plan.finest_cell);
+  return out;
+}
+
+void sweep(const SurfaceSettings& settings, SweepInput& input, const Resolved& resolved, const SlabSpan& span,
+           SlabSink& sink, SurfaceVolume* volume, const RunContext& run, Stopwatch& watch, SurfaceStats& stats) {
+  const PointSourceInfo& info = input.info;
+  SampleFeed feed(input.ingested.store, resolved.lattice, resolved.feed, resolved.radii, info.has_radius);
+  Pipeline pipeline(settings, resolved, input.frame, input.ingested.extent, feed, info.attributes.size(), sink, span,
+                    volume);
+  pipeline.run(run, watch);
+  pipeline.report(stats);
+  warn_of_contradictions(stats, input_name(settings), run);
+  if (feed.counts().undersampled > 0) {
+    stats.rejected.push_back({"radius above --max-radius", feed.counts().undersampled, std::nullopt});
+    run.info(fmt::format("{} of {} samples discarded as undersampled: radius above --max-radius",
+                         feed.counts().undersampled, info.count));
+  }
+}
+
+void finish_stats(const Stopwatch& watch, const Stopwatch::Moment& began, SurfaceStats& stats) {
+  stats.stages = watch.stages();
+  const Stopwatch::Moment ended = Stopwatch::now();
+  stats.wall = ended.wall - began.wall;
+  stats.cpu = ended.cpu - began.cpu;
+  stats.peak_memory = peak_memory();
+}
+
+void no_surface(const std::string& input, std::uint64_t samples) {
+  throw Error(ExitCode::empty,
+              fmt::format("{}: no surface came out of {} samples; they lie too far apart for their radii, or on no "
+                          "surface at all (try --blend or --particlescale above 1)",
+                          input, samples));
+}
+
+void run_in_arena(const RunContext& run, const std::function<void()>& work) {
+  const int threads = run.threads > 0 ? run.threads : tbb::this_task_arena::max_concurrency();
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+  tbb::task_arena arena(threads);
+  arena.execute(work);
+}
+
+namespace {
+
 void report_pruning(const PruneCounts& counts, const std::string& name, SurfaceStats& stats, const RunContext& run) {
   stats.pruned = counts;
   if (counts.kept == 0 && counts.removed > 0) {
@@ -275,6 +390,26 @@ void report_pruning(const PruneCounts& counts, const std::string& name, SurfaceS
   }
   run.info(fmt::format("{} connected parts, {} small ones left out with {} triangles", counts.kept, counts.removed,
                        counts.removed_triangles));
+}
+
+/// On their way to a mesh file, small parts are left out.
+class PrunedSlabs final : public SlabSink {
+ public:
+  explicit PrunedSlabs(Pruner& pruner) : pruner_(pruner) {}
+  void write(const FinalSlab& slab, const VertexBatch& vertices) override { pruner_.add(vertices, slab.triangles); }
+
+ private:
+  Pruner& pruner_;
+};
+
+/// Everything that comes out, from here on, is less the shift.
+void shift_output(SweepInput& input, const SurfaceSettings& settings, SurfaceStats& stats, const RunContext& run) {
+  stats.shift = local_shift(input.ingested.census);
+  input.frame = shifted(input.frame, stats.shift);
+  const Eigen::Vector3d by(stats.shift[0], stats.shift[1], stats.shift[2]);
+  input.ingested.census.low -= by;
+  input.ingested.census.high -= by;
+  if (!settings.dry_run) run.info(fmt::format("coordinates are written less {}", shift_text(stats.shift)));
 }
 
 SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run) {
@@ -290,81 +425,34 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
     const MeshSink trial(out);
   }
 
-  const std::unique_ptr<PointSource> source = open_inputs(settings, tmp, run);
-  const PointSourceInfo& info = source->info();
-  Frame frame;
-  std::optional<Ingested> ingested = read_input(*source, settings, tmp, run, watch, frame);
-  const Census& census = ingested->census;
-  clean(*ingested, settings, frame.step, tmp, run, watch, info.count, stats);
-  if (settings.local) stats.shift = local_shift(census);
-  const Frame written_frame = shifted(frame, stats.shift);
-  const auto plan_for = [&](const SurfaceSettings& s) {
-    Resolved r = resolve_plan(s, frame, ingested->store, ingested->extent, info.has_radius, info.attributes.size());
-    r.plan.memory_bytes += table_bytes(r.lattice, *ingested);
-    return r;
-  };
-  Resolved resolved;
-  watch.time("plan", [&] { resolved = plan_for(settings); });
-  expect_time(settings, info, resolved, watch, Stopwatch::now().wall - began.wall);
-  stats.plan = resolved.plan;
-  stats.samples_read = info.count;
-  stats.replaced_attributes = census.unusable_attributes;
-  for (int k = 1; k < kDefects; ++k) {
-    if (census.rejected[k] > 0) {
-      stats.rejected.push_back({describe(static_cast<Defect>(k)), census.rejected[k], census.first_row[k]});
-    }
-  }
-  run.info(describe(resolved.plan, settings));
-  constexpr std::uint64_t kLargestTables = std::uint64_t{1} << 30;  // a scan of 380 million samples needs a few MB
-  if (is_out_of_reach(resolved.plan, settings.blend) || table_bytes(resolved.lattice, *ingested) > kLargestTables) {
-    throw Error(ExitCode::empty,
-                fmt::format("{}: some of the {} samples lie so far away from the others ({:.3g}, r {:.3g}) that the "
-                            "lattice cannot hold both; remove them",
-                            input_name(settings), resolved.plan.samples,
-                            *std::max_element(resolved.plan.extent.begin(), resolved.plan.extent.end()),
-                            resolved.plan.radius_median));
-  }
-  if (run.max_memory > 0 && resolved.plan.memory_bytes > run.max_memory) {
-    refuse_memory(settings, resolved.plan.levels, resolved.plan.memory_bytes, run.max_memory,
-                  [&](const SurfaceSettings& s) { return plan_for(s).plan.memory_bytes; });
-  }
-
-  stats.disk_bytes = ingested->store.disk_bytes();
+  SweepInput input = read_surface_input(settings, tmp, /*keep=*/false, run, watch, stats);
+  if (settings.local) shift_output(input, settings, stats, run);
+  const Resolved resolved = plan_surface(settings, input, run, watch, Stopwatch::now().wall - began.wall, stats);
   if (!settings.dry_run) {
-    out.attributes = info.attributes;
-    out.double_positions = needs_double(census, stats.shift, resolved.plan.finest_cell);
-    if (settings.local) {
-      out.comments.push_back("shift " + shift_text(stats.shift));
-      run.info(fmt::format("coordinates are written less {}", shift_text(stats.shift)));
-    }
+    out = mesh_layout(input, resolved);
+    out.path = settings.output;
+    out.tmp_dir = tmp;
+    if (settings.local) out.comments.push_back("shift " + shift_text(stats.shift));
     MeshSink sink(out);
-    SampleFeed feed(ingested->store, resolved.lattice, resolved.feed, resolved.radii, info.has_radius);
     std::optional<SurfaceVolume> volume;
     VolumeExport grids = settings.volume;
     if (settings.local) grids.shift = stats.shift;
-    if (grids.wanted())
-      volume.emplace(grids, written_frame, resolved.lattice, resolved.main_level, info.attributes, tmp);
+    if (grids.wanted()) {
+      volume.emplace(grids, input.frame, resolved.lattice, resolved.main_level, input.info.attributes, tmp);
+    }
     const PruneRule rule{settings.prune_triangles,
                          resolve(settings.prune_size, resolved.plan.radius_median, settings.blend)};
-    std::optional<Pruner> pruner;
-    if (rule.triangles > 0 || rule.size > 0) pruner.emplace(rule, tmp, sink);
-    Pipeline pipeline(settings, resolved, written_frame, ingested->extent, feed, info.attributes.size(), sink,
-                      volume ? &*volume : nullptr, pruner ? &*pruner : nullptr);
-    pipeline.run(run, watch);
-    pipeline.report(stats);
-    warn_of_contradictions(stats, input_name(settings), run);
-    if (feed.counts().undersampled > 0) {
-      stats.rejected.push_back({"radius above --max-radius", feed.counts().undersampled, std::nullopt});
-      run.info(fmt::format("{} of {} samples discarded as undersampled: radius above --max-radius",
-                           feed.counts().undersampled, info.count));
+    const bool prunes = rule.triangles > 0 || rule.size > 0;
+    Pruner pruner(rule, tmp, sink);
+    MeshFileSlabs whole(sink);
+    PrunedSlabs pruned(pruner);
+    sweep(settings, input, resolved, all_slabs(resolved.lattice, input.ingested.extent),
+          prunes ? static_cast<SlabSink&>(pruned) : whole, volume ? &*volume : nullptr, run, watch, stats);
+    if (prunes) {
+      watch.time("cluster and write", [&] { pruner.finish(); });
+      report_pruning(pruner.counts(), input_name(settings), stats, run);
     }
-    if (pruner) report_pruning(pruner->counts(), input_name(settings), stats, run);
-    if (sink.triangles() == 0) {
-      throw Error(ExitCode::empty,
-                  fmt::format("{}: no surface came out of {} samples; they lie too far apart for their radii, or on no "
-                              "surface at all (try --blend or --particlescale above 1)",
-                              input_name(settings), resolved.plan.samples));
-    }
+    if (sink.triangles() == 0) no_surface(input_name(settings), resolved.plan.samples);
     if (volume) {
       watch.time("volume", [&] { volume->finish(/*open=*/stats.rejected_loops > 0); });
       volume->commit();
@@ -374,11 +462,7 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
     stats.vertices = sink.vertices();
     stats.triangles = sink.triangles();
   }
-  stats.stages = watch.stages();
-  const Stopwatch::Moment ended = Stopwatch::now();
-  stats.wall = ended.wall - began.wall;
-  stats.cpu = ended.cpu - began.cpu;
-  stats.peak_memory = peak_memory();
+  finish_stats(watch, began, stats);
   return stats;
 }
 
@@ -387,11 +471,8 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
 SurfaceStats reconstruct_surface(const SurfaceSettings& settings, const RunContext& run) {
   check_settings(settings);
   require_two_files(settings);
-  const int threads = run.threads > 0 ? run.threads : tbb::this_task_arena::max_concurrency();
-  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
-  tbb::task_arena arena(threads);
   SurfaceStats stats;
-  arena.execute([&] { stats = reconstruct(settings, run); });
+  run_in_arena(run, [&] { stats = reconstruct(settings, run); });
   return stats;
 }
 

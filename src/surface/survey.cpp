@@ -213,8 +213,8 @@ std::string name_of(const PointSourceInfo& source) {
 void require_samples(const PointSourceInfo& source) {
   if (!source.has_normals) {
     throw Error(ExitCode::unreadable,
-                fmt::format("{}: no normals (properties nx ny nz); estimate and orient them first, for example with "
-                            "CloudCompare or MeshLab, and save them with the points",
+                fmt::format("{}: no normals (properties nx ny nz); --normals auto finds and orients them, see also "
+                            "`lamina normal`",
                             name_of(source)));
   }
   if (source.count == 0) throw Error(ExitCode::empty, fmt::format("{}: the file holds no points", name_of(source)));

@@ -66,6 +66,9 @@ TEST_F(Inputs, PosesMovePointsNormalsAndRadii) {
   EXPECT_THAT(rows.ny, ElementsAre(-1, 0));
   EXPECT_THAT(rows.nx, ElementsAre(0, 1));
   EXPECT_THAT(rows.radius, ElementsAre(1, 1));
+  ASSERT_EQ(source->info().scans.size(), 1);
+  EXPECT_EQ(source->info().scans[0].scanner, ScanPart::Scanner::pose_origin);
+  EXPECT_THAT(source->info().scans[0].at, ElementsAre(10, 20, 30));
   EXPECT_THAT(refusal({cloud + "@" + write("p", "1 2 3\n")}), HasSubstr("3 numbers; a pose is 16"));
   EXPECT_THAT(refusal({cloud + "@" + write("p", "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 one\n")}),
               HasSubstr("line 1: a pose is 16 numbers"));
@@ -89,6 +92,13 @@ TEST_F(Inputs, AScanListGivesItsScansTheirPoses) {
   EXPECT_NEAR(rows.x[1], 0.563 - 0.052, 1e-3);
   EXPECT_NEAR(rows.y[1], 0.013, 1e-3);
   EXPECT_NEAR(rows.z[1], 0.826 - 0.011, 1e-3);
+  // Its scanner lies in that direction, far away.
+  ASSERT_EQ(source->info().scans.size(), 2);
+  const ScanPart& scan = source->info().scans[1];
+  EXPECT_EQ(scan.first, 1);
+  EXPECT_EQ(scan.scanner, ScanPart::Scanner::direction);
+  EXPECT_NEAR(scan.at[0], 0.563, 1e-3);
+  EXPECT_NEAR(scan.at[2], 0.826, 1e-3);
   EXPECT_THAT(refusal({write("bad.conf", "bmesh a.xyz 0 0 0 0 0 0 0\n")}), HasSubstr("line 1: the quaternion"));
   EXPECT_THAT(refusal({write("bad.conf", "camera 0 0 0 0 0 0 1\nbmesh a.xyz 0 0 0 0 0 0 1 5\n")}),
               HasSubstr("line 2: bmesh FILE"));

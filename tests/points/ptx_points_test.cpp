@@ -41,6 +41,18 @@ TEST_F(PtxPoints, AppliesPosesAndLeavesOutMissingReturns) {
   }
 }
 
+TEST_F(PtxPoints, KnowsWhereItsScannersStood) {
+  const auto source =
+      open_points(write(scan(2, 1, "1 2 3 0.5\n4 5 6 1\n") + scan(1, 1, "0 0 0 0.5\n") + scan(1, 1, "7 8 9 1\n")));
+  const std::vector<ScanPart>& scans = source->info().scans;
+  ASSERT_EQ(scans.size(), 2);  // the empty one has no rows
+  EXPECT_EQ(scans[1].first, 2);
+  for (const ScanPart& s : scans) {
+    EXPECT_EQ(s.scanner, ScanPart::Scanner::position);
+    EXPECT_THAT(s.at, ElementsAre(100, 200, 300));
+  }
+}
+
 TEST_F(PtxPoints, Colours) {
   const auto source = open_points(write(scan(1, 1, "1 2 3 0.5 10 20 30\n")));
   EXPECT_EQ(source->info().attributes[3], (AttributeSpec{"blue", ScalarType::uint8}));

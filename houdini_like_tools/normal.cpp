@@ -1,0 +1,109 @@
+// lamina normal: normals for points that have none, and one side for all of them.
+#include "lamina/normals.h"
+
+#include <fmt/format.h>
+
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "console.h"
+#include "inputs.h"
+#include "lamina/edit_points.h"
+#include "lamina/error.h"
+#include "normal_options.h"
+#include "result_file.h"
+#include "text.h"
+#include "tool.h"
+
+namespace lamina::tools {
+namespace {
+
+struct NormalOptions {
+  std::vector<std::string> inputs;
+  std::string output, columns, stats;
+  NormalsSettings settings;
+  bool reorient = false, check = false, missing = false;
+  Precision precision = Precision::automatic;
+  RunOptions run;
+};
+
+NormalsMode mode_of(const NormalOptions& o) {
+  if (int{o.reorient} + int{o.check} + int{o.missing} > 1)
+    throw Error(ExitCode::usage, "--reorient, --missing and --check exclude each other");
+  if (o.check) return NormalsMode::check;
+  if (o.reorient) return NormalsMode::reorient;
+  return o.missing ? NormalsMode::complete : NormalsMode::estimate;
+}
+
+void run_normal(const NormalOptions& o) {
+  NormalsSettings settings = o.settings;
+  settings.mode = mode_of(o);
+  if (!o.check && o.output.empty()) throw CLI::RequiredError("--output");
+  if (o.check && !o.output.empty()) throw Error(ExitCode::usage, "--check writes no points; leave --output out");
+  if (o.stats == "-" && o.output == "-")
+    throw Error(ExitCode::usage, "--stats and --output both name standard output; give one of them a file");
+  const RunContext context = make_context(o.run);
+  std::vector<std::string> names;
+  for (const std::string& name : o.inputs) names.push_back(pipe_name(name));
+  std::unique_ptr<PointSource> source = open_points(names, PointSettings{context.tmp_dir, o.columns});
+  for (const std::string& remark : source->info().remarks) context.info(remark);
+  const std::string path = shown_name(source->info().path);
+  if (source->info().geographic)
+    throw Error(ExitCode::unreadable, path +
+                                          ": x and y are degrees of longitude and latitude, in which no distance "
+                                          "can be measured; project them to metres first");
+  PointColumns columns = with_precision(columns_of(source->info()), o.precision);
+  columns.normals = true;
+  // An output that cannot be written is better known before the work.
+  std::unique_ptr<PointsWriter> writer;
+  if (!o.output.empty()) writer = open_points_writer(o.output, columns, {.count = {}, .tmp_dir = o.run.tmp_dir});
+  std::optional<ResultFile> stats_file;
+  if (!o.stats.empty()) stats_file.emplace(o.stats);
+  NormalsReport report;
+  source = with_normals(std::move(source), settings, report, context);
+  if (writer) {
+    const EditReport rows = edit_points(*source, *writer, {}, settings.bad_samples, context);
+    warn_of_bad_rows(rows, path, context);
+    writer->commit();
+  }
+  context.info(describe(report));
+  warn_of_conflicts(report, path, context);
+  if (stats_file) stats_file->write(normals_json(report).dump(2) + "\n");
+}
+
+}  // namespace
+
+void add_normal(CLI::App& app) {
+  auto* tool = app.add_subcommand("normal", "Find normals of points, or turn those they have to one side");
+  auto o = std::make_shared<NormalOptions>();
+  tool->add_option("INPUT", o->inputs,
+                   "points of any format; several files, folders, patterns or scan lists are one cloud; - for standard "
+                   "input")
+      ->required();
+  tool->add_option_function<std::string>(
+          "-o,--output", [o](const std::string& name) { o->output = pipe_name(name); },
+          "the points with normals: .ply .xyz .csv .pcd .las; - for PLY on standard output")
+      ->type_name("FILE")
+      ->group("Output");
+  const std::string group = "Normals";
+  tool->add_flag("--reorient", o->reorient, "keep the directions the input has, change signs only")->group(group);
+  tool->add_flag("--missing", o->missing, "keep the normals the input has, find those it lacks")->group(group);
+  tool->add_flag("--check", o->check, "change and write nothing: tell the share of sign conflicts")->group(group);
+  add_normals_options(*tool, o->settings, group);
+  add_columns(*tool, o->columns);
+  add_bad_samples(*tool, o->settings.bad_samples);
+  add_precision(*tool, o->precision);
+  tool->add_option("--stats", o->stats, "write counts and conflicts by slab to this JSON file, - for standard output")
+      ->type_name("FILE.json")
+      ->group("Run");
+  add_run_options(*tool, o->run);
+  add_examples(*tool,
+               "  lamina normal scan.ply -o with_normals.ply\n"
+               "  lamina normal scan.ply --k 8 --up 0,0,1 -o up.ply\n"
+               "  lamina normal scan.ply --reorient --viewpoint 0,0,5 -o facing.ply\n"
+               "  lamina normal scan.ply --check");
+  tool->callback([o] { run_normal(*o); });
+}
+
+}  // namespace lamina::tools

@@ -1,0 +1,16 @@
+// Options and statistics about normals that tools share.
+#pragma once
+#include <CLI/CLI.hpp>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "lamina/normals.h"
+
+namespace lamina::tools {
+
+/// --k, --radius, --viewpoint, --up, --flip.
+void add_normals_options(CLI::App& tool, NormalsSettings& settings, const std::string& group);
+
+nlohmann::ordered_json normals_json(const NormalsReport& report);
+
+}  // namespace lamina::tools

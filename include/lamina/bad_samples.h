@@ -1,0 +1,8 @@
+// What jobs do about samples they cannot use.
+#pragma once
+
+namespace lamina {
+
+enum class BadSamples { drop, refuse };
+
+}  // namespace lamina

@@ -1,0 +1,57 @@
+#include "chunk/job.h"
+
+#include <fmt/format.h>
+
+#include "lamina/error.h"
+#include "lamina/version.h"
+#include "surface/choose_normals.h"
+
+namespace lamina {
+
+std::string mesh_settings(const SurfaceSettings& settings) {
+  // Every setting by name: one that is added must be dealt with here, or this does not compile. What follows `chord`
+  // does not change the mesh; names of files are not settings of it.
+  const auto& [input, more_inputs, columns, output, frame, bad_samples, normals, normal_search, radius_scale, density,
+               clean, max_radius, blend, steps, fit, diffuse, cell, levels, boundary, cluster, chord, prune_triangles,
+               prune_size, local, window, dry_run, volume] = settings;
+  // Jobs of several runs refuse these: require_mesh_alone().
+  (void)clean, (void)prune_triangles, (void)prune_size, (void)local;
+  (void)input, (void)more_inputs, (void)output, (void)normals, (void)normal_search, (void)window, (void)dry_run;
+  const std::string frame_word = frame             ? fmt::format("{}", static_cast<int>(*frame))
+                                 : volume.wanted() ? "grid"
+                                                   : "auto";
+  return fmt::format(
+      "columns {}\nframe {}\nbad_samples {}\nnormals {}\nparticlescale {}\ndensity {}\nmax_radius {}\nblend {}\nsteps "
+      "{}\nfit {}\n"
+      "diffuse {}\ncell {}\nlevels {}\nboundary {}\ncluster {}\nchord {}\n",
+      columns, frame_word, static_cast<int>(bad_samples), normals_words(settings), radius_scale, density,
+      to_string(max_radius), blend, steps, static_cast<int>(fit), diffuse, to_string(cell), levels, boundary,
+      static_cast<int>(cluster), chord);
+}
+
+std::uint64_t job_hash(const SurfaceSettings& settings, const std::string& input_id, const Resolved& resolved) {
+  const std::string text =
+      fmt::format("{}\n{}\n{}\nlattice {} {} radii {} {}\n", version(), input_id, mesh_settings(settings),
+                  resolved.lattice.cell, resolved.lattice.levels, resolved.radii.finest_cell, resolved.radii.levels);
+  std::uint64_t hash = 0xcbf29ce484222325U;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+  return hash;
+}
+
+void require_mesh_alone(const SurfaceSettings& settings, const std::string& option) {
+  if (settings.volume.wanted()) {
+    throw Error(ExitCode::usage,
+                fmt::format("{} makes the mesh alone: leave --vdb and --vdb-points to a run of their own", option));
+  }
+  if (settings.clean.looks_around() || !settings.clean.pick.takes_all()) {
+    throw Error(
+        ExitCode::usage,
+        fmt::format("{} cannot clean samples as they are read; clean the points before, with lamina clean", option));
+  }
+  if (settings.prune_triangles > 0 || settings.prune_size.value > 0 || settings.local)
+    throw Error(ExitCode::usage,
+                fmt::format("{}: --prune, --prune-size and --local want the mesh from one run", option));
+  if (settings.dry_run) throw Error(ExitCode::usage, fmt::format("{} and --dry-run contradict each other", option));
+}
+
+}  // namespace lamina

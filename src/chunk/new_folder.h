@@ -1,0 +1,22 @@
+// A folder that appears under its name only when complete.
+#pragma once
+#include <string>
+
+namespace lamina {
+
+/// Made hidden beside the final name; removed with all that is in it unless published.
+class NewFolder {
+ public:
+  /// Throws Error(budget) when something of that name is there that is no empty folder, or it cannot be made.
+  explicit NewFolder(const std::string& name);
+  ~NewFolder();
+  NewFolder(const NewFolder&) = delete;
+  NewFolder& operator=(const NewFolder&) = delete;
+  [[nodiscard]] const std::string& path() const { return path_; }  ///< where it is for now
+  void publish();
+
+ private:
+  std::string name_, path_;
+};
+
+}  // namespace lamina

@@ -1,0 +1,178 @@
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "normals/patch_graph.h"
+#include "normals/signed_forest.h"
+#include "normals/window_samples.h"
+
+namespace lamina::normals {
+namespace {
+
+/// Evidence between clusters, oriented by the signs so far.
+struct Evidence {
+  std::uint32_t a = 0, b = 0;
+  float sum = 0;
+};
+
+/// Sums what goes between the same two clusters, in a fixed order.
+void add_up(std::vector<Evidence>& evidence) {
+  tbb::parallel_sort(evidence.begin(), evidence.end(), [](const Evidence& l, const Evidence& r) {
+    if (l.a != r.a) return l.a < r.a;
+    if (l.b != r.b) return l.b < r.b;
+    return l.sum < r.sum;
+  });
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < evidence.size();) {
+    Evidence e = evidence[i];
+    double sum = 0;
+    for (; i < evidence.size() && evidence[i].a == e.a && evidence[i].b == e.b; ++i) sum += double{evidence[i].sum};
+    e.sum = static_cast<float>(sum);
+    evidence[n++] = e;
+  }
+  evidence.resize(n);
+}
+
+std::vector<Evidence> evidence_of(const PatchGraph& graph) {
+  std::vector<Evidence> evidence;
+  evidence.reserve(graph.edges.size());
+  for (const PatchEdge& e : graph.edges) evidence.push_back({e.a, e.b, e.agreement});
+  for (std::uint32_t i = 1; i < graph.nodes.size(); ++i) {
+    if (graph.nodes[i].vote != 0) evidence.push_back({kFixed, i, graph.nodes[i].vote});
+  }
+  add_up(evidence);
+  return evidence;
+}
+
+void grow_forest(std::vector<Evidence> evidence, SignedForest& forest, std::size_t nodes) {
+  std::vector<std::size_t> best(nodes);
+  while (!evidence.empty()) {
+    constexpr std::size_t kNothing = ~std::size_t{0};
+    std::fill(best.begin(), best.end(), kNothing);
+    const auto offer = [&](std::uint32_t cluster, std::size_t i) {
+      // The fixed node waits to be asked: its ties are many, and none is urgent.
+      if (cluster == kFixed) return;
+      std::size_t& now = best[cluster];
+      if (now == kNothing || std::abs(evidence[i].sum) > std::abs(evidence[now].sum)) now = i;
+    };
+    for (std::size_t i = 0; i < evidence.size(); ++i) {
+      offer(evidence[i].a, i);
+      offer(evidence[i].b, i);
+    }
+    bool joined = false;
+    for (const std::size_t i : best) {
+      if (i == kNothing || evidence[i].sum == 0) continue;
+      const Evidence& e = evidence[i];
+      joined = forest.unite(e.a, e.b, static_cast<std::int8_t>(e.sum > 0 ? 1 : -1)) || joined;
+    }
+    if (!joined) break;
+    for (Evidence& e : evidence) {
+      const std::uint32_t a = forest.find(e.a);
+      const std::uint32_t b = forest.find(e.b);
+      const int sign = forest.sign(e.a) * forest.sign(e.b);
+      e = {std::min(a, b), std::max(a, b), sign < 0 ? -e.sum : e.sum};
+    }
+    evidence.erase(
+        std::remove_if(evidence.begin(), evidence.end(), [](const Evidence& e) { return e.a == e.b || e.sum == 0; }),
+        evidence.end());
+    add_up(evidence);
+  }
+}
+
+/// Sums over the nodes of a cluster, with its signs so far.
+struct Body {
+  double area = 0;
+  std::array<double, 3> moment{};  ///< area times centre
+  std::array<double, 3> facing{};  ///< area times normal: zero for what is closed
+  double volume = 0, size = 0;
+
+  /// How much of it faces one way.
+  [[nodiscard]] double openness() const { return length(facing) / area; }
+  static double length(const std::array<double, 3>& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
+};
+
+std::vector<Body> bodies_of(const PatchGraph& graph, const std::vector<std::uint32_t>& root, const PatchSigns& signs) {
+  const std::size_t n = graph.nodes.size();
+  std::vector<Body> bodies(n);
+  for (std::size_t i = 1; i < n; ++i) {
+    const PatchNode& node = graph.nodes[i];
+    Body& body = bodies[root[i]];
+    body.area += double{node.area};
+    for (std::size_t a = 0; a < 3; ++a) {
+      body.moment[a] += double{node.area} * double{node.centre[a]};
+      body.facing[a] += signs.sign[i] * double{node.outward[a]};
+    }
+  }
+  for (std::size_t i = 1; i < n; ++i) {
+    const PatchNode& node = graph.nodes[i];
+    Body& body = bodies[root[i]];
+    std::array<double, 3> offset{};
+    double along = 0;
+    for (std::size_t a = 0; a < 3; ++a) {
+      offset[a] = double{node.centre[a]} - body.moment[a] / body.area;
+      along += double{node.outward[a]} * offset[a];
+    }
+    body.volume += signs.sign[i] * (along + double{node.bulge});
+    body.size += double{node.area} * Body::length(offset);
+  }
+  return bodies;
+}
+
+/// A surface that encloses a positive volume has its normals outward: the sum of area, normal times offset from the
+/// centre is three times the volume. Sheets that face one way enclose nothing: a ground has its outside above, whether
+/// it is a hill or a bowl.
+void turn_outside_out(const PatchGraph& graph, const std::array<float, 3>& up, const std::vector<std::uint32_t>& root,
+                      PatchSigns& signs) {
+  constexpr double kOpen = 0.3;     // half a sphere has 0.5
+  constexpr double kUpright = 0.5;  // cosine
+  constexpr double kLittle = 0.1;   // of the volume that the same area could enclose
+  const std::vector<Body> bodies = bodies_of(graph, root, signs);
+  for (std::size_t i = 1; i < graph.nodes.size(); ++i) {
+    if (root[i] == kFixed) continue;
+    const Body& body = bodies[root[i]];
+    double upward = 0;
+    for (std::size_t a = 0; a < 3; ++a) upward += body.facing[a] * double{up[a]};
+    const bool open = body.openness() > kOpen;
+    const bool ground = open && std::abs(upward) > kUpright * Body::length(body.facing);
+    if ((ground ? upward : body.volume) < 0) signs.sign[i] = static_cast<std::int8_t>(-signs.sign[i]);
+    const bool sure = !open && std::abs(body.volume) > kLittle * body.size;
+    signs.source[i] = sure ? SignSource::outside : SignSource::unsure;
+  }
+}
+
+}  // namespace
+
+PatchSigns find_signs(const PatchGraph& graph, const std::array<float, 3>& up) {
+  const std::size_t n = graph.nodes.size();
+  PatchSigns signs{std::vector<std::int8_t>(n, 1), std::vector<SignSource>(n, SignSource::fixed), 0};
+  SignedForest forest(n);
+  grow_forest(evidence_of(graph), forest, n);
+  std::vector<std::uint32_t> root(n);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    root[i] = forest.find(i);
+    signs.sign[i] = forest.sign(i);
+    if (root[i] == i && (i != kFixed)) ++signs.components;
+  }
+  if (n > 1 && std::any_of(root.begin() + 1, root.end(), [](std::uint32_t r) { return r == kFixed; }))
+    ++signs.components;
+  turn_outside_out(graph, up, root, signs);
+  return signs;
+}
+
+std::vector<SignConflicts> count_conflicts(const PatchGraph& graph, const PatchSigns& signs) {
+  std::vector<SignConflicts> slabs;
+  std::size_t e = 0;
+  for (const SlabLinks& slab : graph.slabs) {
+    SignConflicts c{slab.same + slab.opposite, slab.opposite};
+    for (; e < slab.edge_end; ++e) {
+      const PatchEdge& edge = graph.edges[e];
+      c.pairs += std::uint64_t{edge.same} + edge.opposite;
+      c.conflicts += signs.sign[edge.a] == signs.sign[edge.b] ? edge.opposite : edge.same;
+    }
+    slabs.push_back(c);
+  }
+  return slabs;
+}
+
+}  // namespace lamina::normals

@@ -1,0 +1,290 @@
+#include "normals/patches.h"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/parallel_sort.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "lamina/floor_divide.h"
+#include "normals/signed_forest.h"
+
+namespace lamina::normals {
+namespace {
+
+using Vector = std::array<float, 3>;
+
+/// Strong links join first; weak ones are left to the graph of patches, which has more to go by.
+constexpr int kStrengths = 32;
+constexpr float kWeakest = 0.5F;
+
+Vector normal_of(const WindowSamples& s, std::uint32_t i) {
+  return {s.nx[i], s.ny[i], s.nz[i]};
+}
+float dot(const Vector& a, const Vector& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+/// Whether two neighbours lie beside each other on one surface, so that opposite normals contradict each other: across
+/// a thin wall and around an edge they do not.
+bool lie_along(const Vector& offset, const Vector& a, const Vector& b) {
+  const float squared = dot(offset, offset);
+  constexpr float kSine2 = 0.25F;
+  const float along_a = dot(offset, a);
+  const float along_b = dot(offset, b);
+  return squared > 0 && along_a * along_a < kSine2 * squared && along_b * along_b < kSine2 * squared &&
+         std::abs(dot(a, b)) > 0.5F;
+}
+
+/// Samples of a cell: places in `order`.
+struct Cell {
+  std::size_t begin = 0, end = 0;
+  std::uint32_t patches = 0;  ///< found in it
+  std::uint32_t first = 0;    ///< node of the first of them
+  std::vector<PatchEdge> edges;
+  std::uint64_t same = 0, opposite = 0;
+};
+
+class PatchGrower {
+ public:
+  PatchGrower(const SampleTree& tree, const PatchSettings& settings, const Viewpoints& viewpoints, const Links& links,
+              WindowSamples& samples, PatchGraph& graph)
+      : tree_(tree), settings_(settings), viewpoints_(viewpoints), links_(links), samples_(samples), graph_(graph) {}
+
+  void run() {
+    sort_into_cells();
+    for_cells([&](Cell& cell) { grow(cell); });
+    auto node = static_cast<std::uint32_t>(graph_.nodes.size());
+    for (Cell& cell : cells_) {
+      cell.first = node;
+      node += cell.patches;
+    }
+    graph_.nodes.resize(node);
+    for_cells([&](Cell& cell) { settle(cell); });
+    for_cells([&](Cell& cell) { connect(cell); });
+    gather_edges();
+  }
+
+ private:
+  template <class Work>
+  void for_cells(const Work& work) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, cells_.size(), 16), [&](const auto& range) {
+      for (std::size_t c = range.begin(); c < range.end(); ++c) work(cells_[c]);
+    });
+  }
+
+  [[nodiscard]] bool is_fixed(std::uint32_t place) const { return settings_.given_stay && samples_.given[place] != 0; }
+
+  void sort_into_cells() {
+    const FloorDivider cell_of(settings_.cell);
+    constexpr std::int64_t kMiddle = 1 << 20;
+    const auto key = [&](std::uint32_t p) {
+      const auto part = [&](std::int32_t v) { return static_cast<std::uint64_t>(cell_of(v) + kMiddle); };
+      return part(samples_.z[p]) << 42 | part(samples_.y[p]) << 21 | part(samples_.x[p]);
+    };
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(links_.core.size());
+    tbb::parallel_for(std::size_t{0}, keys.size(), [&](std::size_t i) {
+      keys[i] = {key(links_.core[i]), static_cast<std::uint32_t>(i)};
+    });
+    tbb::parallel_sort(keys.begin(), keys.end());
+    order_.resize(keys.size());
+    cell_of_.assign(samples_.size(), kNoNode);
+    slot_.resize(samples_.size());
+    for (std::size_t i = 0; i < keys.size(); ++i) {
+      order_[i] = keys[i].second;
+      if (i == 0 || keys[i].first != keys[i - 1].first) cells_.push_back({i, i, 0, 0, {}, 0, 0});
+      cells_.back().end = i + 1;
+      const std::uint32_t place = links_.core[order_[i]];
+      cell_of_[place] = static_cast<std::uint32_t>(cells_.size() - 1);
+      slot_[place] = static_cast<std::uint32_t>(i);
+    }
+    forest_.emplace(order_.size());
+  }
+
+  [[nodiscard]] bool is_root(std::size_t slot) { return forest_->find(static_cast<std::uint32_t>(slot)) == slot; }
+
+  struct Link {
+    std::uint32_t from, to;  ///< slots
+    bool opposite;
+  };
+
+  [[nodiscard]] float agreement_of(std::size_t i, std::uint32_t place, std::uint32_t other, const Vector& n) const {
+    return agreement(tree_.offset(place, other), n, normal_of(samples_, other), links_.scale[i]);
+  }
+
+  /// Joins samples of the cell along their links, the strongest first.
+  void grow(Cell& cell) {
+    std::array<std::vector<Link>, kStrengths> by_strength;
+    for (std::size_t s = cell.begin; s < cell.end; ++s) {
+      const std::uint32_t i = order_[s];
+      const std::uint32_t place = links_.core[i];
+      if (is_fixed(place) || !samples_.has_normal(place)) continue;
+      const Vector n = normal_of(samples_, place);
+      for (const std::uint32_t other : links_.neighbours[i]) {
+        if (other == place || cell_of_[other] != cell_of_[place] || is_fixed(other) || !samples_.has_normal(other))
+          continue;
+        const float w = agreement_of(i, place, other, n);
+        const float strength = std::min(std::abs(w), 1.0F);
+        if (strength < kWeakest) continue;
+        const auto bin = std::min(kStrengths - 1, static_cast<int>((1 - strength) / (1 - kWeakest) * kStrengths));
+        by_strength[static_cast<std::size_t>(bin)].push_back({static_cast<std::uint32_t>(s), slot_[other], w < 0});
+      }
+    }
+    for (const std::vector<Link>& links : by_strength) {
+      for (const Link& link : links) {
+        forest_->unite(link.from, link.to, static_cast<std::int8_t>(link.opposite ? -1 : 1));
+      }
+    }
+    for (std::size_t s = cell.begin; s < cell.end; ++s) {
+      const std::uint32_t place = links_.core[order_[s]];
+      if (is_root(s) && !is_fixed(place) && samples_.has_normal(place)) ++cell.patches;
+    }
+  }
+
+  /// Gives the cell's patches their nodes, and the samples their signs.
+  void settle(Cell& cell) {
+    std::uint32_t next = cell.first;
+    for (std::size_t s = cell.begin; s < cell.end; ++s) {
+      const std::uint32_t place = links_.core[order_[s]];
+      samples_.node[place] = kNoNode;
+      if (!samples_.has_normal(place)) continue;
+      if (is_fixed(place)) {
+        samples_.node[place] = kFixed;
+        continue;
+      }
+      const std::uint32_t root = forest_->find(static_cast<std::uint32_t>(s));
+      // The root is the patch's first sample.
+      samples_.node[place] = root == s ? next++ : samples_.node[links_.core[order_[root]]];
+      if (forest_->sign(static_cast<std::uint32_t>(s)) < 0) {
+        for (auto* n : {&samples_.nx[place], &samples_.ny[place], &samples_.nz[place]}) *n = -*n;
+      }
+    }
+    sum_up(cell);
+  }
+
+  /// Offsets are from a corner near the cell, so that sums of floats cannot cancel.
+  void sum_up(const Cell& cell) {
+    struct Sums {
+      double area = 0, bulge = 0, vote = 0;
+      std::array<double, 3> moment{}, outward{};
+      std::uint32_t count = 0;
+    };
+    std::vector<Sums> all(cell.patches);
+    if (all.empty()) return;
+    const std::uint32_t pivot = links_.core[order_[cell.begin]];
+    for (std::size_t s = cell.begin; s < cell.end; ++s) {
+      const std::uint32_t place = links_.core[order_[s]];
+      if (samples_.node[place] == kNoNode || samples_.node[place] == kFixed) continue;
+      Sums& sum = all[samples_.node[place] - cell.first];
+      const Vector n = normal_of(samples_, place);
+      const Vector at = tree_.offset(pivot, place);
+      // A sample stands for the area its neighbourhood has for each of its samples.
+      const double area = std::max(double{links_.scale[order_[s]]}, 1.0) / (PatchNode::kUnit * PatchNode::kUnit);
+      sum.area += area;
+      for (std::size_t a = 0; a < 3; ++a) {
+        sum.moment[a] += area * double{at[a]} / PatchNode::kUnit;
+        sum.outward[a] += area * double{n[a]};
+      }
+      sum.bulge += area * double{dot(n, at)} / PatchNode::kUnit;
+      sum.vote +=
+          double{viewpoints_.vote(samples_.row[place], {samples_.x[place], samples_.y[place], samples_.z[place]}, n)};
+      ++sum.count;
+    }
+    const std::array<std::int32_t, 3> origin{samples_.x[pivot], samples_.y[pivot], samples_.z[pivot]};
+    for (std::uint32_t p = 0; p < cell.patches; ++p) {
+      const Sums& sum = all[p];
+      PatchNode& node = graph_.nodes[cell.first + p];
+      node.count = sum.count;
+      node.area = static_cast<float>(sum.area);
+      double bulge = sum.bulge;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const double centre = sum.moment[a] / sum.area;
+        bulge -= sum.outward[a] * centre;
+        node.centre[a] = static_cast<float>(centre + origin[a] / PatchNode::kUnit);
+        node.outward[a] = static_cast<float>(sum.outward[a]);
+      }
+      node.bulge = static_cast<float>(bulge);
+      node.vote = static_cast<float>(sum.vote);
+    }
+  }
+
+  /// What the links of the cell's samples say, within their patches and to others. Later slabs look back themselves.
+  void connect(Cell& cell) {
+    for (std::size_t s = cell.begin; s < cell.end; ++s) {
+      const std::uint32_t i = order_[s];
+      const std::uint32_t place = links_.core[i];
+      const std::uint32_t node = samples_.node[place];
+      if (node == kNoNode) continue;
+      const Vector n = normal_of(samples_, place);
+      for (const std::uint32_t other : links_.neighbours[i]) {
+        if (other == place || samples_.node[other] == kNoNode) continue;
+        const Vector m = normal_of(samples_, other);
+        const bool along = lie_along(tree_.offset(place, other), n, m);
+        const bool same = dot(n, m) > 0;
+        if (samples_.node[other] == node) {
+          if (along) ++(same ? cell.same : cell.opposite);
+          continue;
+        }
+        const float w = agreement_of(i, place, other, n);
+        cell.edges.push_back({std::min(node, samples_.node[other]), std::max(node, samples_.node[other]),
+                              w * std::min(std::abs(w), 1.0F), along && same ? 1U : 0U, along && !same ? 1U : 0U});
+      }
+    }
+    add_up(cell.edges);
+  }
+
+  static void add_up(std::vector<PatchEdge>& edges) {
+    std::stable_sort(edges.begin(), edges.end(),
+                     [](const PatchEdge& l, const PatchEdge& r) { return l.a < r.a || (l.a == r.a && l.b < r.b); });
+    std::size_t n = 0;
+    for (const PatchEdge& e : edges) {
+      if (n > 0 && edges[n - 1].a == e.a && edges[n - 1].b == e.b) {
+        edges[n - 1].agreement += e.agreement;
+        edges[n - 1].same += e.same;
+        edges[n - 1].opposite += e.opposite;
+      } else {
+        edges[n++] = e;
+      }
+    }
+    edges.resize(n);
+  }
+
+  void gather_edges() {
+    std::vector<PatchEdge> edges;
+    SlabLinks slab;
+    for (const Cell& cell : cells_) {
+      edges.insert(edges.end(), cell.edges.begin(), cell.edges.end());
+      slab.same += cell.same;
+      slab.opposite += cell.opposite;
+    }
+    add_up(edges);
+    graph_.edges.insert(graph_.edges.end(), edges.begin(), edges.end());
+    slab.edge_end = graph_.edges.size();
+    graph_.slabs.push_back(slab);
+  }
+
+  const SampleTree& tree_;
+  const PatchSettings& settings_;
+  const Viewpoints& viewpoints_;
+  const Links& links_;
+  WindowSamples& samples_;
+  PatchGraph& graph_;
+  std::vector<std::uint32_t> order_;    ///< numbers of core samples, by cell
+  std::vector<std::uint32_t> cell_of_;  ///< by place; kNoNode outside the slab
+  std::vector<std::uint32_t> slot_;     ///< by place: where in order_
+  std::optional<SignedForest> forest_;  ///< of slots
+  std::vector<Cell> cells_;
+};
+
+}  // namespace
+
+void grow_patches(const SampleTree& tree, const PatchSettings& settings, const Viewpoints& viewpoints,
+                  const Links& links, WindowSamples& samples, PatchGraph& graph) {
+  PatchGrower(tree, settings, viewpoints, links, samples, graph).run();
+}
+
+}  // namespace lamina::normals

@@ -1,0 +1,144 @@
+#include "normals/sample_tree.h"
+
+#include <tbb/parallel_invoke.h>
+
+#include <limits>
+
+namespace lamina::normals {
+namespace {
+
+constexpr std::size_t kLeaf = 12;               ///< samples a leaf has at most
+constexpr std::size_t kParallel = 1u << 14;     ///< smaller ranges are built by one thread
+constexpr std::size_t kWidest = 2 * kLeaf + 2;  ///< of a leaf's arrays
+
+}  // namespace
+
+struct SampleTree::Item {
+  std::array<std::int32_t, 3> at;
+  std::uint32_t number;
+};
+
+struct SampleTree::Query {
+  std::array<std::int32_t, 3> at;
+  std::uint32_t place = 0;
+  std::size_t wanted = 0, count = 0;
+  float bound = 0;  ///< farther samples are of no interest
+  Neighbour* found = nullptr;
+  std::array<float, 3> outside{};  ///< by axis: how far the node in question lies from the sample
+
+  void take(Neighbour n) {
+    if (count == wanted) {
+      if (!(n < found[count - 1])) return;
+    } else {
+      ++count;
+    }
+    std::size_t i = count - 1;
+    for (; i > 0 && n < found[i - 1]; --i) found[i] = found[i - 1];
+    found[i] = n;
+    if (count == wanted) bound = found[count - 1].squared;
+  }
+};
+
+SampleTree::SampleTree(std::span<const std::int32_t> x, std::span<const std::int32_t> y,
+                       std::span<const std::int32_t> z) {
+  const std::size_t n = x.size();
+  std::vector<Item> items(n);
+  for (std::size_t i = 0; i < n; ++i) items[i] = {{x[i], y[i], z[i]}, static_cast<std::uint32_t>(i)};
+  while ((n >> depth_) > kLeaf) ++depth_;
+  nodes_.resize((std::size_t{1} << depth_) - 1);
+  if (n > 0) build(items, 0, 0, n, 0);
+  order_.resize(n);
+  for (auto& axis : at_) axis.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    order_[i] = items[i].number;
+    for (std::size_t a = 0; a < 3; ++a) at_[a][i] = items[i].at[a];
+  }
+}
+
+void SampleTree::build(std::vector<Item>& items, std::size_t node, std::size_t begin, std::size_t end, int depth) {
+  if (depth == depth_) return;
+  std::array<std::int32_t, 3> low = items[begin].at;
+  std::array<std::int32_t, 3> high = low;
+  for (std::size_t i = begin + 1; i < end; ++i) {
+    for (std::size_t a = 0; a < 3; ++a) {
+      low[a] = std::min(low[a], items[i].at[a]);
+      high[a] = std::max(high[a], items[i].at[a]);
+    }
+  }
+  std::size_t axis = 0;
+  for (std::size_t a = 1; a < 3; ++a) {
+    if (high[a] - low[a] > high[axis] - low[axis]) axis = a;
+  }
+  const std::size_t middle = begin + (end - begin) / 2;
+  const auto at = [&](std::size_t i) { return items.begin() + static_cast<std::ptrdiff_t>(i); };
+  std::nth_element(at(begin), at(middle), at(end), [axis](const Item& a, const Item& b) {
+    return a.at[axis] < b.at[axis] || (a.at[axis] == b.at[axis] && a.number < b.number);
+  });
+  nodes_[node] = {items[middle].at[axis], static_cast<int>(axis)};
+  const auto lower = [&] { build(items, 2 * node + 1, begin, middle, depth + 1); };
+  const auto upper = [&] { build(items, 2 * node + 2, middle, end, depth + 1); };
+  if (end - begin > kParallel) {
+    tbb::parallel_invoke(lower, upper);
+  } else {
+    lower();
+    upper();
+  }
+}
+
+std::size_t SampleTree::nearest(std::uint32_t place, std::size_t k, float bound, Neighbour* found) const {
+  Query q;
+  q.at = {at_[0][place], at_[1][place], at_[2][place]};
+  q.place = place;
+  q.wanted = std::min(k, kMostNeighbours);
+  q.bound = bound;
+  q.found = found;
+  if (q.wanted > 0) search(q, 0, 0, order_.size(), 0, 0.0F);
+  return q.count;
+}
+
+void SampleTree::search(Query& q, std::size_t node, std::size_t begin, std::size_t end, int depth,
+                        float squared) const {
+  if (depth == depth_) {
+    std::array<float, kWidest> d2;
+    const std::size_t n = end - begin;
+    const std::int32_t* x = at_[0].data() + begin;
+    const std::int32_t* y = at_[1].data() + begin;
+    const std::int32_t* z = at_[2].data() + begin;
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto dx = static_cast<float>(x[i] - q.at[0]);
+      const auto dy = static_cast<float>(y[i] - q.at[1]);
+      const auto dz = static_cast<float>(z[i] - q.at[2]);
+      d2[i] = dx * dx + dy * dy + dz * dz;
+    }
+    for (std::size_t i = 0; i < n; ++i) {
+      if (d2[i] <= q.bound && begin + i != q.place) q.take({d2[i], static_cast<std::uint32_t>(begin + i)});
+    }
+    return;
+  }
+  const Node& split = nodes_[node];
+  const auto axis = static_cast<std::size_t>(split.axis);
+  const std::size_t middle = begin + (end - begin) / 2;
+  const auto side = static_cast<float>(q.at[axis] - split.split);
+  // Where both halves touch the plane, what lies on it may be in either.
+  const bool lower_first = side < 0 || (side == 0 && q.place < middle);
+  const auto go = [&](bool lower, float distance) {
+    if (lower) {
+      search(q, 2 * node + 1, begin, middle, depth + 1, distance);
+    } else {
+      search(q, 2 * node + 2, middle, end, depth + 1, distance);
+    }
+  };
+  go(lower_first, squared);
+  // The other half is as far as the plane along this axis, and as the node itself along the others.
+  const float before = q.outside[axis];
+  const float there = squared - before * before + side * side;
+  // Rounding must not hide a sample at the bound.
+  constexpr float kSlack = 1 - 1e-5F;
+  if (there * kSlack <= q.bound) {
+    q.outside[axis] = side;
+    go(!lower_first, there);
+    q.outside[axis] = before;
+  }
+}
+
+}  // namespace lamina::normals

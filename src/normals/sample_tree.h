@@ -1,0 +1,87 @@
+// The nearest samples around a sample: a balanced kd-tree over the fixed-point positions of a window.
+#pragma once
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace lamina::normals {
+
+struct Neighbour {
+  float squared = 0;         ///< distance, steps^2
+  std::uint32_t sample = 0;  ///< place in the tree's order
+  friend bool operator<(const Neighbour& a, const Neighbour& b) {
+    return a.squared < b.squared || (a.squared == b.squared && a.sample < b.sample);
+  }
+};
+
+/// Samples are given places so that those of a leaf follow one another: whoever goes through the places in order finds
+/// neighbours in the processor's cache. The order depends on the positions and their numbers alone, not on threads.
+/// Queries may run on any number of threads.
+class SampleTree {
+ public:
+  static constexpr std::size_t kMostNeighbours = 256;
+
+  /// Wants three arrays of one length below 2^32, coordinates within +-(2^30 - 1).
+  SampleTree(std::span<const std::int32_t> x, std::span<const std::int32_t> y, std::span<const std::int32_t> z);
+
+  [[nodiscard]] std::size_t size() const { return order_.size(); }
+  /// Number, in the arrays given, of the sample at each place.
+  [[nodiscard]] const std::vector<std::uint32_t>& order() const { return order_; }
+
+  /// The `k` (at most kMostNeighbours) nearest samples to the one at `place`, itself left out, that are not farther
+  /// than the squared distance `bound`; nearest first, equally near ones by place. Returns how many there are.
+  std::size_t nearest(std::uint32_t place, std::size_t k, float bound, Neighbour* found) const;
+
+  /// Calls visit(neighbour) for every sample within the squared distance but the one at `place`, in the order of
+  /// places.
+  template <class Visit>
+  void within(std::uint32_t place, float squared, const Visit& visit) const {
+    if (!order_.empty()) within(place, squared, visit, 0, 0, order_.size(), 0);
+  }
+
+  /// From the sample at place `a` to that at place `b`, steps.
+  [[nodiscard]] std::array<float, 3> offset(std::uint32_t a, std::uint32_t b) const {
+    return {static_cast<float>(at_[0][b] - at_[0][a]), static_cast<float>(at_[1][b] - at_[1][a]),
+            static_cast<float>(at_[2][b] - at_[2][a])};
+  }
+  [[nodiscard]] const std::vector<std::int32_t>& axis(int a) const { return at_[static_cast<std::size_t>(a)]; }
+
+ private:
+  struct Item;
+  struct Node {
+    std::int32_t split = 0;  ///< samples before the middle are not above it, the others not below
+    int axis = 0;
+  };
+  struct Query;
+
+  void build(std::vector<Item>& items, std::size_t node, std::size_t begin, std::size_t end, int depth);
+  void search(Query& q, std::size_t node, std::size_t begin, std::size_t end, int depth, float squared) const;
+
+  template <class Visit>
+  void within(std::uint32_t place, float squared, const Visit& visit, std::size_t node, std::size_t begin,
+              std::size_t end, int depth) const {
+    if (depth == depth_) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const std::array<float, 3> d = offset(place, static_cast<std::uint32_t>(i));
+        const float d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        if (d2 <= squared && i != place) visit(Neighbour{d2, static_cast<std::uint32_t>(i)});
+      }
+      return;
+    }
+    const Node& n = nodes_[node];
+    const std::size_t middle = begin + (end - begin) / 2;
+    const auto side = static_cast<float>(at_[static_cast<std::size_t>(n.axis)][place] - n.split);
+    if (side <= 0 || side * side <= squared) within(place, squared, visit, 2 * node + 1, begin, middle, depth + 1);
+    if (side >= 0 || side * side <= squared) within(place, squared, visit, 2 * node + 2, middle, end, depth + 1);
+  }
+
+  std::array<std::vector<std::int32_t>, 3> at_;  ///< by place
+  std::vector<std::uint32_t> order_;
+  std::vector<Node> nodes_;  ///< a heap: the children of i are 2 i + 1 and 2 i + 2; all leaves are at one depth
+  int depth_ = 0;
+};
+
+}  // namespace lamina::normals

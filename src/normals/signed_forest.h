@@ -1,0 +1,54 @@
+// Disjoint sets whose members have a sign relative to each other.
+#pragma once
+#include <cstdint>
+#include <numeric>
+#include <utility>
+#include <vector>
+
+namespace lamina::normals {
+
+/// Over the numbers 0 .. n-1. Threads may work on sets that have nothing in common.
+class SignedForest {
+ public:
+  explicit SignedForest(std::size_t n) : parent_(n), sign_(n, 1) { std::iota(parent_.begin(), parent_.end(), 0U); }
+
+  /// The set's root. sign(i) is relative to it until the next unite().
+  std::uint32_t find(std::uint32_t i) {
+    std::uint32_t root = i;
+    std::int8_t to_root = 1;
+    while (parent_[root] != root) {
+      to_root = static_cast<std::int8_t>(to_root * sign_[root]);
+      root = parent_[root];
+    }
+    while (i != root && parent_[i] != root) {
+      const std::uint32_t next = parent_[i];
+      const auto rest = static_cast<std::int8_t>(to_root * sign_[i]);
+      parent_[i] = root;
+      sign_[i] = to_root;
+      to_root = rest;
+      i = next;
+    }
+    return root;
+  }
+  /// Relative to the root find(i) has just returned; 1 for a root.
+  [[nodiscard]] std::int8_t sign(std::uint32_t i) const { return sign_[i]; }
+
+  /// Joins the sets of a and b, whose signs then differ where `relative` is -1. The smaller root stays. False when they
+  /// were in one set already: then nothing changes.
+  bool unite(std::uint32_t a, std::uint32_t b, std::int8_t relative) {
+    std::uint32_t root_a = find(a);
+    std::uint32_t root_b = find(b);
+    if (root_a == root_b) return false;
+    const auto sign = static_cast<std::int8_t>(relative * sign_[a] * sign_[b]);
+    if (root_a > root_b) std::swap(root_a, root_b);
+    parent_[root_b] = root_a;
+    sign_[root_b] = sign;
+    return true;
+  }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+  std::vector<std::int8_t> sign_;  ///< relative to the parent
+};
+
+}  // namespace lamina::normals

@@ -1,0 +1,249 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <utility>
+
+#include "edit/record_sorter.h"
+#include "files/descriptor.h"
+#include "lamina/error.h"
+#include "lamina/normals.h"
+#include "lamina/radii.h"
+#include "meshes/with_threads.h"
+#include "normals/directions.h"
+#include "normals/numbered_points.h"
+#include "normals/patches.h"
+#include "normals/row_normals.h"
+#include "normals/sample_window.h"
+#include "normals/viewpoints.h"
+#include "surface/ingest.h"
+#include "surface/survey.h"
+
+namespace lamina {
+namespace {
+
+using namespace normals;
+
+constexpr std::size_t kMemory = std::size_t{128} << 20;  ///< for records on their way to their rows
+constexpr std::uint64_t kSurveyed = 1 << 18;             ///< samples the spacing is taken from
+constexpr std::uint64_t kLeastSlab = 1 << 17;            ///< samples that keep all threads busy
+constexpr double kPatches = 250'000;                     ///< of a large cloud, about
+constexpr double kLeastPatch = 64;                       ///< samples
+constexpr double kMostSteps = 1 << 29;
+
+/// Lengths of the job, steps.
+struct Scale {
+  DirectionSettings directions;
+  WindowSettings window;
+  PatchSettings patches;
+};
+
+void require_sane(const NormalsSettings& s, const PointSourceInfo& info) {
+  const auto require = [](bool ok, const char* what) {
+    if (!ok) throw Error(ExitCode::usage, what);
+  };
+  require(s.k >= 3 && s.k <= 64, "--k must be in 3..64");
+  require(s.radius >= 0 && std::isfinite(s.radius), "--radius must be 0 (the k nearest) or more");
+  for (const Viewpoint& v : s.viewpoints) {
+    const double squared = v.at[0] * v.at[0] + v.at[1] * v.at[1] + v.at[2] * v.at[2];
+    require(std::isfinite(squared), "a viewpoint must be finite");
+    require(!v.direction || squared > 0, "an up direction must not be 0,0,0");
+  }
+  if (s.mode == NormalsMode::check && !info.has_normals)
+    throw Error(ExitCode::usage, fmt::format("{}: has no normals to check", info.path));
+}
+
+/// Whatever the density, a window holds a good number of samples beyond what a sample's neighbours take.
+Scale scale_of(const NormalsSettings& settings, const SlabStore& store, const Frame& frame) {
+  const RadiusSurvey radii = survey_radii(store, kSurveyed);
+  const auto steps = [](double v) { return std::clamp(v, 1.0, kMostSteps); };
+  Scale s;
+  s.directions.k = settings.k;
+  s.directions.radius = settings.radius > 0 ? static_cast<float>(steps(settings.radius / frame.step)) : 0.0F;
+  // A density radius is about twice the spacing, and sixteen neighbours lie within 1.2 of it.
+  const double usual = std::sqrt(std::max(settings.k, 16) / 16.0) * double{radii.high};
+  constexpr double kReach = 8;
+  s.directions.reach = static_cast<float>(steps(std::max(kReach * usual, double{s.directions.radius})));
+  s.window.reach = static_cast<std::int32_t>(s.directions.reach);
+  const double in_patch = std::max(kLeastPatch, static_cast<double>(store.total()) / kPatches);
+  const double cell = std::max(0.5 * double{radii.median} * std::sqrt(in_patch), double{kLeastPatchCell});
+  s.patches.cell = static_cast<std::int32_t>(steps(cell));
+  s.patches.given_stay = settings.mode == NormalsMode::complete || settings.mode == NormalsMode::check;
+  s.window.least_samples = kLeastSlab;
+  s.window.least_height = std::min(2 * s.window.reach, s.patches.cell);
+  return s;
+}
+
+std::vector<SeenFrom> scanners_of(const PointSourceInfo& info, const NormalsSettings& settings) {
+  std::vector<SeenFrom> seen;
+  const bool one_each = settings.viewpoints.size() > 1 && settings.viewpoints.size() == info.scans.size();
+  for (std::size_t i = 0; i < info.scans.size(); ++i) {
+    const ScanPart& scan = info.scans[i];
+    SeenFrom s;
+    s.first = scan.first;
+    if (one_each) {
+      s.known = true;
+      s.viewpoint = settings.viewpoints[i];
+    } else if (settings.viewpoints.empty() && settings.scanners) {
+      const bool known = scan.scanner == ScanPart::Scanner::position || scan.scanner == ScanPart::Scanner::direction;
+      s.known = known || (settings.pose_origins && scan.scanner == ScanPart::Scanner::pose_origin);
+      s.viewpoint = {scan.at, scan.scanner == ScanPart::Scanner::direction};
+    }
+    seen.push_back(s);
+  }
+  return seen;
+}
+
+class Job {
+ public:
+  Job(PointSource& source, const NormalsSettings& settings, NormalsReport& report, const RunContext& run)
+      : source_(source), settings_(settings), report_(report), run_(run) {}
+
+  std::unique_ptr<RowNormals> work() {
+    const std::string directory = run_.tmp_dir.empty() ? system_tmp_dir() : run_.tmp_dir;
+    RunContext silent = run_;  // what is left out is told by whoever takes the rows
+    silent.log = nullptr;
+    NumberedPoints points(source_, settings_.mode != NormalsMode::estimate);
+    const Survey survey = survey_input(points, settings_.bad_samples, silent);
+    const Frame frame = choose_frame(survey, FrameMode::pca);
+    turn_ = frame.rotation.transpose();
+    const Ingested in = ingest(points, survey, frame, 1, directory, run_);
+    const std::vector<Viewpoint> everywhere =
+        settings_.viewpoints.size() > 1 && settings_.viewpoints.size() == source_.info().scans.size()
+            ? std::vector<Viewpoint>{}
+            : settings_.viewpoints;
+    const Viewpoints viewpoints(everywhere, scanners_of(source_.info(), settings_), frame);
+    const std::size_t memory = run_.max_memory > 0 ? std::min(kMemory, run_.max_memory / 4) : kMemory;
+    edit::RecordSorter records(
+        kRecordBytes, static_cast<std::size_t>(std::min<std::uint64_t>(memory, in.store.total() * (kRecordBytes + 12))),
+        directory);
+    sweep(in.store, scale_of(settings_, in.store, frame), viewpoints, records);
+    const Eigen::Vector3f up = frame.rotation.col(2).cast<float>();
+    PatchSigns signs = find_signs(graph_, {up.x(), up.y(), up.z()});
+    report_.samples = in.store.total();
+    tell(signs, viewpoints);
+    if (settings_.flip) {
+      for (std::size_t i = 1; i < signs.sign.size(); ++i) signs.sign[i] = static_cast<std::int8_t>(-signs.sign[i]);
+    }
+    count_flipped(signs);
+    return std::make_unique<RowNormals>(records, signs, source_.info().count, directory, run_);
+  }
+
+ private:
+  void sweep(const SlabStore& store, const Scale& scale, const Viewpoints& viewpoints, edit::RecordSorter& records) {
+    SampleWindow window(store, scale.window);
+    Links links;
+    while (window.advance()) {
+      if (run_.cancelled()) throw Error(ExitCode::internal, "cancelled");
+      links.core = window.core();
+      std::vector<std::array<float, 3>> given = given_normals(window.samples(), links);
+      find_directions(window.tree(), scale.directions, window.samples(), links);
+      if (settings_.mode == NormalsMode::check) keep_given_only(window.samples(), links);
+      grow_patches(window.tree(), scale.patches, viewpoints, links, window.samples(), graph_);
+      hand_over(window.samples(), links, given, records);
+      if (run_.progress) run_.progress({"normals", window.done(), store.total(), 0, 0});
+    }
+  }
+
+  /// Patches turn normals; only against the given ones can that be told.
+  std::vector<std::array<float, 3>> given_normals(const WindowSamples& s, const Links& links) const {
+    std::vector<std::array<float, 3>> given;
+    if (settings_.mode != NormalsMode::reorient) return given;
+    for (const std::uint32_t p : links.core) given.push_back({s.nx[p], s.ny[p], s.nz[p]});
+    return given;
+  }
+
+  static void keep_given_only(WindowSamples& s, const Links& links) {
+    for (const std::uint32_t p : links.core) {
+      if (s.given[p] == 0) s.nx[p] = s.ny[p] = s.nz[p] = 0;
+    }
+  }
+
+  void hand_over(const WindowSamples& s, const Links& links, const std::vector<std::array<float, 3>>& given,
+                 edit::RecordSorter& records) {
+    std::vector<std::uint64_t> rows;
+    std::vector<std::byte> bytes;
+    rows.reserve(links.core.size());
+    bytes.reserve(links.core.size() * kRecordBytes);
+    for (std::size_t i = 0; i < links.core.size(); ++i) {
+      const std::uint32_t p = links.core[i];
+      if (!s.has_normal(p)) ++report_.without;
+      if (settings_.mode == NormalsMode::check || (settings_.mode == NormalsMode::complete && s.given[p] != 0))
+        continue;
+      RowRecord r{kNoNormal, s.node[p]};
+      if (s.has_normal(p)) {
+        if (s.given[p] != 0) {
+          r.code = s.nx[p] * given[i][0] + s.ny[p] * given[i][1] + s.nz[p] * given[i][2] < 0 ? kTurn : kKeep;
+          count_given(r);
+        } else {
+          const Eigen::Vector3d n = turn_ * Eigen::Vector3d(s.nx[p], s.ny[p], s.nz[p]);
+          r.code = code_of({static_cast<float>(n.x()), static_cast<float>(n.y()), static_cast<float>(n.z())});
+          ++report_.estimated;
+        }
+      }
+      rows.push_back(s.row[p]);
+      const std::size_t at = bytes.size();
+      bytes.resize(at + kRecordBytes);
+      std::memcpy(bytes.data() + at, r.code.data(), sizeof(NormalCode));
+      std::memcpy(bytes.data() + at + sizeof(NormalCode), &r.node, sizeof r.node);
+    }
+    records.add(rows, bytes.data());
+  }
+
+  /// Given normals, by patch, as they stand and turned.
+  void count_given(const RowRecord& r) {
+    given_.resize(std::max<std::size_t>(given_.size(), std::size_t{r.node} + 1));
+    ++(r.code == kTurn ? given_[r.node].second : given_[r.node].first);
+  }
+  void count_flipped(const PatchSigns& signs) {
+    for (std::size_t i = 0; i < given_.size(); ++i)
+      report_.flipped += signs.sign[i] < 0 ? given_[i].first : given_[i].second;
+  }
+
+  void tell(const PatchSigns& signs, const Viewpoints& viewpoints) {
+    report_.patches = graph_.nodes.size() - 1;
+    report_.components = signs.components;
+    report_.slabs = count_conflicts(graph_, signs);
+    for (const SignConflicts& slab : report_.slabs) {
+      report_.conflicts.pairs += slab.pairs;
+      report_.conflicts.conflicts += slab.conflicts;
+    }
+    for (std::size_t i = 1; i < graph_.nodes.size(); ++i) {
+      const std::uint64_t count = graph_.nodes[i].count;
+      switch (signs.source[i]) {
+        case SignSource::fixed:
+          (viewpoints.any() ? report_.by_viewpoint : report_.by_given) += count;
+          break;
+        case SignSource::unsure:
+          report_.unsure += count;
+          [[fallthrough]];
+        case SignSource::outside:
+          report_.by_outside += count;
+          break;
+      }
+    }
+  }
+
+  PointSource& source_;
+  const NormalsSettings& settings_;
+  NormalsReport& report_;
+  const RunContext& run_;
+  Eigen::Matrix3d turn_ = Eigen::Matrix3d::Identity();  ///< back to input coordinates
+  PatchGraph graph_;
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> given_;
+};
+
+}  // namespace
+
+std::unique_ptr<PointSource> with_normals(std::unique_ptr<PointSource> source, const NormalsSettings& settings,
+                                          NormalsReport& report, const RunContext& run) {
+  require_sane(settings, source->info());
+  report = {};
+  std::unique_ptr<RowNormals> found;
+  meshes::with_threads(run.threads, [&] { found = Job(*source, settings, report, run).work(); });
+  return give_normals(std::move(source), std::move(found));
+}
+
+}  // namespace lamina

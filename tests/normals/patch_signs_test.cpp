@@ -1,0 +1,140 @@
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include "normals/patch_graph.h"
+#include "normals/signed_forest.h"
+
+namespace lamina::normals {
+namespace {
+
+PatchNode node_at(float x, float outward) {
+  PatchNode n;
+  n.count = 1;
+  n.area = 1;
+  n.centre = {x, 0, 0};
+  n.outward = {outward, 0, 0};
+  return n;
+}
+
+void link(PatchGraph& g, std::uint32_t a, std::uint32_t b, float agreement, std::uint32_t same = 1,
+          std::uint32_t opposite = 0) {
+  g.edges.push_back({a, b, agreement, same, opposite});
+}
+
+// Two walls of a body, the second one's normals inward: it must turn.
+TEST(PatchSigns, TurnABodyOutsideOut) {
+  for (const float side : {1.0F, -1.0F}) {
+    PatchGraph g;
+    g.nodes.push_back(node_at(1, side));
+    g.nodes.push_back(node_at(-1, side));
+    link(g, 1, 2, -3);
+    const PatchSigns s = find_signs(g, {0, 0, 1});
+    EXPECT_EQ(s.components, 1);
+    EXPECT_EQ(s.sign[1], side);
+    EXPECT_EQ(s.sign[2], -side);
+    EXPECT_EQ(s.source[1], SignSource::outside);
+  }
+}
+
+// Hills and bowls alike.
+TEST(PatchSigns, TurnAnOpenGroundUp) {
+  for (const float bulge : {0.5F, -0.5F}) {
+    PatchGraph g;
+    g.nodes.push_back(node_at(1, 0));
+    g.nodes.push_back(node_at(-1, 0));
+    for (std::size_t i : {1, 2}) {
+      g.nodes[i].outward = {0.2F, 0, -0.9F};
+      g.nodes[i].bulge = bulge;
+    }
+    link(g, 1, 2, 3);
+    const PatchSigns s = find_signs(g, {0, 0, 1});
+    EXPECT_EQ(s.sign[1], -1);
+    EXPECT_EQ(s.source[1], SignSource::unsure);
+    EXPECT_EQ(find_signs(g, {0, 0, -1}).sign[1], 1);
+    EXPECT_EQ(find_signs(g, {0, 1, 0}).sign[1], bulge > 0 ? 1 : -1);
+  }
+}
+
+TEST(PatchSigns, FollowVotesAgainstTheOutside) {
+  PatchGraph g;
+  g.nodes.push_back(node_at(1, 1));
+  g.nodes.push_back(node_at(-1, -1));
+  g.nodes[2].vote = -2;
+  link(g, 1, 2, 3);
+  const PatchSigns s = find_signs(g, {0, 0, 1});
+  EXPECT_EQ(s.sign[1], -1);
+  EXPECT_EQ(s.sign[2], -1);
+  EXPECT_EQ(s.source[1], SignSource::fixed);
+}
+
+// One bad link is not followed where two good ones say otherwise.
+TEST(PatchSigns, SumUpWhatClustersSayOfEachOther) {
+  PatchGraph g;
+  for (int i = 0; i < 4; ++i) g.nodes.push_back(node_at(1, 1));
+  g.nodes[1].vote = 10;
+  link(g, 1, 2, 8);
+  link(g, 3, 4, 8);
+  link(g, 1, 3, -3);
+  link(g, 2, 4, 2);
+  link(g, 2, 3, 2);
+  const PatchSigns s = find_signs(g, {0, 0, 1});
+  for (std::size_t i = 1; i < 5; ++i) EXPECT_EQ(s.sign[i], 1) << i;
+}
+
+TEST(PatchSigns, CountsConflictsThatRemain) {
+  PatchGraph g;
+  for (int i = 0; i < 3; ++i) g.nodes.push_back(node_at(1, 1));
+  g.nodes[1].vote = 1;
+  link(g, 1, 2, -5, 0, 9);  // all resolved by turning 2
+  g.slabs.push_back({10, 2, 1});
+  link(g, 1, 3, 5, 8, 1);
+  link(g, 2, 3, 1, 4, 0);  // against the odd one
+  g.slabs.push_back({0, 0, 3});
+  const std::vector<SignConflicts> c = count_conflicts(g, find_signs(g, {0, 0, 1}));
+  ASSERT_EQ(c.size(), 2);
+  EXPECT_EQ(c[0].pairs, 21);
+  EXPECT_EQ(c[0].conflicts, 2);
+  EXPECT_EQ(c[1].pairs, 13);
+  EXPECT_EQ(c[1].conflicts, 1 + 4);
+}
+
+// Whatever signs are hidden, links that all agree with them give them back, up to one sign for each component.
+RC_GTEST_PROP(PatchSigns, FindHiddenSigns, ()) {
+  const auto n = *rc::gen::inRange<std::uint32_t>(1, 60);
+  const auto hidden = *rc::gen::container<std::vector<int>>(n + 1, rc::gen::element(-1, 1));
+  PatchGraph g;
+  for (std::uint32_t i = 1; i <= n; ++i) g.nodes.push_back(node_at(1, 1));
+  SignedForest joined(n + 1);
+  for (const auto& [a, b] : *rc::gen::container<std::vector<std::pair<std::uint32_t, std::uint32_t>>>(
+           rc::gen::pair(rc::gen::inRange<std::uint32_t>(1, n + 1), rc::gen::inRange<std::uint32_t>(1, n + 1)))) {
+    if (a == b) continue;
+    link(g, std::min(a, b), std::max(a, b), static_cast<float>(hidden[a] * hidden[b] * *rc::gen::inRange(1, 20)));
+    joined.unite(a, b, 1);
+  }
+  const PatchSigns s = find_signs(g, {0, 0, 1});
+  std::uint64_t components = 0;
+  for (std::uint32_t i = 1; i <= n; ++i) {
+    const std::uint32_t root = joined.find(i);
+    components += root == i ? 1 : 0;
+    RC_ASSERT(s.sign[i] * hidden[i] == s.sign[root] * hidden[root]);
+  }
+  RC_ASSERT(s.components == components);
+}
+
+RC_GTEST_PROP(SignedForest, KeepsSignsRelativeToTheRoot, ()) {
+  constexpr std::uint32_t kMany = 40;
+  const auto hidden = *rc::gen::container<std::vector<int>>(kMany, rc::gen::element(-1, 1));
+  SignedForest forest(kMany);
+  for (int i = 0; i < 60; ++i) {
+    const auto a = *rc::gen::inRange<std::uint32_t>(0, kMany);
+    const auto b = *rc::gen::inRange<std::uint32_t>(0, kMany);
+    forest.unite(a, b, static_cast<std::int8_t>(hidden[a] * hidden[b]));
+    RC_ASSERT(forest.find(a) == forest.find(b));
+    const auto c = *rc::gen::inRange<std::uint32_t>(0, kMany);
+    const std::uint32_t root = forest.find(c);
+    RC_ASSERT(forest.sign(c) == hidden[c] * hidden[root]);
+  }
+}
+
+}  // namespace
+}  // namespace lamina::normals

@@ -1,0 +1,88 @@
+#include "normals/plane.h"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <random>
+#include <vector>
+
+namespace lamina::normals {
+namespace {
+
+using Offsets = std::vector<std::array<float, 3>>;
+
+Plane fit(const Offsets& offsets) {
+  Moments m;
+  for (const auto& d : offsets) m.add(d);
+  return fit_plane(m);
+}
+
+/// A flat cloud: axes of the given half lengths, turned at random.
+Offsets random_cloud(std::mt19937& random, const std::array<double, 3>& axes, std::size_t n = 12) {
+  std::normal_distribution<> normal;
+  const Eigen::Quaterniond turn =
+      Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random)).normalized();
+  Offsets offsets;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Eigen::Vector3d p =
+        turn * Eigen::Vector3d(axes[0] * normal(random), axes[1] * normal(random), axes[2] * normal(random));
+    offsets.push_back({static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z())});
+  }
+  return offsets;
+}
+
+void expect_same_as_eigen(const Offsets& offsets) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const auto& d : offsets) mean += Eigen::Vector3d(d[0], d[1], d[2]) / static_cast<double>(offsets.size());
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+  for (const auto& d : offsets) {
+    const Eigen::Vector3d p = Eigen::Vector3d(d[0], d[1], d[2]) - mean;
+    covariance += p * p.transpose() / static_cast<double>(offsets.size());
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
+  const Plane plane = fit(offsets);
+  const double scale = solver.eigenvalues()[2];
+  EXPECT_NEAR(plane.least, solver.eigenvalues()[0], 1e-9 * scale);
+  EXPECT_NEAR(plane.middle, solver.eigenvalues()[1], 1e-7 * scale);
+  EXPECT_NEAR(plane.most, scale, 1e-7 * scale);
+  // Where the two smaller variances are close, any direction between their axes is as good.
+  if (solver.eigenvalues()[1] - solver.eigenvalues()[0] < 1e-3 * scale) return;
+  const Eigen::Vector3d normal(plane.normal[0], plane.normal[1], plane.normal[2]);
+  EXPECT_NEAR(std::abs(normal.dot(solver.eigenvectors().col(0))), 1, 1e-6);
+  EXPECT_NEAR(normal.norm(), 1, 1e-6);
+}
+
+TEST(FitPlane, IsTheEigenvectorOfTheLeastVariance) {
+  std::mt19937 random(1);
+  for (const double thin : {0.0, 1e-6, 1e-3, 0.1, 0.5, 0.9}) {
+    for (int i = 0; i < 50; ++i) expect_same_as_eigen(random_cloud(random, {1, 0.9, thin}));
+  }
+}
+
+RC_GTEST_PROP(FitPlane, DoesNotDependOnTheUnit, (unsigned seed)) {
+  std::mt19937 random(seed);
+  Offsets offsets = random_cloud(random, {1, 0.7, 0.05});
+  const Plane plane = fit(offsets);
+  const float unit = *rc::gen::element(0x1p-20F, 0x1p20F, 0x1p29F);
+  for (auto& d : offsets) {
+    for (float& v : d) v *= unit;
+  }
+  RC_ASSERT(fit(offsets).normal == plane.normal);
+}
+
+TEST(FitPlane, HasNoNormalWithoutAPlane) {
+  EXPECT_FALSE(fit({}).valid());
+  EXPECT_FALSE(fit({{0, 0, 0}, {1, 0, 0}}).valid());
+  EXPECT_FALSE(fit({{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {0, 0, 0}}).valid());
+  EXPECT_FALSE(fit({{0, 0, 0}, {1, 2, 3}, {2, 4, 6}, {-3, -6, -9}}).valid());
+}
+
+TEST(FitPlane, IsExactOnCoordinatePlanes) {
+  const Plane plane = fit({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {3, -2, 0}});
+  EXPECT_EQ(std::abs(plane.normal[2]), 1);
+  EXPECT_EQ(plane.least, 0);
+}
+
+}  // namespace
+}  // namespace lamina::normals

@@ -1,0 +1,115 @@
+#include "normals/sample_tree.h"
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+namespace lamina::normals {
+namespace {
+
+struct Positions {
+  std::vector<std::int32_t> x, y, z;
+};
+
+Positions random_positions(std::size_t n, std::int32_t range, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_int_distribution<std::int32_t> at(-range, range);
+  Positions p;
+  for (std::size_t i = 0; i < n; ++i) {
+    p.x.push_back(at(random));
+    p.y.push_back(at(random));
+    p.z.push_back(at(random));
+  }
+  return p;
+}
+
+/// All other samples by distance, computed without the tree.
+std::vector<Neighbour> all_by_distance(const SampleTree& tree, std::uint32_t place) {
+  std::vector<Neighbour> all;
+  for (std::uint32_t i = 0; i < tree.size(); ++i) {
+    if (i == place) continue;
+    float squared = 0;
+    for (int a = 0; a < 3; ++a) {
+      const auto d = static_cast<float>(tree.axis(a)[i] - tree.axis(a)[place]);
+      squared += d * d;
+    }
+    all.push_back({squared, i});
+  }
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
+void expect_nearest(const Positions& p, std::size_t k, float bound) {
+  const SampleTree tree(p.x, p.y, p.z);
+  std::array<Neighbour, SampleTree::kMostNeighbours> found;
+  const auto step = static_cast<std::uint32_t>(tree.size() / 40 + 1);
+  for (std::uint32_t place = 0; place < tree.size(); place += step) {
+    std::vector<Neighbour> expected = all_by_distance(tree, place);
+    std::erase_if(expected, [&](const Neighbour& n) { return n.squared > bound; });
+    expected.resize(std::min(expected.size(), k));
+    const std::size_t count = tree.nearest(place, k, bound, found.data());
+    ASSERT_EQ(count, expected.size()) << place;
+    for (std::size_t i = 0; i < count; ++i) {
+      ASSERT_EQ(found[i].squared, expected[i].squared) << place << ", " << i;
+      ASSERT_EQ(found[i].sample, expected[i].sample) << place << ", " << i;
+    }
+  }
+}
+
+TEST(SampleTree, FindsTheNearestOfScatteredSamples) {
+  const Positions p = random_positions(3000, 1 << 29, 1);
+  for (const std::size_t k : {1, 8, 16, 64}) expect_nearest(p, k, 1e30F);
+}
+
+TEST(SampleTree, KeepsToTheBound) {
+  const float side = 1 << 27;
+  expect_nearest(random_positions(2000, 1 << 29, 2), 30, side * side);
+}
+
+// Few distinct places: most distances are equal, and the order of places decides.
+TEST(SampleTree, OrdersEquallyNearSamplesByPlace) {
+  expect_nearest(random_positions(2000, 4, 3), 20, 1e30F);
+  expect_nearest(random_positions(500, 0, 4), 20, 1e30F);
+}
+
+TEST(SampleTree, TakesFewerSamplesThanWanted) {
+  for (std::size_t n = 0; n < 30; ++n) expect_nearest(random_positions(n, 100, 5), 40, 1e30F);
+}
+
+RC_GTEST_PROP(SampleTree, NearestAreThoseOfAnySearch, ()) {
+  const auto n = *rc::gen::inRange<std::size_t>(0, 200);
+  const auto range = *rc::gen::element(1, 10, 1000, 1 << 29);
+  const auto k = *rc::gen::inRange<std::size_t>(1, 40);
+  const auto bound = *rc::gen::element(1.0F, 50.0F, 1e30F);
+  expect_nearest(random_positions(n, range, *rc::gen::arbitrary<unsigned>()), k, bound);
+}
+
+TEST(SampleTree, FindsAllWithinADistance) {
+  const Positions p = random_positions(2000, 100, 6);
+  const SampleTree tree(p.x, p.y, p.z);
+  const float squared = 40 * 40;
+  for (std::uint32_t place = 0; place < tree.size(); place += 50) {
+    std::vector<std::uint32_t> expected;
+    for (const Neighbour& n : all_by_distance(tree, place)) {
+      if (n.squared <= squared) expected.push_back(n.sample);
+    }
+    std::sort(expected.begin(), expected.end());
+    std::vector<std::uint32_t> found;
+    tree.within(place, squared, [&](Neighbour n) { found.push_back(n.sample); });
+    ASSERT_EQ(found, expected) << place;
+  }
+}
+
+TEST(SampleTree, GivesEverySampleAPlace) {
+  const Positions p = random_positions(1000, 50, 7);
+  const SampleTree tree(p.x, p.y, p.z);
+  std::vector<std::uint32_t> order = tree.order();
+  for (std::uint32_t i = 0; i < order.size(); ++i) ASSERT_EQ(tree.axis(1)[i], p.y[order[i]]);
+  std::sort(order.begin(), order.end());
+  for (std::uint32_t i = 0; i < order.size(); ++i) ASSERT_EQ(order[i], i);
+}
+
+}  // namespace
+}  // namespace lamina::normals

@@ -1,0 +1,274 @@
+// Normals against clouds whose truth is known.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "lamina/error.h"
+#include "normals/clouds.h"
+
+namespace lamina {
+namespace {
+
+using test::compare;
+using test::find_normals;
+using test::Found;
+using test::Oriented;
+using test::Quality;
+using test::Vector;
+
+NormalsSettings in_mode(NormalsMode mode, int k = 16) {
+  NormalsSettings settings;
+  settings.mode = mode;
+  settings.k = k;
+  return settings;
+}
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+void expect_good(const Quality& q) {
+  EXPECT_GT(q.close, 0.99);
+  EXPECT_GT(q.right_side, 0.999);
+}
+
+TEST(WithNormals, OfASphereAndATorusPointOutward) {
+  for (const int k : {8, 16}) {
+    NormalsSettings settings;
+    settings.k = k;
+    Oriented sphere;
+    test::add_sphere(sphere, 4000, 2, {400000, 5000000, 100});
+    expect_good(compare(sphere, find_normals(sphere, settings).normals));
+    Oriented torus;
+    test::add_torus(torus, 10000);
+    const Found found = find_normals(torus, settings);
+    expect_good(compare(torus, found.normals));
+    EXPECT_EQ(found.report.samples, torus.size());
+    EXPECT_EQ(found.report.estimated, torus.size());
+    EXPECT_EQ(found.report.by_outside, torus.size());
+    EXPECT_EQ(found.report.components, 1);
+    EXPECT_LT(found.report.conflicts.share(), 0.001);
+    EXPECT_GT(found.report.conflicts.pairs, 4 * torus.size());
+  }
+}
+
+TEST(WithNormals, WithinARadiusAreAsGood) {
+  Oriented torus;
+  test::add_torus(torus, 10000);
+  NormalsSettings settings;
+  settings.radius = 0.1;
+  expect_good(compare(torus, find_normals(torus, settings).normals));
+}
+
+TEST(WithNormals, OfNestedShellsEachPointOutward) {
+  Oriented cloud;
+  test::add_sphere(cloud, 6000, 1);
+  test::add_sphere(cloud, 6000, 0.85);
+  const Found found = find_normals(cloud);
+  expect_good(compare(cloud, found.normals));
+  EXPECT_EQ(found.report.components, 2);
+}
+
+// The two sides of a plate three spacings thick: neighbours reach across its rim only.
+TEST(WithNormals, OfAPlateKeepItsSidesApart) {
+  Oriented cloud;
+  test::add_sheet(cloud, 8000, [](double, double) { return 0.05; });
+  const std::size_t half = cloud.size();
+  test::add_sheet(cloud, 8000, [](double, double) { return 0.0; });
+  for (std::size_t i = half; i < cloud.size(); ++i) cloud.normals[i][2] = -1;
+  const Found found = find_normals(cloud, in_mode(NormalsMode::estimate, 8));
+  // Sheets that nothing joins are each too flat to have an outside.
+  std::array<double, 2> up{};
+  for (std::size_t i = 0; i < cloud.size(); ++i) up.at(i / half) += found.normals[i][2] / static_cast<double>(half);
+  EXPECT_GT(std::abs(up[0]), 0.999);
+  EXPECT_GT(std::abs(up[1]), 0.999);
+  EXPECT_EQ(found.report.unsure, cloud.size());
+}
+
+TEST(WithNormals, OfAnOpenSheetFaceUp) {
+  const auto hills = [](double x, double y) { return 0.1 * std::sin(9 * x) * std::cos(7 * y); };
+  Oriented cloud;
+  test::add_sheet(cloud, 6000, hills);
+  NormalsSettings settings;
+  settings.viewpoints = {{{0, 0, 1}, true}};
+  const Found up = find_normals(cloud, settings);
+  expect_good(compare(cloud, up.normals));
+  EXPECT_EQ(up.report.by_viewpoint, cloud.size());
+
+  settings.viewpoints = {{{0, 0, -1}, true}};
+  EXPECT_LT(compare(cloud, find_normals(cloud, settings).normals).right_side, 0.001);
+  settings.flip = true;
+  EXPECT_GT(compare(cloud, find_normals(cloud, settings).normals).right_side, 0.999);
+}
+
+// From inside, walls seen at a grazing angle get their sign from those seen straight on.
+TEST(WithNormals, FaceAViewpointInside) {
+  Oriented cloud;
+  test::add_sphere(cloud, 6000, 1);
+  NormalsSettings settings;
+  settings.viewpoints = {{{0.9, 0, 0}, false}};
+  EXPECT_EQ(compare(cloud, find_normals(cloud, settings).normals).right_side, 0);
+  settings.viewpoints = {{{3, 0, 0}, false}, {{-3, 0, 0}, false}, {{0, 3, 0}, false}, {{0, -3, 0}, false}};
+  EXPECT_GT(compare(cloud, find_normals(cloud, settings).normals).right_side, 0.999);
+}
+
+TEST(WithNormals, FaceTheScannerOfTheirOwnScan) {
+  Oriented cloud;
+  const auto flat = [](double, double) { return 0.0; };
+  test::add_sheet(cloud, 3000, flat);
+  cloud.scans = {{0, ScanPart::Scanner::position, {0.5, 0.5, 2}}, {3000, ScanPart::Scanner::direction, {0, 0, -1}}};
+  const std::size_t half = cloud.size();
+  test::add_sheet(cloud, 3000, flat);
+  for (std::size_t i = half; i < cloud.size(); ++i) {
+    cloud.positions[i][2] -= 1;
+    cloud.normals[i][2] = -1;
+  }
+  EXPECT_EQ(compare(cloud, find_normals(cloud).normals).right_side, 1);
+  // Viewpoints told win: one for each scan.
+  NormalsSettings settings;
+  settings.viewpoints = {{{0.5, 0.5, -5}, false}, {{0.5, 0.5, 5}, false}};
+  EXPECT_EQ(compare(cloud, find_normals(cloud, settings).normals).right_side, 0);
+  settings.viewpoints.clear();
+  settings.scanners = false;
+  EXPECT_EQ(find_normals(cloud, settings).report.by_viewpoint, 0);
+}
+
+TEST(WithNormals, OriginsOfPosesCountWhenAsked) {
+  Oriented cloud;
+  test::add_sheet(cloud, 3000, [](double, double) { return 0.0; });
+  cloud.scans = {{0, ScanPart::Scanner::pose_origin, {0.5, 0.5, 2}}};
+  NormalsSettings settings;
+  EXPECT_EQ(find_normals(cloud, settings).report.by_viewpoint, 0);
+  settings.pose_origins = true;
+  EXPECT_EQ(compare(cloud, find_normals(cloud, settings).normals).right_side, 1);
+}
+
+/// A cap of the sphere turned inward.
+Oriented flipped_patch(double height, std::size_t& turned) {
+  Oriented cloud;
+  test::add_sphere(cloud, 12000, 1);
+  turned = 0;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (cloud.positions[i][2] < height) continue;
+    for (double& v : cloud.normals[i]) v = -v;
+    ++turned;
+  }
+  return cloud;
+}
+
+TEST(WithNormals, CheckTellsOfAFlippedPatch) {
+  Oriented sphere;
+  test::add_sphere(sphere, 12000, 1);
+  const NormalsSettings check = in_mode(NormalsMode::check);
+  EXPECT_EQ(find_normals(sphere, check, true).report.conflicts.conflicts, 0);
+  std::size_t turned = 0;
+  const Oriented cloud = flipped_patch(0.8, turned);
+  const Found found = find_normals(cloud, check, true);
+  const SignConflicts c = found.report.conflicts;
+  // Links cross the rim of the cap: a strip about a neighbour's distance wide, a few percent of the sphere.
+  EXPECT_GT(c.share(), 0.005);
+  EXPECT_LT(c.share(), 0.05);
+  EXPECT_EQ(found.report.samples, cloud.size());
+  EXPECT_EQ(found.report.estimated, 0);
+  EXPECT_EQ(compare(cloud, found.normals).right_side, 1);  // nothing changed
+}
+
+TEST(WithNormals, ReorientingChangesSignsOnly) {
+  std::size_t turned = 0;
+  Oriented cloud = flipped_patch(0.8, turned);
+  const Found found = find_normals(cloud, in_mode(NormalsMode::reorient), true);
+  EXPECT_EQ(found.report.flipped, turned);
+  EXPECT_EQ(found.report.estimated, 0);
+  EXPECT_EQ(found.report.conflicts.conflicts, 0);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const double sign = cloud.positions[i][2] < 0.8 ? 1 : -1;
+    for (std::size_t a = 0; a < 3; ++a)
+      ASSERT_EQ(found.normals[i][a], static_cast<double>(static_cast<float>(sign * cloud.normals[i][a])));
+  }
+}
+
+TEST(WithNormals, CompletingKeepsWhatIsThere) {
+  Oriented cloud;
+  test::add_sphere(cloud, 8000, 1);
+  const Oriented truth = cloud;
+  // Inward ones: the found ones must follow them, not what is outside.
+  std::size_t missing = 0;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const bool lacks = cloud.positions[i][0] > 0.5 || i % 7 == 0;
+    for (double& v : cloud.normals[i]) v = lacks ? kNan : -v;
+    missing += lacks ? 1 : 0;
+  }
+  const Found found = find_normals(cloud, in_mode(NormalsMode::complete), true);
+  EXPECT_EQ(found.report.estimated, missing);
+  EXPECT_EQ(found.report.by_given, missing);
+  const Quality q = compare(truth, found.normals);
+  EXPECT_EQ(q.right_side, 0);
+  EXPECT_GT(q.close, 0.99);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    if (std::isnan(cloud.normals[i][0])) continue;
+    for (std::size_t a = 0; a < 3; ++a)
+      ASSERT_EQ(found.normals[i][a], static_cast<double>(static_cast<float>(cloud.normals[i][a])));
+  }
+}
+
+TEST(WithNormals, LeavesSamplesWithoutAPlaneAlone) {
+  Oriented cloud;
+  test::add_sphere(cloud, 3000, 1);
+  cloud.add({40, 0, 0}, {1, 0, 0});    // on its own
+  cloud.add({kNan, 0, 0}, {1, 0, 0});  // nowhere
+  const Found found = find_normals(cloud);
+  EXPECT_EQ(found.report.without, 1);
+  EXPECT_EQ(found.report.samples, 3001);
+  EXPECT_EQ(found.normals[3000], (Vector{0, 0, 0}));
+  EXPECT_EQ(found.normals[3001], (Vector{0, 0, 0}));
+}
+
+// Lines of a scanner thirty times closer along than across: the nearest sixteen lie on one.
+TEST(WithNormals, OfScanLinesReachAcross) {
+  Oriented cloud;
+  for (int line = 0; line < 60; ++line) {
+    for (int i = 0; i < 400; ++i) {
+      const double a = 0.01 * line;
+      cloud.add({i * 0.001, std::sin(a), std::cos(a)}, {0, std::sin(a), std::cos(a)});
+    }
+  }
+  NormalsSettings settings;
+  settings.viewpoints = {{{0, 0, 1}, true}};
+  expect_good(compare(cloud, find_normals(cloud, settings).normals));
+}
+
+TEST(WithNormals, AreTheSameForAnyNumberOfThreads) {
+  Oriented cloud;
+  test::add_torus(cloud, 20000);
+  const Found one = find_normals(cloud, {}, false, 1);
+  const Found four = find_normals(cloud, {}, false, 4);
+  EXPECT_EQ(one.normals, four.normals);
+  EXPECT_EQ(one.report.conflicts.pairs, four.report.conflicts.pairs);
+}
+
+TEST(WithNormals, RefusesWhatCannotBe) {
+  Oriented cloud;
+  test::add_sphere(cloud, 100, 1);
+  const auto refusal = [&](const NormalsSettings& s) {
+    try {
+      find_normals(cloud, s);
+    } catch (const Error& e) {
+      EXPECT_EQ(e.code(), ExitCode::usage);
+      return std::string(e.what());
+    }
+    return std::string();
+  };
+  using ::testing::HasSubstr;
+  EXPECT_THAT(refusal(in_mode(NormalsMode::check)), HasSubstr("no normals to check"));
+  NormalsSettings s;
+  s.k = 2;
+  EXPECT_THAT(refusal(s), HasSubstr("--k"));
+  s = {};
+  s.radius = -1;
+  EXPECT_THAT(refusal(s), HasSubstr("--radius"));
+  s = {};
+  s.viewpoints = {{{0, 0, 0}, true}};
+  EXPECT_THAT(refusal(s), HasSubstr("up"));
+}
+
+}  // namespace
+}  // namespace lamina
