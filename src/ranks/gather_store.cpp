@@ -152,7 +152,7 @@ RadiusSurvey survey_together(Ranks& ranks, const SlabStore& store, std::uint64_t
 SlabStore gather_buckets(Ranks& ranks, const SlabStore& store, const std::vector<BucketSpan>& wanted,
                          const std::string& directory, const RunContext& run) {
   const auto size = static_cast<std::size_t>(ranks.size()), own = static_cast<std::size_t>(ranks.rank());
-  constexpr std::size_t kRound = 16 << 20, kLeast = 64 << 10;
+  constexpr std::size_t kRound = 4 << 20, kLeast = 64 << 10;
   const std::size_t most = std::max(kLeast, kRound / size);  // bytes a rank sends to another in a round
   std::optional<StoreGatherer> gatherer;
   std::uint64_t needed = 0, here = 0;
@@ -167,6 +167,7 @@ SlabStore gather_buckets(Ranks& ranks, const SlabStore& store, const std::vector
     for (std::size_t b = wanted[own].begin; b < wanted[own].end; ++b) needed += store.count(b);
   });
   std::vector<Outgoing> outgoing;
+  outgoing.reserve(size);
   for (const BucketSpan& span : wanted) outgoing.emplace_back(store, span);
   std::exception_ptr failure;
   const auto attempt = [&](const auto& work) {
@@ -177,7 +178,7 @@ SlabStore gather_buckets(Ranks& ranks, const SlabStore& store, const std::vector
       failure = std::current_exception();
     }
   };
-  std::vector<Bytes> to(size);
+  std::vector<Bytes> to(size), from;
   for (bool more = true; more;) {
     attempt([&] {
       for (std::size_t r = 0; r < size; ++r) {
@@ -185,9 +186,9 @@ SlabStore gather_buckets(Ranks& ranks, const SlabStore& store, const std::vector
         outgoing[r].fill(to[r], most);
       }
     });
-    const std::vector<Bytes> from = ranks.exchange(to);
+    ranks.exchange(to, from);
     attempt([&] {
-      for (std::size_t r = 0; r < size; ++r) keep(r, from[r]);
+      for (std::size_t r = 0; r < size; ++r) keep(r, r == own ? to[r] : from[r]);
       if (run.progress) run.progress({"share", here, needed, 0, 0});
       if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
     });

@@ -14,7 +14,7 @@ RadiusSurvey survey_together(Ranks& ranks, const SlabStore& store, std::uint64_t
                              std::uint32_t min_samples);
 
 /// A store in `directory` with the buckets that wanted[rank()] names, out of all ranks' stores, compressed blocks as
-/// they are. Memory: some 32 MB, whatever the cloud.
+/// they are. Memory: some 16 MB, whatever the cloud.
 SlabStore gather_buckets(Ranks& ranks, const SlabStore& store, const std::vector<BucketSpan>& wanted,
                          const std::string& directory, const RunContext& run);
 

@@ -14,6 +14,8 @@ namespace {
 
 constexpr std::size_t kBufferBytes = 1 << 20;
 constexpr std::size_t kEncoded = 4096;  ///< vertices encoded at once
+/// Read back at once: what is made of it stays in the cache.
+constexpr std::size_t kVertexBytes = 256 << 10, kTriangleBytes = 64 << 10;
 
 }  // namespace
 
@@ -24,16 +26,12 @@ RankSlabs::RankSlabs(const SlabSpan& span, MeshSinkSettings layout, const std::s
 
 void RankSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {
   if (slab.slab < span_.begin) {
-    last_ = mark_of(vertices, layout_);
-    numbered_ += vertices.size();
+    if (slab.slab == span_.begin - 1) below_ = mark_of(vertices, layout_);
+    first_ += vertices.size();
     return;
   }
   if (slab.slab >= span_.end) return;
-  if (!std::exchange(begun_, true)) {
-    below_ = last_;
-    first_ = numbered_;
-  }
-  numbered_ += vertices.size();
+  begun_ = true;
   require_writable(vertices, layout_.attributes, layout_.double_positions, vertices_);
   const std::size_t record = vertex_record_bytes(layout_.attributes, layout_.double_positions);
   std::vector<std::byte> bytes(kEncoded * record);
@@ -42,7 +40,7 @@ void RankSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {
     encode_vertices(vertices, layout_.attributes, layout_.double_positions, done, n, bytes.data());
     put(records_, std::span(bytes).first(n * record));
   }
-  last_ = mark_of(vertices, layout_);
+  if (slab.slab == span_.end - 1) last_ = mark_of(vertices, layout_);
   make_relative(slab.triangles, first_, below_.vertices, relative_);
   put(faces_, std::as_bytes(std::span(relative_)));
   vertices_ += vertices.size();
@@ -83,7 +81,7 @@ void RankSlabs::read(Spill& spill, const std::function<void(std::span<const std:
 }
 
 void RankSlabs::read_vertices(const std::function<void(std::span<const std::byte>)>& take) {
-  read(records_, take, kBufferBytes);
+  read(records_, take, kVertexBytes);
 }
 
 void RankSlabs::read_triangles(const std::function<void(std::span<const PartTriangle>)>& take) {
@@ -93,7 +91,7 @@ void RankSlabs::read_triangles(const std::function<void(std::span<const PartTria
     std::memcpy(triangles.data(), bytes.data(), bytes.size());
     take(triangles);
   };
-  read(faces_, unpack, kBufferBytes / sizeof(PartTriangle) * sizeof(PartTriangle));
+  read(faces_, unpack, kTriangleBytes / sizeof(PartTriangle) * sizeof(PartTriangle));
 }
 
 }  // namespace lamina::ranks

@@ -46,7 +46,7 @@ class RankSlabs : public SlabSink {
   Spill records_, faces_;
   bool begun_ = false;
   SlabMark below_, last_;
-  std::uint64_t numbered_ = 0, first_ = 0;  ///< vertices as the clusterer counts: so far, and below the part
+  std::uint64_t first_ = 0;  ///< vertices below the part, as the clusterer counts
   std::uint64_t vertices_ = 0, triangles_ = 0;
   std::vector<PartTriangle> relative_;
 };

@@ -63,8 +63,8 @@ class Ranks {
   void most(std::span<std::int64_t> values);
   /// Sum over the ranks before this one.
   std::uint64_t sum_before(std::uint64_t value);
-  /// to[r] goes to rank r; returns what came from each.
-  std::vector<Bytes> exchange(const std::vector<Bytes>& to);
+  /// to[r] goes to rank r, but for a rank's own; from[r] is what came from it. Both keep their memory.
+  void exchange(const std::vector<Bytes>& to, std::vector<Bytes>& from);
 
  private:
   friend class SharedFile;

@@ -286,17 +286,16 @@ std::uint64_t Ranks::sum_before(std::uint64_t value) {
   return first() ? 0 : before;
 }
 
-std::vector<Bytes> Ranks::exchange(const std::vector<Bytes>& to) {
+void Ranks::exchange(const std::vector<Bytes>& to, std::vector<Bytes>& from) {
   const auto size = static_cast<std::size_t>(impl_->size), own = static_cast<std::size_t>(impl_->rank);
   std::vector<std::uint64_t> out(size), in(size);
-  for (std::size_t r = 0; r < size; ++r) out[r] = to[r].size();
+  for (std::size_t r = 0; r < size; ++r) out[r] = r == own ? 0 : to[r].size();
   MPI_Request request = MPI_REQUEST_NULL;
   MPI_Ialltoall(out.data(), 1, MPI_UINT64_T, in.data(), 1, MPI_UINT64_T, MPI_COMM_WORLD, &request);
   impl_->wait(request);
-  std::vector<Bytes> from(size);
+  from.resize(size);
   std::vector<MPI_Request> requests;
   for (std::size_t r = 0; r < size; ++r) {
-    if (r == own) continue;
     from[r].resize(in[r]);
     impl_->start_receive(from[r], static_cast<int>(r), requests);
   }
@@ -304,9 +303,7 @@ std::vector<Bytes> Ranks::exchange(const std::vector<Bytes>& to) {
     const std::size_t r = (own + step) % size;
     impl_->start_send(to[r], static_cast<int>(r), requests);
   }
-  from[own] = to[own];
   impl_->wait(requests);
-  return from;
 }
 
 struct SharedFile::Impl {

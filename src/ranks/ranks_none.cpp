@@ -54,9 +54,7 @@ void Ranks::most(std::span<std::int64_t>) {}
 std::uint64_t Ranks::sum_before(std::uint64_t) {
   return 0;
 }
-std::vector<Bytes> Ranks::exchange(const std::vector<Bytes>& to) {
-  return to;
-}
+void Ranks::exchange(const std::vector<Bytes>&, std::vector<Bytes>&) {}
 SharedFile::SharedFile(Ranks&, const std::string&, std::string) {
   no_mpi();
 }

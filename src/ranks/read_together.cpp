@@ -13,6 +13,7 @@
 #include "ranks/deal_rows.h"
 #include "ranks/packed_input.h"
 #include "slab_store/store_blocks.h"
+#include "surface/choose_normals.h"
 
 namespace lamina::ranks {
 namespace {
@@ -62,7 +63,7 @@ class Reading {
       tell(survey);
       fill(*survey);
     }
-    SharedInput out{{source_->info(), frame_, std::move(*ingested_)}, rows_.end - rows_.first};
+    SharedInput out{{source_->info(), frame_, std::move(*ingested_)}, rows_.end - rows_.first, normals_};
     return out;
   }
 
@@ -72,9 +73,12 @@ class Reading {
     ranks_.together([&] {
       if (!ranks_.first()) return;
       source_ = open_inputs(settings_, directory_, run_);
+      // Normals that are found lie in a store of rank 0's; it deals them out.
+      watch_.time("normals",
+                  [&] { source_ = choose_normals(std::move(source_), settings_, normals_, directory_, run_); });
       require_samples(source_->info());
       put(words, source_->info());
-      words.put(can_be_shared(settings_, source_->info()));
+      words.put(!normals_ && can_be_shared(settings_, source_->info()));
     });
     Bytes bytes = words.take();
     ranks_.broadcast(bytes);
@@ -195,6 +199,7 @@ class Reading {
   const RunContext& run_;
   Stopwatch& watch_;
   std::unique_ptr<PointSource> source_;
+  std::optional<NormalsReport> normals_;
   bool shared_ = true;
   RowSpan rows_{0, 0};
   Frame frame_;

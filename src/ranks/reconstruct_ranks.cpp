@@ -132,6 +132,7 @@ class Job {
     }
     SharedInput shared = read_together(ranks_, settings_, directory_, run_, watch_);
     own_.rows_read = shared.rows;
+    stats_.normals = shared.normals;
     watch_.time("plan", [&] {
       shared.input.radii = survey_together(ranks_, shared.input.ingested.store, kSurveySamples, settings_.density);
     });

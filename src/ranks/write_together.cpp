@@ -21,6 +21,7 @@ std::vector<Border> gather_borders(Ranks& ranks, const Border& own) {
   words.put(own);
   const std::vector<Bytes> all = ranks.gather(words.take());
   std::vector<Border> borders;
+  borders.reserve(all.size());
   for (const Bytes& bytes : all) borders.push_back(Unpacker(bytes).get<Border>());
   Packer list;
   list.put(borders);
@@ -50,7 +51,7 @@ void write_part(SharedFile& file, RankSlabs& part, const Place& place, bool firs
   at = header.size() + place.vertices * record + place.first_triangle * kFaceRecordBytes;
   std::vector<std::byte> faces;
   part.read_triangles([&](std::span<const PartTriangle> triangles) {
-    encode_shifted(triangles, place.first_vertex, place.vertices, "this rank's part", faces);
+    encode_shifted(triangles, place.first_vertex, place.vertices, "a rank's part", faces);
     file.write(at, faces);
     at += faces.size();
     go_on();

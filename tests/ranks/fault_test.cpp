@@ -61,9 +61,7 @@ TEST_F(RankFaults, WhatRanksCannotDo) {
   const std::string out = folder_ / "out.ply";
   const std::vector<std::vector<std::string>> cases{
       {"surface", input_, "-o", out, "--vdb", folder_ / "out.vdb"},
-      {"surface", input_, "-o", out, "--checkpoint", folder_ / "kept"},
       {"surface", input_, "-o", "-"},
-      {"surface", input_, "--dry-run"},
       {"surface", input_, "-o", out, "--levles", "3"},
   };
   for (const auto& words : cases) {
@@ -74,9 +72,16 @@ TEST_F(RankFaults, WhatRanksCannotDo) {
   }
 }
 
-TEST_F(RankFaults, LauncherOfAnotherMpi) {
+TEST_F(RankFaults, OtherWaysToShareOutTheWork) {
   const test::Outcome outcome =
-      test::run_shell("PMI_SIZE=3 PMI_RANK=0 lamina surface " + input_ + " -o " + (folder_ / "out.ply"));
+      test::run_shell("OMPI_COMM_WORLD_SIZE=2 OMPI_COMM_WORLD_RANK=0 lamina surface " + input_ + " -o " +
+                      (folder_ / "out.ply") + " --checkpoint " + (folder_ / "kept"));
+  expect_failure(outcome, ExitCode::usage, "--checkpoint and mpirun contradict each other");
+}
+
+TEST_F(RankFaults, LauncherOfAnotherMpi) {
+  const test::Outcome outcome = test::run_shell(test::kMpiEnvironment + "PMI_SIZE=3 PMI_RANK=0 lamina surface " +
+                                                input_ + " -o " + (folder_ / "out.ply"));
   expect_failure(outcome, ExitCode::usage, "of which this MPI sees 1");
 }
 

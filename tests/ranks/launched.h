@@ -7,20 +7,22 @@
 
 namespace lamina::test {
 
+/// Open MPI keeps some of its memory to the end, and containers forbid it to copy between processes with one call.
+inline const std::string kMpiEnvironment =
+    "export ASAN_OPTIONS=detect_leaks=0:$ASAN_OPTIONS OMPI_MCA_btl_vader_single_copy_mechanism=none; ";
+
 /// Why ranks cannot be tried here; empty: they can.
 inline std::string no_ranks() {
   if (run_shell("mpirun --version").code != 0) return "there is no mpirun";
-  const Outcome tried =
-      run_shell("OMPI_COMM_WORLD_SIZE=2 OMPI_COMM_WORLD_RANK=0 lamina surface none.ply -o none_mesh.ply");
+  const Outcome tried = run_shell(
+      kMpiEnvironment + "OMPI_COMM_WORLD_SIZE=2 OMPI_COMM_WORLD_RANK=0 lamina surface none.ply -o none_mesh.ply");
   return tried.err.find("without MPI") != std::string::npos ? "the program was built without MPI" : "";
 }
 
 /// mpirun with `ranks` processes, as many as there are processors or more.
 inline std::string mpirun(int ranks) {
-  // Containers forbid what copies between processes with one call; sessions leave nothing behind that way either.
-  return "OMPI_MCA_btl_vader_single_copy_mechanism=none mpirun --allow-run-as-root --oversubscribe --bind-to none "
-         "-np " +
-         std::to_string(ranks) + " " + quoted(LAMINA_PROGRAM);
+  return kMpiEnvironment + "mpirun --allow-run-as-root --oversubscribe --bind-to none -np " + std::to_string(ranks) +
+         " " + quoted(LAMINA_PROGRAM);
 }
 
 inline Outcome run_ranks(int ranks, const std::vector<std::string>& arguments) {
