@@ -20,4 +20,8 @@ if(LAMINA_SANITIZE)
   target_compile_options(lamina_flags INTERFACE
     -fsanitize=${LAMINA_SANITIZE} -fno-omit-frame-pointer -Wno-maybe-uninitialized)
   target_link_options(lamina_flags INTERFACE -fsanitize=${LAMINA_SANITIZE})
+  if(LAMINA_SANITIZE MATCHES thread)
+    # TBB's library is not instrumented: its orders are told to the sanitizer.
+    target_compile_options(lamina_flags INTERFACE -include ${PROJECT_SOURCE_DIR}/tests/tsan/annotated_tbb.h)
+  endif()
 endif()

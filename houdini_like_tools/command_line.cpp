@@ -7,6 +7,7 @@
 #include <new>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <thread>
 #include <utility>
 
@@ -63,8 +64,8 @@ std::string unknown_word(const CLI::App& app, const CLI::App& tool) {
   return {};
 }
 
-/// Ranks that mpirun started fail together, and rank 0 says why. The others leave after it: mpirun ends the job with the
-/// first that goes.
+/// Ranks that mpirun started fail together, and rank 0 says why. The others leave after it: mpirun ends the job with
+/// the first that goes.
 template <class... Arguments>
 void complain(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
   if (launch().rank > 0) {
@@ -85,6 +86,14 @@ int answer_parse_error(const CLI::App& app, const CLI::ParseError& error) {
   }
   complain("{}: {} (see '{} --help')\n", command, reason, command);
   return exit_code(ExitCode::usage);
+}
+
+/// Threads take memory, too: the standard library says so by a code, TBB by its words.
+bool is_short_of_memory(const std::exception& e) {
+  if (const auto* system = dynamic_cast<const std::system_error*>(&e); system != nullptr)
+    return system->code() == std::errc::resource_unavailable_try_again ||
+           system->code() == std::errc::not_enough_memory;
+  return std::string_view(e.what()).starts_with("pthread_create");
 }
 
 }  // namespace
@@ -111,8 +120,9 @@ int run_program(int argc, const char* const* argv, const std::vector<AddTool>& t
     complain("lamina: out of memory; free some, or see --max-memory to plan the job\n");
     return exit_code(ExitCode::budget);
   } catch (const std::exception& e) {
-    complain("lamina: internal error: {}\n", e.what());
-    return exit_code(ExitCode::internal);
+    const bool short_of = is_short_of_memory(e);
+    complain("lamina: {}: {}\n", short_of ? "out of memory for threads" : "internal error", e.what());
+    return exit_code(short_of ? ExitCode::budget : ExitCode::internal);
   }
 }
 

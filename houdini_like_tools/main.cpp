@@ -17,6 +17,7 @@ int main(int argc, char** argv) {
       add_measure,
       add_convert,
       add_merge,
+      add_clean,
       add_clip,
       add_transform,
       add_sort,

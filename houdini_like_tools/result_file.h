@@ -5,7 +5,8 @@
 
 namespace lamina::tools {
 
-/// Staged beside its name and renamed by write(); without write() nothing is left and an older file stays as it was.
+/// Written beside its name and renamed, all of it by write(), so that a run that is killed before leaves nothing; an
+/// older file stays as it was until then.
 /// "-" is standard output; pipes and devices are written to directly.
 class ResultFile {
  public:
@@ -18,8 +19,12 @@ class ResultFile {
   void write(const std::string& text);
 
  private:
+  void open();
+  void discard();
   [[noreturn]] void refuse(int error) const;
-  std::string path_, staged_;  ///< staged_ is empty where nothing has to be removed
+  std::string path_;
+  bool staged_ = false;  ///< a regular file
+  std::string beside_;   ///< empty where nothing has to be removed
   std::FILE* file_ = nullptr;
 };
 

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "clean_options.h"
 #include "console.h"
 #include "inputs.h"
 #include "lamina/error.h"
@@ -31,6 +32,22 @@ struct SurfaceOptions {
   PartsOptions parts;
   std::string stats, preview;
 };
+
+void add_cleaning(nlohmann::ordered_json& j, const SurfaceStats& s, const SurfaceSettings& settings) {
+  const CleanCounts& c = s.cleaned;
+  j["cleaned"] = {{"clipped", c.clipped},
+                  {"skipped", c.skipped},
+                  {"merged", c.merged},
+                  {"outliers", c.outliers},
+                  {"outlier_distance", c.outlier_distance},
+                  {"thinned", c.thinned}};
+  if (settings.prune_triangles > 0 || settings.prune_size.value > 0) {
+    j["pruned"] = {{"kept_parts", s.pruned.kept},
+                   {"removed_parts", s.pruned.removed},
+                   {"removed_triangles", s.pruned.removed_triangles}};
+  }
+  if (settings.local) j["shift"] = s.shift;
+}
 
 nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& settings) {
   nlohmann::ordered_json j;
@@ -63,6 +80,7 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
     if (r.first_row) entry["first_row"] = *r.first_row;
     j["rejected"].push_back(entry);
   }
+  add_cleaning(j, s, settings);
   j["replaced_attribute_values"] = s.replaced_attributes;
   j["corners"] = {{"projected", s.corners}, {"seen", s.corners_seen}, {"trusted", s.corners_good}};
   j["contradicting_normals"] = {
@@ -252,6 +270,7 @@ void add_surface(CLI::App& app) {
   add_length(*tool, "--max-radius", s.max_radius, "discard samples with a larger radius as undersampled; 0: none")
       ->group(samples);
 
+  add_clean_options(*tool, s.clean, "Cleaning");
   tool->add_option("--normals", s.normals,
                    "whose normals: the file's; auto: found where the file has none; estimate: all found")
       ->transform(words<NormalsChoice>(
@@ -294,6 +313,15 @@ void add_surface(CLI::App& app) {
       ->group(mesh);
   tool->add_flag("--level", s.vertex_levels,
                  "give vertices their octree level, 0 the finest, as property level; 'lamina render --paint level'")
+      ->group(mesh);
+
+  tool->add_option("--prune", s.prune_triangles, "leave out connected parts of fewer triangles")
+      ->type_name("N")
+      ->capture_default_str()
+      ->group(mesh);
+  add_length(*tool, "--prune-size", s.prune_size, "leave out parts whose box has a shorter diagonal; 0: none")
+      ->group(mesh);
+  tool->add_flag("--local", s.local, "write coordinates less a round shift, for programs that read floats")
       ->group(mesh);
 
   add_volume_options(*tool, s.volume);

@@ -16,6 +16,7 @@ void add_info(CLI::App& app);
 void add_measure(CLI::App& app);
 void add_convert(CLI::App& app);
 void add_merge(CLI::App& app);
+void add_clean(CLI::App& app);
 void add_clip(CLI::App& app);
 void add_transform(CLI::App& app);
 void add_sort(CLI::App& app);

@@ -34,6 +34,8 @@ void keep_rows(SampleBatch& batch, const std::vector<std::uint8_t>& keep);
 /// The pieces edit_points() is made of. Drops rows that cannot be written and replaces attribute values that are not
 /// finite; `written` is left at 0.
 EditReport clean_rows(SampleBatch& batch);
+/// The same of the rows i with keep[i] != 0; the others are dropped without being counted as bad.
+EditReport clean_rows(SampleBatch& batch, std::vector<std::uint8_t> keep);
 /// Adds what a later batch came to.
 void add(EditReport& total, const EditReport& batch);
 /// Throws Error(unreadable) naming the first bad row.

@@ -68,6 +68,10 @@ class SlabStore {
   /// Decompresses one bucket into `out` (resized to it); safe from several threads. Throws Error(budget) naming the
   /// directory when the file cannot be read or is damaged; of a kept store Error(unreadable) naming the file.
   void read(std::size_t bucket, LocalSamples& out) const;
+  /// Leaves samples out for good: keep[b][i] says whether sample i of bucket b stays, as read() has given it so far.
+  /// Counts and bounds become those of the samples that stay. Their disk space is not given back. Reads every bucket
+  /// that loses samples, and throws what read() does.
+  void keep_only(std::vector<std::vector<bool>> keep);
   /// Says that a bucket will be read soon, so that a slow disk begins to.
   void will_read(std::size_t bucket) const;
   /// Says that buckets before this one will not be read again. Their disk space is given back, a file at a

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "lamina/bad_samples.h"
+#include "lamina/clean.h"
 #include "lamina/cluster.h"
 #include "lamina/length.h"
 #include "lamina/normals.h"
@@ -39,6 +40,7 @@ struct SurfaceSettings {
   NormalsSettings normal_search;  ///< how those that are found are; mode and bad_samples follow the others
   double radius_scale = 1;        ///< > 0: multiplies every sample's radius, given or estimated
   std::uint32_t density = 16;     ///< samples a counting cell must hold to give a radius (paper, section 3.1), >= 2
+  CleanSettings clean;            ///< what is left out before radii are estimated
   Length max_radius;              ///< samples with a larger radius are discarded as undersampled; 0: none
   double blend = 1.2;             ///< H > 0: R = H r (paper, section 3.2)
   int steps = 1;                  ///< N in 1..16: projection steps
@@ -50,8 +52,11 @@ struct SurfaceSettings {
   double boundary = 0;  ///< isovertices whose corners' projections lie farther than this from the average of
                         ///< their samples (in R) are rejected; 0: no limit
   ClusterMode cluster = ClusterMode::preserving;
-  double chord = 0.17;         ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
-  bool vertex_levels = false;  ///< give vertices an attribute `level`: of the octree, 0 the finest
+  double chord = 0.17;                ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
+  bool vertex_levels = false;         ///< give vertices an attribute `level`: of the octree, 0 the finest
+  std::uint64_t prune_triangles = 0;  ///< connected parts of the mesh with fewer triangles are left out
+  Length prune_size;     ///< parts whose box has a shorter diagonal, too; `r`, `R`: of the median sample; 0: none
+  bool local = false;    ///< write coordinates less a shift (SurfaceStats::shift), which floats then hold
   int window = 1;        ///< slabs that each stage advances at once, >= 1: more is faster on many cores, takes memory
   bool dry_run = false;  ///< plan only: reads the input, writes nothing
   VolumeExport volume;   ///< grids to write beside the mesh
@@ -85,9 +90,17 @@ struct Rejected {
   std::optional<std::uint64_t> first_row;  ///< of the input, counted from 0, where known
 };
 
+/// Connected parts of the mesh, where pruning was asked for.
+struct PruneCounts {
+  std::uint64_t kept = 0, removed = 0, removed_triangles = 0;
+};
+
 struct SurfaceStats {
   SurfacePlan plan;
   std::uint64_t samples_read = 0;
+  CleanCounts cleaned;
+  PruneCounts pruned;
+  std::array<double, 3> shift{};          ///< SurfaceSettings::local: add it to the coordinates written
   std::vector<Rejected> rejected;         ///< samples left out, by reason
   std::uint64_t replaced_attributes = 0;  ///< attribute values that were NaN or out of range
   std::uint64_t vertices = 0, triangles = 0;

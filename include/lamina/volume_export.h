@@ -1,7 +1,9 @@
 // What `surface` writes as OpenVDB grids beside its mesh.
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,6 +26,8 @@ struct VolumeExport {
   std::size_t split = 0;  ///< bytes of voxels in memory at which a new file begins: OUT.0001.vdb ...; 0: one file
   std::string points;     ///< .vdb for the projected corners as points: P, N, Cd, pscale; empty: none
   std::size_t points_per_file = 1 << 20;  ///< beyond, a numbered sequence
+
+  std::optional<std::array<double, 3>> shift{};  ///< written to the grids' metadata `shift`: add it to coordinates
 
   static constexpr const char* kColours = "auto";
   [[nodiscard]] bool wanted() const { return !path.empty() || !points.empty(); }

@@ -12,8 +12,10 @@ std::string mesh_settings(const SurfaceSettings& settings) {
   // Every setting by name: one that is added must be dealt with here, or this does not compile. What follows `chord`
   // does not change the mesh; names of files are not settings of it.
   const auto& [input, more_inputs, columns, output, frame, bad_samples, normals, normal_search, radius_scale, density,
-               max_radius, blend, steps, fit, diffuse, cell, levels, boundary, cluster, chord, vertex_levels, window, dry_run,
-               volume] = settings;
+               clean, max_radius, blend, steps, fit, diffuse, cell, levels, boundary, cluster, chord, vertex_levels,
+               prune_triangles, prune_size, local, window, dry_run, volume] = settings;
+  // Jobs of several runs refuse these: require_mesh_alone().
+  (void)clean, (void)prune_triangles, (void)prune_size, (void)local;
   (void)input, (void)more_inputs, (void)output, (void)normals, (void)normal_search, (void)window, (void)dry_run;
   const std::string frame_word = frame             ? fmt::format("{}", static_cast<int>(*frame))
                                  : volume.wanted() ? "grid"
@@ -41,6 +43,14 @@ void require_mesh_alone(const SurfaceSettings& settings, const std::string& opti
     throw Error(ExitCode::usage,
                 fmt::format("{} makes the mesh alone: leave --vdb and --vdb-points to a run of their own", option));
   }
+  if (settings.clean.looks_around() || !settings.clean.pick.takes_all()) {
+    throw Error(
+        ExitCode::usage,
+        fmt::format("{} cannot clean samples as they are read; clean the points before, with lamina clean", option));
+  }
+  if (settings.prune_triangles > 0 || settings.prune_size.value > 0 || settings.local)
+    throw Error(ExitCode::usage,
+                fmt::format("{}: --prune, --prune-size and --local want the mesh from one run", option));
   if (settings.dry_run) throw Error(ExitCode::usage, fmt::format("{} and --dry-run contradict each other", option));
 }
 

@@ -44,15 +44,18 @@ void keep_values(std::vector<T>& values, const std::vector<std::uint8_t>& keep) 
 }  // namespace
 
 EditReport clean_rows(SampleBatch& batch) {
+  return clean_rows(batch, std::vector<std::uint8_t>(batch.size(), 1));
+}
+
+EditReport clean_rows(SampleBatch& batch, std::vector<std::uint8_t> keep) {
   EditReport report;
   report.read = batch.size();
-  std::vector<std::uint8_t> keep(batch.size());
   for (std::size_t i = 0; i < batch.size(); ++i) {
-    keep[i] = is_finite_row(batch, i) ? 1 : 0;
-    if (keep[i] != 0) continue;
+    if (keep[i] == 0 || is_finite_row(batch, i)) continue;
+    keep[i] = 0;
     if (report.bad_rows++ == 0) report.first_bad_row = batch.first + i;
   }
-  if (report.bad_rows > 0) keep_rows(batch, keep);
+  if (std::find(keep.begin(), keep.end(), 0) != keep.end()) keep_rows(batch, keep);
   for (std::size_t a = 0; a < batch.attributes.size(); ++a) {
     // A double may be finite where the float beside it is not.
     const bool exact = a < batch.exact.size() && !batch.exact[a].empty();

@@ -21,7 +21,10 @@ BackgroundWriter::~BackgroundWriter() {
 
 BackgroundWriter::Buffer BackgroundWriter::buffer() {
   const std::lock_guard lock(mutex_);
-  if (spares_.empty()) return std::make_unique_for_overwrite<std::byte[]>(buffer_bytes_);
+  if (spares_.empty()) {
+    spares_.reserve(++made_);  // the thread has nobody to tell that memory is out
+    return std::make_unique_for_overwrite<std::byte[]>(buffer_bytes_);
+  }
   Buffer spare = std::move(spares_.back());
   spares_.pop_back();
   return spare;
@@ -30,8 +33,8 @@ BackgroundWriter::Buffer BackgroundWriter::buffer() {
 int BackgroundWriter::write(int fd, Buffer buffer, std::size_t bytes, std::optional<std::uint64_t> offset) {
   std::unique_lock lock(mutex_);
   changed_.wait(lock, [&] { return jobs_.size() < most_; });
-  jobs_.push_back({fd, std::move(buffer), bytes, offset});
   if (!thread_.joinable()) thread_ = std::thread([this] { work(); });
+  jobs_.push_back({fd, std::move(buffer), bytes, offset});
   changed_.notify_all();
   return error_;
 }

@@ -49,6 +49,7 @@ class BackgroundWriter {
   std::condition_variable changed_;
   std::deque<Job> jobs_;  ///< the front one is being written
   std::vector<Buffer> spares_;
+  std::size_t made_ = 0;  ///< buffers
   int error_ = 0;
   bool ending_ = false;
   std::thread thread_;  ///< started by the first write

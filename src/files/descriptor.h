@@ -23,6 +23,7 @@ class Descriptor {
   }
   [[nodiscard]] int get() const { return fd_; }
   [[nodiscard]] explicit operator bool() const { return fd_ >= 0; }
+  [[nodiscard]] int release() { return std::exchange(fd_, -1); }  ///< somebody else closes it
   /// 0 or the errno of close(): network file systems report a failed write only here.
   int close();
 

@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstdio>
 #include <filesystem>
 
 #include "lamina/error.h"
@@ -33,19 +32,6 @@ std::string follow_links(const std::string& path) {
   return target.string();
 }
 
-/// Creates the hidden file; a number is added when a run that was killed left one behind.
-Descriptor create_partial(const fs::path& path, std::string& partial) {
-  constexpr std::size_t kLongestName = 200;  // leaves room in the 255 bytes file systems allow
-  constexpr int kTries = 1000;
-  const std::string stem = fmt::format(".{}.partial-{}", path.filename().string().substr(0, kLongestName), ::getpid());
-  for (int i = 0; i < kTries; ++i) {
-    partial = (path.parent_path() / (i == 0 ? stem : fmt::format("{}-{}", stem, i))).string();
-    Descriptor file(::open(partial.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666));
-    if (file || errno != EEXIST) return file;
-  }
-  return {};
-}
-
 }  // namespace
 
 OutputFile::OutputFile(const std::string& path, const std::string& tmp_dir) : name_(path), path_(follow_links(path)) {
@@ -60,7 +46,7 @@ OutputFile::OutputFile(const std::string& path, const std::string& tmp_dir) : na
   }
   if (streams_) {
     directory_ = tmp_dir.empty() ? system_tmp_dir() : tmp_dir;
-    file_ = open_unlinked(directory_);
+    unnamed_ = open_unlinked(directory_);
     return;
   }
   if (path.empty()) refuse("the output", "its name is empty");
@@ -69,26 +55,27 @@ OutputFile::OutputFile(const std::string& path, const std::string& tmp_dir) : na
   // Renaming would replace a write-protected file all the same.
   if (exists && ::faccessat(AT_FDCWD, path_.c_str(), W_OK, AT_EACCESS) != 0) refuse(name_, system_message(errno));
   directory_ = final_path.has_parent_path() ? final_path.parent_path().string() : ".";
-  file_ = create_partial(final_path, partial_);
-  if (!file_) {
+  staged_ = StagedFile(path_);
+  if (!staged_) {
     const int error = errno;
-    partial_.clear();
     std::error_code ignored;
     if (!fs::exists(directory_, ignored)) refuse(name_, fmt::format("the folder {} does not exist", directory_));
     refuse(name_, system_message(error));
   }
 }
 
-OutputFile::~OutputFile() {
-  if (!partial_.empty()) ::unlink(partial_.c_str());
+std::string OutputFile::staged() {
+  if (streams_) return {};
+  if (const int error = staged_.give_hidden_name(); error != 0) report_write_error(name_, error);
+  return staged_.reopened();
 }
 
 void OutputFile::publish() {
-  // No fsync, like cp and mv: it would hold every run for the disk. A failure that a network file system keeps for
-  // close() is caught.
-  if (const int error = file_.close(); error != 0) report_write_error(name_, error);
-  if (std::rename(partial_.c_str(), path_.c_str()) != 0) report_write_error(name_, errno);
-  partial_.clear();
+  publish_as(path_);
+}
+
+void OutputFile::publish_as(const std::string& path) {
+  if (const int error = staged_.publish(path); error != 0) report_write_error(name_, error);
 }
 
 Descriptor OutputFile::destination() const {

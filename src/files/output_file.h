@@ -3,31 +3,35 @@
 #include <string>
 
 #include "files/descriptor.h"
+#include "files/staged_file.h"
 
 namespace lamina {
 
-/// Stages an output: in a hidden file beside a regular one, renamed at the end; in an unlinked file for standard output
-/// ("-"), pipes and devices, streamed at the end.
+/// Stages an output: a regular one in its own folder, named at the end (StagedFile); standard output ("-"), pipes and
+/// devices in an unlinked file, streamed at the end.
 class OutputFile {
  public:
   /// Throws Error(budget) naming `path` and the reason, Error(usage) when "-" is a terminal.
   OutputFile(const std::string& path, const std::string& tmp_dir);
-  ~OutputFile();  ///< removes the hidden file unless published
   OutputFile(const OutputFile&) = delete;
   OutputFile& operator=(const OutputFile&) = delete;
 
-  [[nodiscard]] int fd() const { return file_.get(); }             ///< the staged file, open for reading and writing
+  /// The staged file, open for reading and writing.
+  [[nodiscard]] int fd() const { return streams_ ? unnamed_.get() : staged_.fd(); }
   [[nodiscard]] bool streams() const { return streams_; }          ///< goes to a pipe or device at the end
   [[nodiscard]] const std::string& name() const { return name_; }  ///< for messages
-  [[nodiscard]] const std::string& staged() const { return partial_; }       ///< the hidden file; empty when it streams
+  /// A hidden name by which other processes can open the staged file; empty when it streams. Throws Error(budget).
+  [[nodiscard]] std::string staged();
   [[nodiscard]] const std::string& directory() const { return directory_; }  ///< where the staged file lies
 
-  void publish();                                ///< closes and renames; of a file that does not stream
+  void publish();  ///< gives a file that does not stream its name; throws Error(budget) when that fails
+  void publish_as(const std::string& path);      ///< the same under another name of the same folder
   [[nodiscard]] Descriptor destination() const;  ///< where a streaming one goes
 
  private:
-  std::string name_, path_, directory_, partial_;
-  Descriptor file_;
+  std::string name_, path_, directory_;
+  StagedFile staged_;
+  Descriptor unnamed_;
   bool streams_ = false;
 };
 

@@ -1,11 +1,10 @@
 #include "meshes/output_file.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
 #include <utility>
 
 #include "lamina/error.h"
@@ -17,27 +16,30 @@ OutputFile::OutputFile(std::string path) : path_(std::move(path)) {
     file_ = stdout;
     return;
   }
-  std::error_code ec;
-  if (std::filesystem::is_directory(path_, ec))
-    throw Error(ExitCode::budget, fmt::format("{}: is a directory; name a file to write", path_));
-  beside_ = fmt::format("{}.part{}", path_, ::getpid());
-  file_ = std::fopen(beside_.c_str(), "wbx");
+  staged_ = std::make_unique<lamina::OutputFile>(path_, std::string{});
+  Descriptor second(::fcntl(staged_->fd(), F_DUPFD_CLOEXEC, 0));
+  file_ = second ? ::fdopen(second.get(), "wb") : nullptr;
   if (file_ == nullptr) fail("cannot be written");
+  (void)second.release();
 }
 
 OutputFile::~OutputFile() {
-  if (file_ == nullptr || file_ == stdout) return;
-  std::fclose(file_);
-  std::remove(beside_.c_str());
+  if (file_ != nullptr && file_ != stdout) std::fclose(file_);
 }
 
 void OutputFile::write(std::string_view bytes) {
   if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) fail("cannot be written to its end");
 }
 
+void OutputFile::close() {
+  // A full disk may show only when the last buffer goes out.
+  if (std::fclose(std::exchange(file_, nullptr)) != 0) fail("cannot be completed");
+}
+
 void OutputFile::commit(const std::string& name) {
   path_ = name;
-  commit();
+  close();
+  staged_->publish_as(name);
 }
 
 void OutputFile::commit() {
@@ -45,14 +47,16 @@ void OutputFile::commit() {
     if (std::fflush(stdout) != 0) fail("cannot be written to its end");
     return;
   }
-  // A full disk may show only when the last buffer goes out.
-  std::FILE* file = std::exchange(file_, nullptr);
-  if (std::fclose(file) != 0 || std::rename(beside_.c_str(), path_.c_str()) != 0) {
-    const int reason = errno;
-    std::remove(beside_.c_str());
-    errno = reason;
-    fail("cannot be completed");
+  if (!staged_->streams()) {
+    close();
+    return staged_->publish();
   }
+  const long bytes = std::ftell(file_);
+  close();
+  Descriptor to = staged_->destination();
+  const int copied = copy_all(staged_->fd(), static_cast<std::uint64_t>(bytes), to.get());
+  const int closed = to.close();
+  if (copied != 0 || closed != 0) report_write_error(path_, copied != 0 ? copied : closed);
 }
 
 void OutputFile::fail(const char* what) const {

@@ -2,12 +2,16 @@
 #pragma once
 #include <cstdint>
 #include <cstdio>
+#include <memory>
 #include <string>
 #include <string_view>
 
+#include "files/output_file.h"
+
 namespace lamina::meshes {
 
-/// Written beside the final name and renamed by commit(); without commit() nothing is left. "-" is standard output.
+/// Named by commit(); without commit() nothing is left. "-" is standard output, written to at once; other pipes and
+/// devices get everything at commit().
 class OutputFile {
  public:
   /// Throws Error(budget) when the file cannot be made.
@@ -21,8 +25,10 @@ class OutputFile {
   void commit(const std::string& name);
 
  private:
+  void close();
   [[noreturn]] void fail(const char* what) const;
-  std::string path_, beside_;
+  std::string path_;
+  std::unique_ptr<lamina::OutputFile> staged_;  ///< null for standard output
   std::FILE* file_ = nullptr;
 };
 

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <bit>
+#include <cctype>
+#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <istream>
@@ -17,9 +19,14 @@ namespace {
   throw Error(ExitCode::unreadable, fmt::format("{}: {}", path, what));
 }
 
+/// As OpenMesh's reader parts words.
+bool is_blank(char c) {
+  return std::isspace(static_cast<unsigned char>(c)) != 0;
+}
+
 /// True for a line of the OBJ keyword `letter`.
 bool keyword(std::string_view line, char letter) {
-  return line.size() > 1 && line[0] == letter && (line[1] == ' ' || line[1] == '\t');
+  return line.size() > 1 && line[0] == letter && is_blank(line[1]);
 }
 
 /// The three coordinates `text` begins with. OpenMesh stops at a number it cannot read: so must we, by name.
@@ -33,16 +40,45 @@ std::array<double, 3> position(std::string_view text, const std::string& path, s
   return p;
 }
 
+/// The corners of a face, VERTEX[/[TEXTURE][/NORMAL]] each. OpenMesh's reader ends the program over a corner without
+/// its vertex and a normal that is not there.
+void require_face(std::string_view text, const std::string& path, std::uint64_t line, std::uint64_t normals) {
+  const auto refuse = [&](const std::string& what) { fail(path, fmt::format("line {}: {}", line, what)); };
+  while (true) {
+    while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
+    if (text.empty() || text.front() == '#') return;
+    for (int part = 0; part < 3; ++part) {
+      std::int64_t number = 0;
+      const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+      const bool there = error == std::errc{};
+      if (!there && part != 1)
+        refuse("a face's corner is VERTEX, VERTEX/TEXTURE/NORMAL or VERTEX//NORMAL, whole numbers");
+      if (there) text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+      if (part == 2 && (number < 1 || static_cast<std::uint64_t>(number) > normals))
+        refuse(fmt::format("the face names normal {} but there are {} before it", number, normals));
+      if (text.empty() || text.front() != '/') break;
+      if (part < 2) text.remove_prefix(1);
+    }
+    if (!text.empty() && !is_blank(text.front()))
+      refuse("a face's corner is VERTEX, VERTEX/TEXTURE/NORMAL or VERTEX//NORMAL, whole numbers");
+  }
+}
+
 TextCensus census_obj(std::istream& in, const std::string& path) {
   TextCensus census;
   census.faces = 0;
   std::string line;
+  std::uint64_t normals = 0;
   for (std::uint64_t number = 1; std::getline(in, line); ++number) {
     const auto text = trimmed(line);
-    if (keyword(text, 'v')) census.positions.push_back(position(text.substr(1), path, number));
-    if (keyword(text, 'f')) ++*census.faces;
     if (!text.empty() && text.back() == '\\' && text[0] != '#')
       fail(path, fmt::format("line {} is continued on the next: join the lines, or convert to PLY", number));
+    if (keyword(text, 'v')) census.positions.push_back(position(text.substr(1), path, number));
+    if (text.starts_with("vn") && text.size() > 2 && is_blank(text[2])) ++normals;
+    if (keyword(text, 'f')) {
+      require_face(text.substr(1), path, number, normals);
+      ++*census.faces;
+    }
   }
   if (census.positions.empty()) fail(path, "holds no vertices: not an OBJ file?");
   return census;

@@ -21,6 +21,10 @@ constexpr std::size_t kSpoolBytes = 256 << 10;
   throw Error(ExitCode::unreadable, fmt::format("{}: cannot be read: {}", name, system_message(error)));
 }
 
+std::int64_t write_time(const struct stat& status) {
+  return std::int64_t{status.st_mtim.tv_sec} * 1'000'000'000 + status.st_mtim.tv_nsec;
+}
+
 /// Bytes that have come from a pipe, up to `size`.
 std::size_t receive(int fd, const std::string& name, std::byte* data, std::size_t size) {
   std::size_t have = 0;
@@ -49,6 +53,14 @@ InputFile spool(int fd, const std::string& name, const std::string& tmp_dir) {
 std::size_t InputFile::read(std::uint64_t offset, void* data, std::size_t size) const {
   const ReadResult result = pread_all(file.get(), data, size, offset);
   if (result.error != 0) cannot_read(name, result.error);
+  struct stat status {};
+  if (written && ::fstat(file.get(), &status) == 0 &&
+      (write_time(status) != *written || static_cast<std::uint64_t>(status.st_size) != bytes)) {
+    throw Error(ExitCode::unreadable,
+                fmt::format("{}: another program wrote to it while it was read; wait until it is complete, and start "
+                            "again",
+                            name));
+  }
   return result.bytes;
 }
 
@@ -74,7 +86,7 @@ InputFile open_input(const std::string& path, const std::string& tmp_dir) {
   InputFile input = whole_file ? InputFile{} : spool(file.get(), name, tmp_dir);
   if (whole_file) {
     ::posix_fadvise(file.get(), 0, 0, POSIX_FADV_SEQUENTIAL);
-    input = {std::move(file), static_cast<std::uint64_t>(status.st_size), name};
+    input = {std::move(file), static_cast<std::uint64_t>(status.st_size), name, write_time(status)};
   }
   char start[2];
   if (is_gzip({start, input.read(0, start, sizeof start)})) return unpack_gzip(input, tmp_dir);

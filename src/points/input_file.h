@@ -2,6 +2,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -14,8 +15,11 @@ struct InputFile {
   Descriptor file;
   std::uint64_t bytes = 0;
   std::string name;  ///< for messages
+  /// When a file of the user's was last written to, nanoseconds; nothing for those of our own.
+  std::optional<std::int64_t> written{};
 
-  /// Fills `data`; fewer bytes only at the end of the file. Throws Error(unreadable) when the system cannot read.
+  /// Fills `data`; fewer bytes only at the end of the file. Throws Error(unreadable) when the system cannot read, or
+  /// when another program has written to the file since it was opened.
   std::size_t read(std::uint64_t offset, void* data, std::size_t size) const;
 };
 

@@ -132,7 +132,7 @@ class Reading {
   bool fill(const Survey& survey) {
     ranks_.together([&] {
       const auto work = [&] {
-        ingested_.emplace(ingest(*source_, survey, frame_, settings_.radius_scale, directory_, run_, rows_));
+        ingested_.emplace(ingest(*source_, survey, frame_, settings_.radius_scale, directory_, run_, {}, rows_));
       };
       watch_.time("store", [&] {
         if (shared_) {

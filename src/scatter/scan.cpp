@@ -153,7 +153,7 @@ ScanReport scan(const TriangleMesh& mesh, const ScanSettings& settings, const st
           rows.add(s.position, s.normal, s.colour, s.confidence);
           ++report.samples;
         }
-    OutputFile out(path);
+    meshes::OutputFile out(path);
     out.write(scatter_detail::ply_header(layout, report.samples));
     out.write(rows.bytes());
     out.commit();

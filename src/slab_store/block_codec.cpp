@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <memory>
 
 #include "lamina/error.h"
 
@@ -69,6 +70,12 @@ void unflatten(std::span<std::uint32_t> values, const ColumnHeader& header) {
   }
 }
 
+/// Blosc does not look whether it gets the memory it asks for, and crashes: so does the program ask before.
+void require_memory(std::size_t bytes) {
+  const auto memory = std::make_unique_for_overwrite<std::byte[]>(bytes);
+  *static_cast<volatile std::byte*>(memory.get()) = std::byte{};  // or the compiler leaves it all out
+}
+
 }  // namespace
 
 std::size_t block_bound(const SampleColumns& columns, std::size_t rows) {
@@ -87,6 +94,7 @@ std::size_t encode_block(const SampleColumns& columns, std::span<const std::byte
     if (SampleColumns::is_position(c)) flatten(scratch.first(count), header);
     // Given more room than this, Blosc may use it for small blocks instead of storing them plainly.
     const std::size_t room = count * value_bytes + BLOSC_MAX_OVERHEAD;
+    require_memory(2 * room);
     const int bytes =
         blosc_compress_ctx(SampleColumns::is_noise(c) ? 0 : kLevel, BLOSC_SHUFFLE, value_bytes, count * value_bytes,
                            scratch.data(), block.data() + end, room, kCompressor, 0, 1);
@@ -123,6 +131,7 @@ bool decode_block(const SampleColumns& columns, std::span<const std::byte> block
       scratch.resize(bytes);
       to = scratch.data();
     }
+    require_memory(2 * bytes + BLOSC_MAX_OVERHEAD);
     if (blosc_decompress_ctx(block.data() + begin, to, bytes, 1) != static_cast<int>(bytes)) return false;
     if (SampleColumns::is_position(c)) {
       unflatten({reinterpret_cast<std::uint32_t*>(to), count}, header);

@@ -18,6 +18,7 @@ struct BucketIndex {
   std::vector<BlockEntry> blocks;        ///< in the order of append()
   std::vector<std::uint32_t> checksums;  ///< of the blocks, where the store is kept
   std::uint64_t count = 0;
+  std::vector<bool> keep{};  ///< of the samples in the blocks, which stay; empty: all
   std::int32_t z_lower = std::numeric_limits<std::int32_t>::max();
   std::int32_t z_upper = std::numeric_limits<std::int32_t>::min();
 };

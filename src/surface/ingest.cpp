@@ -94,7 +94,7 @@ std::pair<std::int32_t, std::int32_t> range_of(const std::vector<std::int32_t>& 
 
 /// Fills the rest of a piece from `piece.rows`.
 void to_local(Piece& piece, const AttributeLayout& layout, const Frame& frame, double radius_scale,
-              double quality_scale) {
+              double quality_scale, const RowPick& pick) {
   const SampleBatch& rows = piece.rows;
   LocalSamples& out = piece.local;
   Census& census = piece.census;
@@ -107,6 +107,7 @@ void to_local(Piece& piece, const AttributeLayout& layout, const Frame& frame, d
   double farthest = 0;
   std::size_t n = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (!census.takes(pick, rows, i)) continue;
     const Defect defect = defect_of(rows, i);
     if (defect != Defect::none) {
       census.reject(defect, rows.first + i);
@@ -170,7 +171,7 @@ StoreSettings store_settings(const Survey& survey, const Frame& frame, const Sto
 }  // namespace
 
 Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, double radius_scale,
-                const StorePlace& place, const RunContext& run, const RowSpan& rows) {
+                const StorePlace& place, const RunContext& run, const RowPick& pick, const RowSpan& rows) {
   const PointSourceInfo& info = source.info();
   const StoreSettings buckets = store_settings(survey, frame, place);
   SlabStoreWriter writer({info.has_radius, info.has_quality, info.attributes}, buckets);
@@ -201,7 +202,7 @@ Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, d
   };
   const auto convert = [&](Piece* piece) {
     if (info.random_access) read(piece->rows);
-    to_local(*piece, info.attributes, frame, radius_scale, quality);
+    to_local(*piece, info.attributes, frame, radius_scale, quality, pick);
     return piece;
   };
   const auto append = [&](Piece* piece) {

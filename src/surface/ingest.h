@@ -43,6 +43,6 @@ struct RowSpan {
 /// Reads the input, or some of its rows, into the store; samples with a defect are left out. After a survey of all rows
 /// the result is always complete; after one of a part it need not be.
 Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, double radius_scale,
-                const StorePlace& place, const RunContext& run, const RowSpan& rows = {});
+                const StorePlace& place, const RunContext& run, const RowPick& pick = {}, const RowSpan& rows = {});
 
 }  // namespace lamina

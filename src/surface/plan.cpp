@@ -133,6 +133,7 @@ void check_settings(const SurfaceSettings& s) {
   require(s.boundary >= 0, "--boundary", "0 (no limit) or positive, in influence radii");
   require(s.chord >= 0 && s.chord <= 1, "--chord", "in 0..1");
   require(s.window >= 1 && s.window <= 1024, "--window", "in 1..1024");
+  require_sane(s.clean);
   check_volume_export(s.volume);
   require(!s.input.empty(), "the input", "a point file");
   require(s.dry_run || !s.output.empty(), "--output", "given");

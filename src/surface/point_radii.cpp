@@ -13,6 +13,7 @@
 #include "lamina/error.h"
 #include "meshes/with_threads.h"
 #include "surface/ingest.h"
+#include "surface/numbered_rows.h"
 #include "surface/plan.h"
 #include "surface/survey.h"
 
@@ -21,44 +22,6 @@ namespace {
 
 constexpr std::size_t kMemory = std::size_t{256} << 20;
 constexpr std::size_t kPiece = std::size_t{1} << 15;  ///< rows written at a time
-constexpr std::size_t kDigits = 3;  ///< of a row's number, 16 bits each: the store keeps them in two bytes
-
-/// The positions of a source, each with the number of its row; what else a reconstruction wants is made up.
-class NumberedPositions final : public PointSource {
- public:
-  explicit NumberedPositions(PointSource& source) : source_(source) {
-    info_.path = source.info().path;
-    info_.count = source.info().count;
-    info_.random_access = source.info().random_access;
-    info_.has_normals = true;
-    for (std::size_t d = 0; d < kDigits; ++d) info_.attributes.push_back({fmt::format("row{}", d), ScalarType::uint16});
-  }
-  void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
-    source_.read(first, count, out);
-    const std::size_t n = out.size();
-    out.nx.assign(n, 0);
-    out.ny.assign(n, 0);
-    out.nz.assign(n, 1);
-    out.radius.clear();
-    out.quality.clear();
-    out.exact.clear();
-    out.attributes.resize(kDigits);
-    for (std::size_t d = 0; d < kDigits; ++d) {
-      out.attributes[d].resize(n);
-      for (std::size_t i = 0; i < n; ++i)
-        out.attributes[d][i] = static_cast<float>(((first + i) >> (16 * d)) & 0xFFFFU);
-    }
-  }
-
- private:
-  PointSource& source_;
-};
-
-std::uint64_t row_of(const std::vector<std::vector<float>>& digits, std::size_t i) {
-  std::uint64_t row = 0;
-  for (std::size_t d = 0; d < kDigits; ++d) row |= static_cast<std::uint64_t>(digits[d][i]) << (16 * d);
-  return row;
-}
 
 /// Counts of radii by size, a hundredth of an octave wide.
 class Distribution {
@@ -202,14 +165,14 @@ PointRadiiReport write_radii(PointSource& source, PointsWriter& writer, const Po
   const std::string directory = run.tmp_dir.empty() ? system_tmp_dir() : run.tmp_dir;
   RunContext silent = run;  // what is left out is told by whoever writes the rows
   silent.log = nullptr;
-  NumberedPositions positions(source);
+  NumberedRows positions(source);
   const Survey survey = survey_input(positions, settings.bad_samples, silent);
   const Frame frame = choose_frame(survey, FrameMode::pca);
   const Ingested in = ingest(positions, survey, frame, 1, directory, run);
   SurfaceSettings plan;
   plan.input = source.info().path;
   plan.density = settings.density;
-  const Resolved resolved = resolve_plan(plan, frame, in.store, in.extent, false, kDigits);
+  const Resolved resolved = resolve_plan(plan, frame, in.store, in.extent, false, NumberedRows::kDigits);
 
   const std::size_t memory = run.max_memory > 0 ? std::min(kMemory, run.max_memory / 4) : kMemory;
   const std::uint64_t whole = in.store.total() * (sizeof(float) + 12);

@@ -18,10 +18,13 @@
 #include "lamina/mesh_sink.h"
 #include "lamina/points.h"
 #include "surface/choose_normals.h"
+#include "surface/clean_ingested.h"
 #include "surface/ingest.h"
 #include "surface/kept_input.h"
+#include "surface/local_shift.h"
 #include "surface/pipeline.h"
 #include "surface/plan.h"
+#include "surface/pruner.h"
 #include "surface/stopwatch.h"
 #include "surface/survey.h"
 #include "surface/sweep.h"
@@ -154,10 +157,12 @@ Ingested read_input(PointSource& source, const SurfaceSettings& settings, const 
   std::optional<Ingested> ingested;
   const auto fill = [&](const Survey& survey) {
     frame = choose_frame(survey, chosen_frame(settings));
-    watch.time("store", [&] { ingested.emplace(ingest(source, survey, frame, settings.radius_scale, place, run)); });
+    watch.time("store", [&] {
+      ingested.emplace(ingest(source, survey, frame, settings.radius_scale, place, run, settings.clean.pick));
+    });
   };
   std::optional<Survey> survey;
-  watch.time("survey", [&] { survey = survey_part(source); });
+  watch.time("survey", [&] { survey = survey_part(source, settings.clean.pick); });
   if (survey) {
     fill(*survey);
     if (ingested->complete) {
@@ -166,7 +171,7 @@ Ingested read_input(PointSource& source, const SurfaceSettings& settings, const 
     }
     ingested.reset();
   }
-  watch.time("survey", [&] { survey = survey_input(source, settings.bad_samples, run); });
+  watch.time("survey", [&] { survey = survey_input(source, settings.bad_samples, run, settings.clean.pick); });
   fill(*survey);
   return std::move(*ingested);
 }
@@ -197,6 +202,27 @@ void refuse_two_levels(const SurfaceSettings& settings, const PointSourceInfo& i
     throw Error(ExitCode::usage, fmt::format("{}: the points have an attribute called level already; leave out --level",
                                              input_name(settings)));
   }
+}
+
+/// What is to be left out before anything is measured.
+void clean(Ingested& in, const SurfaceSettings& settings, double step, const std::string& tmp, const RunContext& run,
+           Stopwatch& watch, std::uint64_t rows, SurfaceStats& stats) {
+  stats.cleaned.clipped = in.census.clipped;
+  stats.cleaned.skipped = in.census.skipped;
+  if (settings.clean.looks_around()) {
+    watch.time("clean",
+               [&] { clean_ingested(in, settings.clean, step, input_name(settings), tmp, stats.cleaned, run); });
+  }
+  if (const std::string said = describe(stats.cleaned); !said.empty())
+    run.info(fmt::format("{} of {} samples left: {}", in.store.total(), rows, said));
+}
+
+/// What is left out is not written down with samples that are kept for several runs.
+void require_uncleaned(const SurfaceSettings& settings) {
+  if (settings.clean.looks_around() || !settings.clean.pick.takes_all())
+    throw Error(ExitCode::usage,
+                "samples that are kept for several runs cannot be cleaned as they are read; clean the "
+                "points before, with lamina clean");
 }
 
 }  // namespace
@@ -262,14 +288,16 @@ FrameMode chosen_frame(const SurfaceSettings& settings) {
 
 SweepInput read_surface_input(const SurfaceSettings& settings, const std::string& directory, bool keep,
                               const RunContext& run, Stopwatch& watch, SurfaceStats& stats) {
-  if (settings.more_inputs.empty() && is_kept_input(settings.input) && !keep)
-    return open_kept_input(settings.input, settings);
+  const bool kept = settings.more_inputs.empty() && is_kept_input(settings.input);
+  if (keep || kept) require_uncleaned(settings);
+  if (kept && !keep) return open_kept_input(settings.input, settings);
   const std::string scratch = keep ? temporary_directory(settings, run) : directory;
   std::unique_ptr<PointSource> source = open_inputs(settings, scratch, run);
   if (settings.normals != NormalsChoice::file)
     watch.time("normals", [&] { source = choose_normals(std::move(source), settings, stats.normals, scratch, run); });
   Frame frame;
   Ingested ingested = read_input(*source, settings, {directory, keep}, run, watch, frame);
+  clean(ingested, settings, frame.step, scratch, run, watch, source->info().count, stats);
   return {source->info(), frame, std::move(ingested)};
 }
 
@@ -366,6 +394,37 @@ void run_in_arena(const RunContext& run, const std::function<void()>& work) {
 
 namespace {
 
+void report_pruning(const PruneCounts& counts, const std::string& name, SurfaceStats& stats, const RunContext& run) {
+  stats.pruned = counts;
+  if (counts.kept == 0 && counts.removed > 0) {
+    throw Error(ExitCode::empty, fmt::format("{}: all {} connected parts of the mesh are too small for --prune or "
+                                             "--prune-size",
+                                             name, counts.removed));
+  }
+  run.info(fmt::format("{} connected parts, {} small ones left out with {} triangles", counts.kept, counts.removed,
+                       counts.removed_triangles));
+}
+
+/// On their way to a mesh file, small parts are left out.
+class PrunedSlabs final : public SlabSink {
+ public:
+  explicit PrunedSlabs(Pruner& pruner) : pruner_(pruner) {}
+  void write(const FinalSlab& slab, const VertexBatch& vertices) override { pruner_.add(vertices, slab.triangles); }
+
+ private:
+  Pruner& pruner_;
+};
+
+/// Everything that comes out, from here on, is less the shift.
+void shift_output(SweepInput& input, const SurfaceSettings& settings, SurfaceStats& stats, const RunContext& run) {
+  stats.shift = local_shift(input.ingested.census);
+  input.frame = shifted(input.frame, stats.shift);
+  const Eigen::Vector3d by(stats.shift[0], stats.shift[1], stats.shift[2]);
+  input.ingested.census.low -= by;
+  input.ingested.census.high -= by;
+  if (!settings.dry_run) run.info(fmt::format("coordinates are written less {}", shift_text(stats.shift)));
+}
+
 SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run) {
   SurfaceStats stats;
   Stopwatch watch;
@@ -380,19 +439,32 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
   }
 
   SweepInput input = read_surface_input(settings, tmp, /*keep=*/false, run, watch, stats);
+  if (settings.local) shift_output(input, settings, stats, run);
   const Resolved resolved = plan_surface(settings, input, run, watch, Stopwatch::now().wall - began.wall, stats);
   if (!settings.dry_run) {
     out = mesh_layout(settings, input, resolved);
     out.path = settings.output;
     out.tmp_dir = tmp;
+    if (settings.local) out.comments.push_back("shift " + shift_text(stats.shift));
     MeshSink sink(out);
     std::optional<SurfaceVolume> volume;
-    if (settings.volume.wanted()) {
-      volume.emplace(settings.volume, input.frame, resolved.lattice, resolved.main_level, input.info.attributes, tmp);
+    VolumeExport grids = settings.volume;
+    if (settings.local) grids.shift = stats.shift;
+    if (grids.wanted()) {
+      volume.emplace(grids, input.frame, resolved.lattice, resolved.main_level, input.info.attributes, tmp);
     }
-    MeshFileSlabs slabs(sink);
-    sweep(settings, input, resolved, all_slabs(resolved.lattice, input.ingested.extent), slabs,
-          volume ? &*volume : nullptr, run, watch, stats);
+    const PruneRule rule{settings.prune_triangles,
+                         resolve(settings.prune_size, resolved.plan.radius_median, settings.blend)};
+    const bool prunes = rule.triangles > 0 || rule.size > 0;
+    Pruner pruner(rule, tmp, sink);
+    MeshFileSlabs whole(sink);
+    PrunedSlabs pruned(pruner);
+    sweep(settings, input, resolved, all_slabs(resolved.lattice, input.ingested.extent),
+          prunes ? static_cast<SlabSink&>(pruned) : whole, volume ? &*volume : nullptr, run, watch, stats);
+    if (prunes) {
+      watch.time("cluster and write", [&] { pruner.finish(); });
+      report_pruning(pruner.counts(), input_name(settings), stats, run);
+    }
     if (sink.triangles() == 0) no_surface(input_name(settings), resolved.plan.samples);
     if (volume) {
       watch.time("volume", [&] { volume->finish(/*open=*/stats.rejected_loops > 0); });

@@ -11,6 +11,7 @@
 #include <limits>
 #include <numeric>
 
+#include "clean/row_pick.h"
 #include "lamina/error.h"
 
 namespace lamina {
@@ -26,11 +27,12 @@ struct Partial {
   Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
 };
 
-Partial look_at(const SampleBatch& batch, const AttributeLayout& layout) {
+Partial look_at(const SampleBatch& batch, const AttributeLayout& layout, const RowPick& pick) {
   Partial p;
   Census& c = p.census;
   c.count_attributes(batch, layout);
   for (std::size_t i = 0; i < batch.size(); ++i) {
+    if (!c.takes(pick, batch, i)) continue;
     const Defect defect = defect_of(batch, i);
     if (defect != Defect::none) {
       c.reject(defect, batch.first + i);
@@ -69,7 +71,7 @@ Survey survey_of(const Partial& p) {
   return survey;
 }
 
-Partial look_at_all(PointSource& source, const RunContext& run) {
+Partial look_at_all(PointSource& source, const RunContext& run, const RowPick& pick) {
   const std::uint64_t count = source.info().count;
   Partial total;
   std::uint64_t done = 0;
@@ -81,7 +83,7 @@ Partial look_at_all(PointSource& source, const RunContext& run) {
     SampleBatch batch;
     while (done < count) {
       source.read(done, kChunk, batch);
-      merge(total, look_at(batch, source.info().attributes));
+      merge(total, look_at(batch, source.info().attributes, pick));
       done = std::min<std::uint64_t>(count, done + kChunk);
       report();
     }
@@ -97,7 +99,7 @@ Partial look_at_all(PointSource& source, const RunContext& run) {
       if (first >= count) return;
       SampleBatch& batch = batches.local();
       source.read(first, kChunk, batch);
-      partials[i] = look_at(batch, source.info().attributes);
+      partials[i] = look_at(batch, source.info().attributes, pick);
     });
     for (const Partial& p : partials) merge(total, p);
     done = std::min<std::uint64_t>(count, done + kPieces * kChunk);
@@ -123,6 +125,14 @@ void Census::reject(Defect defect, std::uint64_t row) {
   if (rejected[k]++ == 0) first_row[k] = row;
 }
 
+bool Census::takes(const RowPick& pick, const SampleBatch& batch, std::size_t i) {
+  if (pick.takes_all()) return true;
+  const clean::Pick judged = clean::judge(pick, batch, i, batch.first + i);
+  skipped += judged == clean::Pick::skipped ? 1 : 0;
+  clipped += judged == clean::Pick::clipped ? 1 : 0;
+  return judged == clean::Pick::taken;
+}
+
 void Census::count_attributes(const SampleBatch& batch, const AttributeLayout& layout) {
   for (std::size_t c = 0; c < batch.attributes.size(); ++c) {
     if (layout[c].type != ScalarType::float32 && layout[c].type != ScalarType::float64) continue;  // always in range
@@ -146,6 +156,8 @@ void Census::merge(const Census& later) {
   unusable_attributes += later.unusable_attributes;
   max_quality = std::max(max_quality, later.max_quality);
   usable += later.usable;
+  clipped += later.clipped;
+  skipped += later.skipped;
   low = low.cwiseMin(later.low);
   high = high.cwiseMax(later.high);
 }
@@ -219,6 +231,9 @@ void judge(const Census& c, const PointSourceInfo& source, BadSamples bad, const
     run.warn(what + "; dropped");
   }
   warn_of_attributes(path, c, bad, run);
+  if (c.usable == 0 && c.clipped > 0)
+    throw Error(ExitCode::empty,
+                fmt::format("{}: none of its {} samples lies in the box to clip to", path, source.count));
   if (c.usable == 0)
     throw Error(ExitCode::empty, fmt::format("{}: none of its {} samples is usable", path, source.count));
   if (source.has_quality && !(c.max_quality > 0)) {
@@ -238,14 +253,14 @@ void judge(const Census& c, const PointSourceInfo& source, BadSamples bad, const
               fmt::format("{}: coordinates span {:.3g}, more than can be computed with", path, extent.maxCoeff()));
 }
 
-Survey survey_input(PointSource& source, BadSamples bad, const RunContext& run) {
+Survey survey_input(PointSource& source, BadSamples bad, const RunContext& run, const RowPick& pick) {
   require_samples(source.info());
-  Survey survey = survey_of(look_at_all(source, run));
+  Survey survey = survey_of(look_at_all(source, run, pick));
   judge(survey, source.info(), bad, run);
   return survey;
 }
 
-std::optional<Survey> survey_part(PointSource& source) {
+std::optional<Survey> survey_part(PointSource& source, const RowPick& pick) {
   // Runs of rows from all over the file: whatever order the rows are in, all of the cloud is looked at.
   constexpr std::uint64_t kRuns = 256;
   constexpr std::uint64_t kRows = 1024;
@@ -258,7 +273,7 @@ std::optional<Survey> survey_part(PointSource& source) {
     const auto share = static_cast<double>(i) / static_cast<double>(kRuns - 1);
     const auto first = static_cast<std::uint64_t>(share * static_cast<double>(count - kRows));
     source.read(first, kRows, batch);
-    partials[i] = look_at(batch, source.info().attributes);
+    partials[i] = look_at(batch, source.info().attributes, pick);
   });
   Partial total;
   for (const Partial& p : partials) merge(total, p);

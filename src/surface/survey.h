@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "lamina/clean.h"
 #include "lamina/frame.h"
 #include "lamina/points.h"
 #include "lamina/run.h"
@@ -30,6 +31,7 @@ inline float usable_attribute(float value) {
 /// What a pass over the input finds besides the samples themselves.
 struct Census {
   std::uint64_t usable = 0;
+  std::uint64_t clipped = 0, skipped = 0;  ///< rows that RowPick does not take
   std::array<std::uint64_t, kDefects> rejected{};
   std::array<std::uint64_t, kDefects> first_row{};
   Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());  ///< bounding box, input
@@ -39,6 +41,8 @@ struct Census {
   std::uint64_t first_unusable_attribute = 0;  ///< row of the first
 
   void reject(Defect defect, std::uint64_t row);
+  /// Whether the row is taken; counts it where it is not.
+  bool takes(const RowPick& pick, const SampleBatch& batch, std::size_t i);
   void count_attributes(const SampleBatch& batch, const AttributeLayout& layout);
   void merge(const Census& later);  ///< of the rows after those of this one
 };
@@ -48,12 +52,12 @@ struct Survey : Census {
 };
 
 /// Reads the whole input once. Throws as judge() does.
-Survey survey_input(PointSource& source, BadSamples bad, const RunContext& run);
+Survey survey_input(PointSource& source, BadSamples bad, const RunContext& run, const RowPick& pick = {});
 
 /// A survey of some 2^18 rows from all over a large input whose rows can be read in any order: enough to choose a frame
 /// by, though samples may lie outside its box; `usable` is an estimate for all rows. Nothing for other inputs, and
 /// where the rows looked at make no frame.
-std::optional<Survey> survey_part(PointSource& source);
+std::optional<Survey> survey_part(PointSource& source, const RowPick& pick = {});
 
 /// Warns of rows left out and attributes replaced. Throws Error(empty) when nothing usable is there or all samples lie
 /// at one place, Error(unreadable) for a defect or an unusable attribute when `bad` is refuse, and for coordinates that

@@ -9,8 +9,9 @@
 
 namespace lamina::volume {
 
-CornerPoints::CornerPoints(std::string path, std::size_t per_file, const AttributeLayout& layout, const Frame& frame)
-    : path_(std::move(path)), per_file_(per_file), frame_(frame) {
+CornerPoints::CornerPoints(std::string path, std::size_t per_file, const AttributeLayout& layout, const Frame& frame,
+                           const std::optional<std::array<double, 3>>& shift)
+    : path_(std::move(path)), per_file_(per_file), frame_(frame), shift_(shift) {
   points_.layout = layout;
   points_.samples.attributes.resize(layout.size());
   // An output that cannot be written is refused before the work.
@@ -46,6 +47,7 @@ void CornerPoints::write_file() {
   const double voxel = point_voxel(points_.samples, 0);
   const auto grid = point_grid(points_, point_columns(points_), point_transform(points_, voxel));
   label(*grid, "points", false);
+  if (shift_) note_shift(*grid, *shift_);
   const std::string bytes = vdb_bytes({grid});
   bytes_ += bytes.size();
   files_.back()->write(bytes);

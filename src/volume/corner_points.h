@@ -1,7 +1,9 @@
 // The projected corners next to the surface, as points: where the mesh's vertices are taken from.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,7 +17,9 @@ namespace lamina::volume {
 /// A points grid needs all of its points at once: beyond `per_file` a numbered sequence is begun.
 class CornerPoints {
  public:
-  CornerPoints(std::string path, std::size_t per_file, const AttributeLayout& layout, const Frame& frame);
+  /// `shift`: VolumeExport::shift.
+  CornerPoints(std::string path, std::size_t per_file, const AttributeLayout& layout, const Frame& frame,
+               const std::optional<std::array<double, 3>>& shift);
   void add(const IsoSlab& slab);
   void finish();
   /// The names the files appear under.
@@ -29,6 +33,7 @@ class CornerPoints {
   std::string path_;
   std::size_t per_file_;
   Frame frame_;
+  std::optional<std::array<double, 3>> shift_;
   PointArrays points_;
   std::vector<std::unique_ptr<meshes::OutputFile>> files_;
   std::uint64_t count_ = 0, bytes_ = 0;

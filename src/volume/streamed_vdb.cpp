@@ -4,7 +4,6 @@
 #include <openvdb/io/Archive.h>
 #include <openvdb/io/Compression.h>
 #include <openvdb/io/GridDescriptor.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -97,19 +96,13 @@ PackedLeaf pack(const Vec3STree::LeafNodeType& leaf, bool half) {
   return pack_any(leaf, Vec3s(0), half);
 }
 
-StreamedVdb::StreamedVdb(std::string path, const std::string& tmp_dir)
-    : path_(std::move(path)), beside_(fmt::format("{}.part{}", path_, ::getpid())), spool_(tmp_dir) {
+StreamedVdb::StreamedVdb(std::string path, const std::string& tmp_dir) : path_(std::move(path)), spool_(tmp_dir) {
   std::error_code ec;
   if (std::filesystem::is_directory(path_, ec))
     throw Error(ExitCode::budget, fmt::format("{}: is a directory; name a file to write", path_));
   // An output that cannot be written is better known before the work.
-  const std::ofstream trial(beside_, std::ios::binary);
-  if (!trial) fail("cannot be written");
-  staged_ = true;
-}
-
-StreamedVdb::~StreamedVdb() {
-  if (staged_) std::remove(beside_.c_str());
+  staged_ = StagedFile(path_);
+  if (!staged_) fail("cannot be written");
 }
 
 void StreamedVdb::fail(const char* what) const {
@@ -272,7 +265,7 @@ void StreamedVdb::write(std::ostream& os) {
 void StreamedVdb::finish() {
   spool_.flush(disk_);
   spool_.check(disk_.drain());
-  std::fstream file(beside_, std::ios::binary | std::ios::in | std::ios::out | std::ios::trunc);
+  std::fstream file(staged_.reopened(), std::ios::binary | std::ios::in | std::ios::out | std::ios::trunc);
   if (!file) fail("cannot be written");
   write(file);
   file.seekp(kTagAt);
@@ -293,8 +286,8 @@ void StreamedVdb::finish() {
 }
 
 void StreamedVdb::commit(const std::string& final_name) {
-  if (std::rename(beside_.c_str(), final_name.c_str()) != 0) fail("cannot be completed");
-  staged_ = false;
+  errno = staged_.publish(final_name);
+  if (errno != 0) fail("cannot be completed");
 }
 
 }  // namespace lamina::volume

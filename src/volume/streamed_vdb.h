@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "files/staged_file.h"
 #include "slab_store/temp_file.h"
 #include "volume/tile_signs.h"
 
@@ -28,11 +29,10 @@ PackedLeaf pack(const openvdb::FloatTree::LeafNodeType& leaf, float background, 
 PackedLeaf pack(const openvdb::Vec3STree::LeafNodeType& leaf, bool half);
 
 /// Leaves wait, compressed, in an unnamed temporary file; memory holds some forty bytes for each. finish() puts the
-/// file together beside its name, commit() renames. Without commit() nothing is left.
+/// file together, commit() gives it its name. Without commit() nothing is left.
 class StreamedVdb {
  public:
   StreamedVdb(std::string path, const std::string& tmp_dir);
-  ~StreamedVdb();
   StreamedVdb(const StreamedVdb&) = delete;
   StreamedVdb& operator=(const StreamedVdb&) = delete;
 
@@ -69,12 +69,12 @@ class StreamedVdb {
   [[nodiscard]] std::string read(const Record& record, std::size_t bytes) const;
   [[noreturn]] void fail(const char* what) const;
 
-  std::string path_, beside_;
+  std::string path_;
+  StagedFile staged_;
   TempFile spool_;
   BackgroundWriter disk_{TempFile::kBufferBytes, kBuffersInFlight};  ///< ends before the file it writes to
   std::vector<Grid> grids_;
   std::uint64_t bytes_ = 0;
-  bool staged_ = false;
 };
 
 }  // namespace lamina::volume

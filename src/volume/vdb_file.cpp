@@ -108,6 +108,10 @@ void label(openvdb::GridBase& grid, const std::string& name, bool half) {
   grid.setSaveFloatAsHalf(half);
 }
 
+void note_shift(openvdb::GridBase& grid, const std::array<double, 3>& shift) {
+  grid.insertMeta("shift", openvdb::Vec3DMetadata(openvdb::Vec3d(shift[0], shift[1], shift[2])));
+}
+
 std::uint64_t write_vdb(const openvdb::GridCPtrVec& grids, const std::string& path) {
   meshes::OutputFile out(path);
   const std::string bytes = vdb_bytes(grids);

@@ -2,6 +2,7 @@
 #pragma once
 #include <openvdb/openvdb.h>
 
+#include <array>
 #include <string>
 
 namespace lamina::volume {
@@ -33,6 +34,8 @@ bool is_open(const openvdb::GridBase& grid);
 
 /// Name, creator and precision of a grid about to be written.
 void label(openvdb::GridBase& grid, const std::string& name, bool half);
+/// Metadata `shift`: what to add to the grid's coordinates to get the input's.
+void note_shift(openvdb::GridBase& grid, const std::array<double, 3>& shift);
 
 /// Writes the grids beside `path`, then renames; "-" is standard output. Returns the size in bytes.
 std::uint64_t write_vdb(const openvdb::GridCPtrVec& grids, const std::string& path);

@@ -221,5 +221,19 @@ TEST(ReadMesh, CutArchivesAreNamed) {
   }
 }
 
+// OpenMesh's reader ends the program over these.
+TEST(ReadMesh, ObjFacesThatNameNothingAreRefused) {
+  const ScratchFolder folder;
+  const std::string corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+  for (const char* face :
+       {"f /1 2 3", "f 1 2 //3", "f 1 2 x", "f 1/'1 2 3", "f 1//1 2//1 3//1", "f 1//0 2 3", "f\v/1 2 3"}) {
+    const auto path = folder.write("face.obj", corners + face + "\n");
+    SCOPED_TRACE(face);
+    expect_error(ExitCode::unreadable, [&] { read_mesh(path); }, {path, "line 4"});
+  }
+  const auto good = folder.write("good.obj", corners + "vn 0 0 1\nvt 0 0\nf 1/1/1 2//1 3/1\nf -3 -2 -1 # last\n");
+  EXPECT_EQ(read_mesh(good).triangles.size(), 2U);
+}
+
 }  // namespace
 }  // namespace lamina

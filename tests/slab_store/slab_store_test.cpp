@@ -312,5 +312,51 @@ TEST(SlabStore, NoticesADamagedFile) {
   std::filesystem::remove_all(directory);
 }
 
+TEST(SlabStore, SamplesLeftOutNeverComeBack) {
+  std::mt19937 random(11);
+  const StoreLayout layout{true, true, {{"red", ScalarType::uint8}}};
+  StoreSettings settings;
+  settings.directory = temporary();
+  settings.bucket_height = 100;
+  settings.buckets = 7;
+  SlabStoreWriter writer(layout, settings);
+  writer.append(random_samples(layout, 5000, 0, 600, random));
+  SlabStore store = writer.finish();
+  std::vector<LocalSamples> expected(store.buckets());
+  for (auto& e : expected) e.attributes.resize(1);
+  // Twice, the second time of what the first has left; one bucket loses everything and one nothing.
+  for (int round = 0; round < 2; ++round) {
+    std::vector<std::vector<bool>> keep(store.buckets());
+    for (std::size_t b = 0; b < store.buckets(); ++b) {
+      LocalSamples all;
+      store.read(b, all);
+      expected[b] = {};
+      expected[b].attributes.resize(1);
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        keep[b].push_back(b != 2 && (b == 3 || random() % 3 > 0));
+        if (keep[b].back()) append_row(all, i, expected[b]);
+      }
+    }
+    store.keep_only(keep);
+  }
+  std::uint64_t total = 0;
+  for (std::size_t b = 0; b < store.buckets(); ++b) {
+    LocalSamples left;
+    store.read(b, left);
+    EXPECT_TRUE(same(left, expected[b])) << b;
+    EXPECT_EQ(store.count(b), expected[b].size());
+    total += store.count(b);
+    if (expected[b].size() == 0) {
+      EXPECT_EQ(store.z_lower(b), std::numeric_limits<std::int32_t>::max());
+      continue;
+    }
+    EXPECT_EQ(store.z_lower(b), *std::min_element(expected[b].z.begin(), expected[b].z.end()));
+    EXPECT_EQ(store.z_upper(b), *std::max_element(expected[b].z.begin(), expected[b].z.end()));
+  }
+  EXPECT_EQ(store.total(), total);
+  EXPECT_EQ(store.count(2), 0U);
+  EXPECT_GT(store.count(3), 500U);
+}
+
 }  // namespace
 }  // namespace lamina
