@@ -52,6 +52,7 @@ void sum_stats(Ranks& ranks, SurfaceStats& stats) {
                                      &c.hard};
   for (std::uint64_t& cells : stats.leaf_cells) counts.push_back(&cells);
   std::vector<std::uint64_t> values;
+  values.reserve(counts.size());
   for (const std::uint64_t* count : counts) values.push_back(*count);
   ranks.sum(values);
   for (std::size_t i = 0; i < counts.size(); ++i) *counts[i] = values[i];
