@@ -45,6 +45,11 @@ int BackgroundWriter::drain() {
   return error_;
 }
 
+int BackgroundWriter::failed_file() {
+  const std::lock_guard lock(mutex_);
+  return failed_file_;
+}
+
 void BackgroundWriter::work() {
   std::unique_lock lock(mutex_);
   for (;;) {
@@ -57,6 +62,7 @@ void BackgroundWriter::work() {
                                    : write_all(job.fd, job.buffer.get(), job.bytes);
       lock.lock();
       error_ = error;
+      if (error != 0) failed_file_ = job.fd;
     }
     spares_.push_back(std::move(jobs_.front().buffer));
     jobs_.pop_front();

@@ -34,6 +34,8 @@ class BackgroundWriter {
   int write(int fd, Buffer buffer, std::size_t bytes, std::optional<std::uint64_t> offset = std::nullopt);
   /// Waits until all is written. 0 or the errno value as above.
   int drain();
+  /// The file whose write failed first; -1: none did.
+  [[nodiscard]] int failed_file();
 
  private:
   struct Job {
@@ -51,6 +53,7 @@ class BackgroundWriter {
   std::vector<Buffer> spares_;
   std::size_t made_ = 0;  ///< buffers
   int error_ = 0;
+  int failed_file_ = -1;
   bool ending_ = false;
   std::thread thread_;  ///< started by the first write
 };

@@ -47,8 +47,10 @@ struct MeshSink::Impl {
   void check_vertices(int error) const {
     if (error != 0) report_write_error(output.name(), error);
   }
-  void check_faces(int error) const {
+  /// What the background says may be about either file.
+  void check_written(int error) {
     if (error == 0) return;
+    if (writer.failed_file() != face_file.get()) check_vertices(error);
     report_write_error(fmt::format("{}: the temporary face file ({} bytes)", face_directory, face_writer.written()),
                        error);
   }
@@ -67,9 +69,9 @@ struct MeshSink::Impl {
   void commit() {
     require_open();
     require_indices();
-    check_vertices(vertex_writer.flush(output.fd()));
-    check_faces(face_writer.flush(face_file.get()));
-    check_vertices(writer.drain());
+    check_written(vertex_writer.flush(output.fd()));
+    check_written(face_writer.flush(face_file.get()));
+    check_written(writer.drain());
     const std::string header = mesh_header(settings, vertices, triangles);
     check_vertices(pwrite_all(output.fd(), header.data(), header.size(), 0));
     if (output.streams()) {
@@ -111,7 +113,7 @@ void MeshSink::append_vertices(const VertexBatch& batch) {
                             "use a larger cell or cut the cloud",
                             s.output.name(), kMost));
   }
-  s.check_vertices(
+  s.check_written(
       s.vertex_writer.append(s.output.fd(), batch.size(), [&](std::byte* to, std::size_t first, std::size_t n) {
         encode_vertices(batch, attributes, wide, first, n, to);
       }));
@@ -121,7 +123,7 @@ void MeshSink::append_vertices(const VertexBatch& batch) {
 void MeshSink::append_triangles(const std::vector<std::array<std::uint32_t, 3>>& triangles) {
   Impl& s = *impl_;
   s.require_open();
-  s.check_faces(
+  s.check_written(
       s.face_writer.append(s.face_file.get(), triangles.size(), [&](std::byte* to, std::size_t first, std::size_t n) {
         s.largest_index = std::max(s.largest_index, encode_faces(triangles.data() + first, n, to));
       }));

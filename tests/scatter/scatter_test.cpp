@@ -130,7 +130,7 @@ TEST(Scatter, NonsenseIsRefusedAndLeavesNothing) {
   s = with(10);
   s.density_ratio = 0.5;
   expect_error(ExitCode::usage, [&] { run(s); }, {"--density-ratio"});
-  expect_error(ExitCode::budget, [&] { run(with(10), "none/x.ply"); }, {"x.ply", "No such file"});
+  expect_error(ExitCode::budget, [&] { run(with(10), "none/x.ply"); }, {"x.ply", "does not exist"});
   expect_error(ExitCode::usage, [] { shape_surface("klein", false); }, {"klein", "torus"});
   expect_error(ExitCode::unreadable, [] { mesh_surface(TriangleMesh{}); }, {"no triangles"});
   EXPECT_EQ(folder.entries(), 0u);

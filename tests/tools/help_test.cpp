@@ -80,7 +80,7 @@ std::string completed(const std::vector<std::string>& lines) {
 TEST(Completion, OffersToolsOptionsAndWords) {
   EXPECT_EQ(completed({"lamina cl", "lamina clip --pl", "lamina clip a.ply --keep ''", "lamina surface --fit s",
                        "lamina scatter --shape to", "lamina clip a.p"}),
-            "clip\n--plane\ninside outside\nsphere\ntorus\n\n")
+            "clean clip\n--plane\ninside outside\nsphere\ntorus\n\n")
       << "file names are bash's own";
   std::vector<std::string> lines;
   std::string expected;
