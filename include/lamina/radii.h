@@ -69,7 +69,7 @@ RadiusSurvey survey_radii(const SlabStore& store, std::uint64_t sample_limit, st
 
 /// The same where a bucket's samples come from elsewhere: `read` fills them in as SlabStore::read() does.
 using ReadBucket = std::function<void(std::size_t bucket, LocalSamples& out)>;
-RadiusSurvey survey_radii(const SlabStore& counts, const ReadBucket& read, std::uint64_t sample_limit,
+RadiusSurvey survey_radii(const SlabStore& store, const ReadBucket& read, std::uint64_t sample_limit,
                           std::uint32_t min_samples = 16);
 
 }  // namespace lamina

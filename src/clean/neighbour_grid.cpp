@@ -49,7 +49,7 @@ struct Entry {
 
 class Grid {
  public:
-  Grid(const Positions& positions, std::int32_t cell) : positions_(positions), entries_(positions.size()) {
+  Grid(const Positions& positions, std::int32_t cell) : entries_(positions.size()) {
     tbb::parallel_for(std::size_t{0}, entries_.size(), [&](std::size_t i) {
       entries_[i] = {key_at(positions, i, cell), static_cast<std::uint32_t>(i)};
     });
@@ -80,7 +80,6 @@ class Grid {
   }
 
  private:
-  const Positions& positions_;
   std::vector<Entry> entries_;
   std::vector<std::size_t> firsts_;  ///< of the entries of each occupied cell
 };

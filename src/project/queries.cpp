@@ -11,9 +11,6 @@ struct Point {
   float x, y, z;
 };
 
-/// Normals contradict each other where their mean is shorter than this.
-constexpr float kTorn = 0.5F;
-
 Point point_of(const Query& q, float shift) {
   return {static_cast<float>(q.x) + shift, static_cast<float>(q.y) + shift, static_cast<float>(q.z) + shift};
 }
@@ -50,14 +47,6 @@ FitInput offsets(const Lot& lot, const std::vector<Query>& queries, std::size_t 
     in.offset.z[l] = corner.z - lot.points[g].z[l];
   }
   return in;
-}
-
-/// Whether the normals a point sees contradict each other.
-bool is_torn(const Lanes* sums, int lane) {
-  const float x = sums[kNx][lane];
-  const float y = sums[kNy][lane];
-  const float z = sums[kNz][lane];
-  return sums[kNearest][lane] <= 1 && x * x + y * y + z * z < kTorn * kTorn * sums[kW][lane] * sums[kW][lane];
 }
 
 /// Whether the samples a point sees lie on two sheets, facing opposite ways, that the lattice can tell apart: `near`
@@ -101,7 +90,6 @@ void list_queries(const Work& work, std::vector<Query>& out) {
 void start(TileState& state, const std::vector<Query>& queries, std::size_t channels, float shift) {
   fill(state.all, queries.size(), channels, [&](std::size_t i) { return point_of(queries[i], shift); });
   state.stepped = false;
-  state.torn = 0;
 }
 
 void accumulate(const Kernel& kernel, const RowSamples& rows, TileState& state, std::size_t channels) {
@@ -146,7 +134,6 @@ bool advance(const Kernel& kernel, const ProjectSettings& settings, TileState& s
         const Point n{sums[kNx][l], sums[kNy][l], sums[kNz][l]};
         const float w2 = sums[kW][l] * sums[kW][l];
         const float n2 = n.x * n.x + n.y * n.y + n.z * n.z;
-        if (is_torn(sums, l)) ++state.torn;
         if (n2 > 0 && n2 < settings.sheets * settings.sheets * w2) {
           moving.push_back(number(i));
           to.push_back(here);
@@ -214,7 +201,6 @@ void settle(const Kernel& kernel, const ProjectSettings& settings, TileState& st
         if (out.reach[l] > settings.good_reach || moved[kSeen][l] < static_cast<float>(settings.good_samples)) continue;
       }
     }
-    if (is_torn(all, lane) && !is_torn(moved, l)) --state.torn;  // two sheets told apart: no contradiction
     state.all.points[to].x[lane] = state.moved.points[from].x[l];
     state.all.points[to].y[lane] = state.moved.points[from].y[l];
     state.all.points[to].z[lane] = state.moved.points[from].z[l];

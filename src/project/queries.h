@@ -35,7 +35,6 @@ struct TileState {
   std::vector<std::uint32_t> moving;  ///< queries that go on, after the first pass
   Lot moved;                          ///< of those
   bool stepped = false;               ///< `moved` is the one to add samples to
-  std::uint64_t torn = 0;             ///< queries whose samples' normals contradict each other
 };
 
 /// Cell centres lie half a cell above their corner.

@@ -14,6 +14,17 @@ bool is_seen(const Lanes* sums, int lane) {
   return sums[kW][lane] > 0 && sums[kNearest][lane] <= 1;
 }
 
+/// Normals contradict each other where their mean is shorter than this.
+constexpr float kTorn = 0.5F;
+
+/// Whether those that a seen point sees do.
+bool is_torn(const Lanes* sums, int lane) {
+  const float x = sums[kNx][lane];
+  const float y = sums[kNy][lane];
+  const float z = sums[kNz][lane];
+  return x * x + y * y + z * z < kTorn * kTorn * sums[kW][lane] * sums[kW][lane];
+}
+
 bool any_seen(const Lanes* sums) {
   bool any = false;
   for (int l = 0; l < kLanes; ++l) any = any || is_seen(sums, l);
@@ -46,7 +57,6 @@ Tally fit_tile(const Kernel& kernel, const ProjectSettings& settings, std::size_
   out.seen.assign(groups * kLanes, 0);
   out.good.assign(groups * kLanes, 0);
   Tally tally;
-  tally.torn = state.torn;
   for (std::size_t g = 0; g < groups; ++g) {
     const Lanes* sums = &state.all.sums[g * channels];
     if (!any_seen(sums)) continue;
@@ -64,6 +74,7 @@ Tally fit_tile(const Kernel& kernel, const ProjectSettings& settings, std::size_
       out.good[g * kLanes + static_cast<std::size_t>(l)] = good ? 1 : 0;
       tally.seen += seen ? 1 : 0;
       tally.good += good ? 1 : 0;
+      tally.torn += seen && is_torn(sums, l) ? 1 : 0;
     }
   }
   return tally;

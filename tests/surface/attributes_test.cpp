@@ -180,6 +180,12 @@ TEST(SurfaceAttributes, ContradictingNormalsAreReported) {
   EXPECT_GE(mixed.stats.torn_share * static_cast<double>(mixed.stats.corners_seen),
             static_cast<double>(mixed.stats.corners_torn));
   EXPECT_NE(said.find("normals contradict each other"), std::string::npos) << said;
+  SurfaceSettings more;
+  more.steps = 4;
+  const Reconstruction stepped = reconstruct(cloud, more, run);
+  EXPECT_GT(stepped.stats.corners_torn, 0u);
+  EXPECT_LE(stepped.stats.corners_torn, stepped.stats.corners_seen);
+  EXPECT_LE(stepped.stats.torn_share, 1.0);
 }
 
 }  // namespace
