@@ -4,7 +4,7 @@
 #include <limits>
 #include <utility>
 
-#include "normals/numbered_points.h"
+#include "surface/numbered_rows.h"
 
 namespace lamina::normals {
 namespace {

@@ -13,12 +13,12 @@
 #include "lamina/radii.h"
 #include "meshes/with_threads.h"
 #include "normals/directions.h"
-#include "normals/numbered_points.h"
 #include "normals/patches.h"
 #include "normals/row_normals.h"
 #include "normals/sample_window.h"
 #include "normals/viewpoints.h"
 #include "surface/ingest.h"
+#include "surface/numbered_rows.h"
 #include "surface/survey.h"
 
 namespace lamina {
@@ -105,7 +105,7 @@ class Job {
     const std::string directory = run_.tmp_dir.empty() ? system_tmp_dir() : run_.tmp_dir;
     RunContext silent = run_;  // what is left out is told by whoever takes the rows
     silent.log = nullptr;
-    NumberedPoints points(source_, settings_.mode != NormalsMode::estimate);
+    NumberedRows points(source_, settings_.mode != NormalsMode::estimate);
     const Survey survey = survey_input(points, settings_.bad_samples, silent);
     const Frame frame = choose_frame(survey, FrameMode::pca);
     turn_ = frame.rotation.transpose();

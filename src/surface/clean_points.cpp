@@ -33,7 +33,7 @@ std::vector<bool> rows_to_drop(PointSource& source, const CleanSettings& setting
     if (in.store.count(b) == 0) continue;
     in.store.read(b, samples);
     for (std::size_t i = 0; i < keep[b].size(); ++i) {
-      if (!keep[b][i]) drop[row_of(samples.attributes, i)] = true;
+      if (!keep[b][i]) drop[row_of(samples, i)] = true;
     }
   }
   return drop;

@@ -7,18 +7,25 @@
 namespace lamina {
 namespace {
 
-void replace_unusable_normals(SampleBatch& b) {
-  for (std::size_t i = 0; i < b.size(); ++i) {
-    const float square = b.nx[i] * b.nx[i] + b.ny[i] * b.ny[i] + b.nz[i] * b.nz[i];
-    if (std::isfinite(square) && square > 1e-20F) continue;
-    b.nx[i] = b.ny[i] = 0;
-    b.nz[i] = 1;
-  }
+constexpr std::size_t kDigits = NumberedRows::kDigits;
+constexpr std::uint64_t kGiven = 1ULL << 47;  ///< no file has so many rows
+constexpr double kShortest = 1e-24;           ///< squared length; a reconstruction takes no shorter normals either
+
+bool is_usable(float x, float y, float z) {
+  const double squared = double{x} * double{x} + double{y} * double{y} + double{z} * double{z};
+  return std::isfinite(squared) && squared >= kShortest;
+}
+
+std::uint64_t number_of(const LocalSamples& samples, std::size_t i) {
+  std::uint64_t number = 0;
+  for (std::size_t d = 0; d < kDigits; ++d) number |= static_cast<std::uint64_t>(samples.attributes[d][i]) << (16 * d);
+  return number;
 }
 
 }  // namespace
 
-NumberedRows::NumberedRows(PointSource& source) : source_(source) {
+NumberedRows::NumberedRows(PointSource& source, bool with_normals)
+    : source_(source), with_normals_(with_normals && source.info().has_normals) {
   info_.path = source.info().path;
   info_.count = source.info().count;
   info_.random_access = source.info().random_access;
@@ -29,28 +36,35 @@ NumberedRows::NumberedRows(PointSource& source) : source_(source) {
 void NumberedRows::read(std::uint64_t first, std::size_t count, SampleBatch& out) {
   source_.read(first, count, out);
   const std::size_t n = out.size();
-  if (source_.info().has_normals) {
-    replace_unusable_normals(out);
-  } else {
+  if (!with_normals_) {
     out.nx.assign(n, 0);
     out.ny.assign(n, 0);
-    out.nz.assign(n, 1);
+    out.nz.assign(n, 0);
   }
   out.radius.clear();
   out.quality.clear();
   out.exact.clear();
   out.attributes.resize(kDigits);
-  for (std::size_t d = 0; d < kDigits; ++d) {
-    out.attributes[d].resize(n);
-    for (std::size_t i = 0; i < n; ++i) out.attributes[d][i] = static_cast<float>(((first + i) >> (16 * d)) & 0xFFFFU);
+  for (auto& digits : out.attributes) digits.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    std::uint64_t number = first + i;
+    if (is_usable(out.nx[i], out.ny[i], out.nz[i])) {
+      number |= kGiven;
+    } else {
+      out.nx[i] = 0;
+      out.ny[i] = 0;
+      out.nz[i] = 1;
+    }
+    for (std::size_t d = 0; d < kDigits; ++d) out.attributes[d][i] = static_cast<float>((number >> (16 * d)) & 0xFFFFU);
   }
 }
 
-std::uint64_t row_of(const std::vector<std::vector<float>>& attributes, std::size_t i) {
-  std::uint64_t row = 0;
-  for (std::size_t d = 0; d < NumberedRows::kDigits; ++d)
-    row |= static_cast<std::uint64_t>(attributes[d][i]) << (16 * d);
-  return row;
+std::uint64_t row_of(const LocalSamples& samples, std::size_t i) {
+  return number_of(samples, i) & ~kGiven;
+}
+
+bool has_given_normal(const LocalSamples& samples, std::size_t i) {
+  return (number_of(samples, i) & kGiven) != 0;
 }
 
 }  // namespace lamina

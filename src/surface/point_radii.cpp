@@ -78,7 +78,7 @@ void estimate(const SlabStore& store, const RadiiSettings& settings, edit::Recor
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
     store.read(b, samples);
     rows.resize(samples.size());
-    for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = row_of(samples.attributes, i);
+    for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = row_of(samples, i);
     estimator.push(samples);
     waiting.push_back(rows);
     pop_all();
