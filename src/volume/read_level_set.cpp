@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <utility>
 
 #include "lamina/error.h"
@@ -11,36 +10,14 @@
 namespace lamina {
 namespace {
 
-using openvdb::DoubleGrid;
-using openvdb::FloatGrid;
 using openvdb::GridBase;
 
-bool is_scalar(const GridBase& grid) {
-  return grid.isType<FloatGrid>() || grid.isType<DoubleGrid>();
-}
-
 /// How well a grid serves as the level set nobody named; 0: not at all.
-int fitness(const GridBase& grid) {
-  if (!is_scalar(grid)) return 0;
+int fitness(const GridBase& grid, bool /*named*/) {
+  if (!volume::is_scalar(grid)) return 0;
   const openvdb::GridClass kind = grid.getGridClass();
   if (kind == openvdb::GRID_LEVEL_SET) return grid.getName() == "surface" ? 4 : 3;
   return kind == openvdb::GRID_UNKNOWN ? 1 : 0;
-}
-
-GridBase::Ptr choose(const std::string& path, const openvdb::GridPtrVec& grids, const std::string& name) {
-  const auto refuse = [&](const std::string& what) {
-    throw Error(ExitCode::unreadable, fmt::format("{}: {}; it holds {}", path, what, volume::list_of(grids)));
-  };
-  if (name.empty()) {
-    const auto best = std::max_element(grids.begin(), grids.end(),
-                                       [](const auto& a, const auto& b) { return fitness(*a) < fitness(*b); });
-    if (fitness(**best) == 0) refuse("holds no level set");
-    return *best;
-  }
-  const auto found = std::find_if(grids.begin(), grids.end(), [&](const auto& g) { return g->getName() == name; });
-  if (found == grids.end()) refuse(fmt::format("holds no grid called {}", name));
-  if (fitness(**found) == 0) refuse(fmt::format("grid {} is no level set", name));
-  return *found;
 }
 
 }  // namespace
@@ -62,14 +39,7 @@ bool LevelSet::open() const {
 
 LevelSet read_level_set(const std::string& path, const std::string& name) {
   const volume::VdbFile file = volume::read_vdb(path);
-  const GridBase::Ptr grid = choose(path, file.grids, name);
-  if (!grid->transform().isLinear()) {
-    throw Error(ExitCode::unreadable,
-                fmt::format("{}: grid {} has a frustum (perspective) transform; resample it to cubic voxels first",
-                            path, grid->getName()));
-  }
-  if (grid->activeVoxelCount() == 0)
-    throw Error(ExitCode::unreadable, fmt::format("{}: grid {} has no active voxels", path, grid->getName()));
+  const GridBase::Ptr grid = volume::choose_grid(path, file.grids, name, "level set", fitness);
   auto data = std::make_shared<LevelSet::Data>();
   data->name = grid->getName();
   data->path = path;

@@ -80,6 +80,36 @@ std::string list_of(const openvdb::GridPtrVec& grids) {
   return text;
 }
 
+bool is_scalar(const openvdb::GridBase& grid) {
+  return grid.isType<openvdb::FloatGrid>() || grid.isType<openvdb::DoubleGrid>();
+}
+
+openvdb::GridBase::Ptr choose_grid(const std::string& path, const openvdb::GridPtrVec& grids, const std::string& name,
+                                   const std::string& wanted,
+                                   const std::function<int(const openvdb::GridBase&, bool)>& fitness) {
+  const auto refuse = [&](const std::string& what) {
+    throw Error(ExitCode::unreadable, fmt::format("{}: {}; it holds {}", path, what, list_of(grids)));
+  };
+  auto found = std::find_if(grids.begin(), grids.end(), [&](const auto& g) { return g->getName() == name; });
+  if (name.empty()) {
+    found = std::max_element(grids.begin(), grids.end(),
+                             [&](const auto& a, const auto& b) { return fitness(*a, false) < fitness(*b, false); });
+    if (fitness(**found, false) == 0) refuse(fmt::format("holds no {}", wanted));
+  } else {
+    if (found == grids.end()) refuse(fmt::format("holds no grid called {}", name));
+    if (fitness(**found, true) == 0) refuse(fmt::format("grid {} is no {}", name, wanted));
+  }
+  const openvdb::GridBase& grid = **found;
+  if (!grid.transform().isLinear()) {
+    throw Error(ExitCode::unreadable,
+                fmt::format("{}: grid {} has a frustum (perspective) transform; resample it to cubic voxels first",
+                            path, grid.getName()));
+  }
+  if (grid.activeVoxelCount() == 0)
+    throw Error(ExitCode::unreadable, fmt::format("{}: grid {} has no active voxels", path, grid.getName()));
+  return *found;
+}
+
 openvdb::FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid) {
   if (auto floats = openvdb::gridPtrCast<openvdb::FloatGrid>(grid)) return floats;
   const auto doubles = openvdb::gridPtrCast<openvdb::DoubleGrid>(grid);

@@ -3,6 +3,7 @@
 #include <openvdb/openvdb.h>
 
 #include <array>
+#include <functional>
 #include <string>
 
 namespace lamina::volume {
@@ -21,6 +22,15 @@ std::string kind_of(const openvdb::GridBase& grid);
 
 /// "surface (a level set), Cd (vec3s values)".
 std::string list_of(const openvdb::GridPtrVec& grids);
+
+/// The grid called `name` or, where that is empty, the fittest: the largest fitness(grid, false). It must be fit,
+/// linear and not empty; a named one must have fitness(grid, true) > 0. `wanted`: a word for such grids. Throws
+/// Error(unreadable).
+openvdb::GridBase::Ptr choose_grid(const std::string& path, const openvdb::GridPtrVec& grids, const std::string& name,
+                                   const std::string& wanted,
+                                   const std::function<int(const openvdb::GridBase&, bool)>& fitness);
+/// Float or double.
+bool is_scalar(const openvdb::GridBase& grid);
 
 /// A float or double grid as floats; null when it is neither.
 openvdb::FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid);
