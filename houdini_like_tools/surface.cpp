@@ -61,6 +61,10 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
   j["triangles"] = s.triangles;
   j["levels"] = s.plan.levels;
   j["leaf_cells_by_level"] = s.leaf_cells;
+  j["noise"] = s.plan.noise;
+  j["blend"] = s.plan.blend;
+  j["refit"] = s.plan.refit;
+  j["cell"] = to_string(s.plan.cell);
   j["finest_cell"] = s.plan.finest_cell;
   j["slab_height"] = s.plan.slab_height;
   j["slabs"] = s.plan.slabs;
@@ -104,6 +108,28 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
                    {"kept_isovertices", s.clusters.kept_isovertices},
                    {"hard", s.clusters.hard}};
   return j;
+}
+
+Length length_of(const char* option, const std::string& text) {
+  try {
+    return parse_length(text);
+  } catch (const Error& e) {
+    throw CLI::ValidationError(option, e.what());
+  }
+}
+
+/// A number, or `auto` where the program chooses.
+CLI::Option* add_choice(CLI::App& app, const std::string& name, std::optional<double>& value,
+                        const std::string& description) {
+  const auto take = [&value, name](const std::string& text) {
+    double number = 0;
+    value.reset();
+    if (text == "auto") return;
+    if (!CLI::detail::lexical_cast(text, number))
+      throw CLI::ValidationError(name, text + ": is neither a number nor auto");
+    value = number;
+  };
+  return app.add_option_function<std::string>(name, take, description)->option_text("FLOAT|auto [auto]");
 }
 
 /// Large arrays go back to the system when they are freed. By default the C library raises the size from which they do
@@ -280,8 +306,12 @@ void add_surface(CLI::App& app) {
   add_normals_options(*tool, s.normal_search, "Normals");
 
   const std::string fit = "Fit";
-  tool->add_option("--blend", s.blend, "H: the influence radius R is H times a sample's radius r")
-      ->capture_default_str()
+  add_choice(*tool, "--blend", s.blend, "H: the influence radius R is H times a sample's radius r; auto: by the noise")
+      ->group(fit);
+  add_choice(
+      *tool, "--refit", s.refit,
+      "before all else, replace normals by those fitted to the samples within so many radii; 0: keep them; auto: "
+      "with --blend auto, where noise asks for it")
       ->group(fit);
   tool->add_option("--steps", s.steps, "N: projection steps")->capture_default_str()->group(fit);
   tool->add_option("--fit", s.fit, "surface fitted to the samples around a corner")
@@ -291,7 +321,10 @@ void add_surface(CLI::App& app) {
   tool->add_flag("--diffuse", s.diffuse, "project cell centres and average them at the corners: smoother")->group(fit);
 
   const std::string lattice = "Octree";
-  add_length(*tool, "--cell", s.cell, "largest leaf cell: a length, or times the smallest r or R around")
+  tool->add_option_function<std::string>(
+          "--cell", [&s](const std::string& text) { s.cell = length_of("--cell", text); },
+          "largest leaf cell: a length, or times the smallest r or R around; 0.9R where --blend is given")
+      ->option_text("LENGTH [chosen with --blend]")
       ->group(lattice);
   tool->add_option("--levels", s.levels, "octree levels; 0: as the radii ask, at least 4")
       ->capture_default_str()

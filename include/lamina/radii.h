@@ -59,6 +59,7 @@ class RadiusEstimator {
 struct RadiusSurvey {
   std::uint64_t samples = 0;            ///< samples looked at
   float low = 0, median = 0, high = 0;  ///< 1 %, 50 %, 99 % quantiles, steps
+  float noise = 0;  ///< median distance of samples from the surface their neighbours suggest, in units of `median`
 };
 /// Looks at runs of buckets about evenly spaced samples, each run at least 16 radii tall, about `sample_limit` samples
 /// in all (more when one run of that height holds more; a store of no more than the limit is read whole, as one

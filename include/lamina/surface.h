@@ -42,15 +42,19 @@ struct SurfaceSettings {
   std::uint32_t density = 16;     ///< samples a counting cell must hold to give a radius (paper, section 3.1), >= 2
   CleanSettings clean;            ///< what is left out before radii are estimated
   Length max_radius;              ///< samples with a larger radius are discarded as undersampled; 0: none
-  double blend = 1.2;             ///< H > 0: R = H r (paper, section 3.2)
-  int steps = 1;                  ///< N in 1..16: projection steps
+  std::optional<double> blend;    ///< H > 0: R = H r (paper, section 3.2); unset: chosen by the cloud's noise and the
+                                  ///< evenness of its sampling (SurfacePlan says what)
+  /// >= 0, at most 8: before anything is projected each normal is replaced by that of the sphere fitted to the samples
+  /// within so many radii that face where it does; 0: normals stay; unset: chosen with `blend`, else 0.
+  std::optional<double> refit;
+  int steps = 1;  ///< N in 1..16: projection steps
   FitMode fit = FitMode::sphere;
-  bool diffuse = false;  ///< project cell centres, then corners by their cells (paper, section 3.3)
-  Length cell{0.9,
-              Length::Unit::influence_radius};  ///< largest leaf cell a radius allows; leaves are half to all of it
-  int levels = 0;                               ///< octree levels, 1..12; 0: as the radii ask, at least 4
-  double boundary = 0;  ///< isovertices whose corners' projections lie farther than this from the average of
-                        ///< their samples (in R) are rejected; 0: no limit
+  bool diffuse = false;        ///< project cell centres, then corners by their cells (paper, section 3.3)
+  std::optional<Length> cell;  ///< largest leaf cell a radius allows; leaves are half to all of it. Unset: chosen with
+                               ///< `blend`, 0.9 R where that is given
+  int levels = 0;              ///< octree levels, 1..12; 0: as the radii ask, at least 4
+  double boundary = 0;         ///< isovertices whose corners' projections lie farther than this from the average of
+                               ///< their samples (in R) are rejected; 0: no limit
   ClusterMode cluster = ClusterMode::preserving;
   double chord = 0.17;                ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
   bool vertex_levels = false;         ///< give vertices an attribute `level`: of the octree, 0 the finest
@@ -67,6 +71,9 @@ struct SurfacePlan {
   std::uint64_t samples = 0;       ///< usable ones
   std::array<double, 3> extent{};  ///< of the bounding box along the frame's axes, sweep axis last
   double radius_low = 0, radius_median = 0, radius_high = 0;  ///< 1 %, 50 %, 99 % of r
+  double noise = 0;             ///< median distance of samples from the surface their neighbours suggest, in radii
+  double blend = 0, refit = 0;  ///< as given or chosen
+  Length cell;
   double finest_cell = 0;
   int levels = 0;
   double slab_height = 0;

@@ -25,14 +25,16 @@ std::int64_t cell_of(std::int64_t z, std::int64_t height) {
 }
 
 /// The first bucket that a feed beginning at z reads; `counting`: side of the coarsest counting cells, 0 where there
-/// are none.
-std::size_t first_bucket(const SlabStore& store, std::int64_t z, std::int64_t counting) {
+/// are none; `filter_reach`: of the filter of normals.
+std::size_t first_bucket(const SlabStore& store, std::int64_t z, std::int64_t counting, double filter_reach) {
   const auto first_reaching = [&](std::int64_t from) {
     std::size_t bucket = 0;
     while (bucket < store.buckets() && (store.count(bucket) == 0 || store.z_upper(bucket) < from)) ++bucket;
     return bucket;
   };
-  const std::size_t first = first_reaching(z);
+  std::size_t first = first_reaching(z);
+  if (filter_reach > 0 && first < store.buckets())
+    first = first_reaching(store.z_lower(first) - static_cast<std::int64_t>(filter_reach));
   if (counting == 0 || first == store.buckets()) return first;
   // A radius depends on the counting cells above and below the sample's own.
   return first_reaching((cell_of(store.z_lower(first), counting) - 1) * counting);
@@ -81,20 +83,25 @@ std::size_t SampleFeed::next_filled(std::size_t bucket) const {
 }
 
 void SampleFeed::begin_at(std::int64_t z) {
-  const std::size_t first = first_bucket(store_, z, estimator_ == nullptr ? 0 : counting_height_);
-  pushed_ = announced_ = ready_ = first_ = first;
+  const std::size_t first =
+      first_bucket(store_, z, estimator_ == nullptr ? 0 : counting_height_, filter_ == nullptr ? 0 : filter_->reach());
+  pushed_ = announced_ = measured_ = ready_ = first_ = first;
 }
 
 BucketSpan buckets_read(const SlabStore& store, const RadiiSettings& radii, bool given_radii,
-                        std::optional<std::int64_t> from, std::int64_t to) {
+                        std::optional<std::int64_t> from, std::int64_t to, double filter_reach) {
   const std::int64_t height = given_radii ? 0 : counting_height(radii);
-  BucketSpan span{from ? first_bucket(store, *from, height) : 0, 0};
+  BucketSpan span{from ? first_bucket(store, *from, height, filter_reach) : 0, 0};
   std::int64_t known = to;  // below this all samples are asked for
   span.end = span.begin;
-  while (span.end < store.buckets() && (store.count(span.end) == 0 || store.z_lower(span.end) < to)) {
-    if (store.count(span.end) > 0) known = std::max(known, std::int64_t{store.z_upper(span.end)} + 1);
-    ++span.end;
-  }
+  const auto ask_below = [&](std::int64_t limit) {
+    while (span.end < store.buckets() && (store.count(span.end) == 0 || store.z_lower(span.end) < limit)) {
+      if (store.count(span.end) > 0) known = std::max(known, std::int64_t{store.z_upper(span.end)} + 1);
+      ++span.end;
+    }
+  };
+  ask_below(to);
+  if (filter_reach > 0) ask_below(known + static_cast<std::int64_t>(filter_reach) + 1);
   if (given_radii) return span;
   // The last one's radii are final when a sample lies beyond the counting cells above its own.
   const std::int64_t beyond = (cell_of(known - 1, height) + 2) * height;
@@ -104,7 +111,7 @@ BucketSpan buckets_read(const SlabStore& store, const RadiiSettings& radii, bool
 }
 
 void SampleFeed::prepare(std::int64_t z_limit, const OnReady& on_ready) {
-  std::size_t& front = estimator_ == nullptr ? ready_ : pushed_;  // next to be read for the first time
+  std::size_t& front = estimator_ == nullptr ? measured_ : pushed_;  // next to be read for the first time
   const auto read_ahead = [&] {
     std::size_t next = front;
     for (int i = 0; i < kReadAhead && (next = next_filled(next)) < store_.buckets(); ++i) cache_.prefetch(next++);
@@ -119,15 +126,19 @@ void SampleFeed::prepare(std::int64_t z_limit, const OnReady& on_ready) {
     // Buckets are ascending and disjoint in z: the next one decides.
     const std::size_t next = next_filled(ready_);
     if (next == store_.buckets() || store_.z_lower(next) >= z_limit) break;
+    if (ready_ < measured_ && is_surrounded(ready_)) {
+      make_ready(on_ready);
+      continue;
+    }
     std::vector<float> radii;
     if (estimator_ == nullptr) {
       read_ahead();
-      if (store_.count(ready_) > 0) radii = cache_.get(ready_)->samples.radius;
-      learn(std::move(radii), on_ready);
+      if (store_.count(measured_) > 0) radii = cache_.get(measured_)->samples.radius;
+      learn(std::move(radii));
       continue;
     }
     if (estimator_->pop(radii)) {
-      learn(std::move(radii), on_ready);
+      learn(std::move(radii));
       continue;
     }
     read_ahead();
@@ -141,8 +152,27 @@ void SampleFeed::prepare(std::int64_t z_limit, const OnReady& on_ready) {
   read_ahead();
 }
 
-void SampleFeed::learn(std::vector<float> radii, const OnReady& on_ready) {
-  Known& known = known_[ready_];
+bool SampleFeed::is_surrounded(std::size_t bucket) const {
+  if (filter_ == nullptr || store_.count(bucket) == 0 || measured_ == store_.buckets()) return true;
+  const std::size_t next = next_filled(measured_);
+  return next == store_.buckets() ||
+         static_cast<double>(store_.z_lower(next)) > static_cast<double>(store_.z_upper(bucket)) + filter_->reach();
+}
+
+void SampleFeed::make_ready(const OnReady& on_ready) {
+  if (store_.count(ready_) > 0) {
+    if (filter_ != nullptr) {
+      known_[ready_].normals = filter_->find(ready_);
+      filter_->forget_below(static_cast<std::int64_t>(store_.z_lower(ready_)) -
+                            static_cast<std::int64_t>(filter_->reach()) - 1);
+    }
+    on_ready(*fetch(ready_));
+  }
+  ++ready_;
+}
+
+void SampleFeed::learn(std::vector<float> radii) {
+  Known& known = known_[measured_];
   for (float& r : radii) {
     ++counts_.samples;
     if (estimator_ != nullptr) r *= settings_.radius_scale;
@@ -155,9 +185,9 @@ void SampleFeed::learn(std::vector<float> radii, const OnReady& on_ready) {
     }
     known.max_support = std::max(known.max_support, r * settings_.blend);
   }
+  if (filter_ != nullptr && !radii.empty()) filter_->add(measured_, cache_.get(measured_)->samples, radii);
   known.radius = std::move(radii);
-  if (store_.count(ready_) > 0) on_ready(*fetch(ready_));
-  ++ready_;
+  ++measured_;
 }
 
 void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
@@ -170,6 +200,11 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
   const auto finest = static_cast<float>(lattice_.cell);
   const double ratio = settings_.cell_ratio * (settings_.cell_follows_support ? settings_.blend : 1.0F);
   const bool has_quality = !out.samples.quality.empty();
+  if (!known.normals.x.empty()) {
+    out.samples.nx = known.normals.x;
+    out.samples.ny = known.normals.y;
+    out.samples.nz = known.normals.z;
+  }
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 8192), [&](const auto& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       const float r = known.radius[i];

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "feed/bucket_cache.h"
+#include "feed/normal_filter.h"
 #include "lamina/lattice.h"
 #include "lamina/radii.h"
 #include "lamina/slab_store.h"
@@ -45,9 +46,9 @@ struct BucketSpan {
 };
 
 /// The buckets that a feed reads which begins at `from` (begin_at(); nothing: at the bottom) and prepares all below
-/// `to`: it may look for two more, but does without them.
+/// `to`: it may look for two more, but does without them. `filter_reach`: NormalFilter::reach(), 0 without one.
 BucketSpan buckets_read(const SlabStore& store, const RadiiSettings& radii, bool given_radii,
-                        std::optional<std::int64_t> from, std::int64_t to);
+                        std::optional<std::int64_t> from, std::int64_t to, double filter_reach = 0);
 
 /// Buckets go by ascending z: prepare() runs ahead, release() follows behind. Inside a bucket samples are sorted by
 /// blocks of cells (feed/block_order.h): successive ones lie close to each other, which the stages may rely on for
@@ -57,6 +58,9 @@ class SampleFeed {
   /// Gives buckets released back to the store.
   SampleFeed(SlabStore& store, const Lattice& lattice, const FeedSettings& settings, const RadiiSettings& radii,
              bool given_radii);
+
+  /// Normals come from this filter, which must outlive the feed. Called before anything else.
+  void filter_normals(NormalFilter& filter) { filter_ = &filter; }
 
   /// Leaves out what lies below, before anything else is asked for: buckets with a sample at or above z get the radii,
   /// and so come in the batches, of a feed that begins at the bottom; buckets below may have other radii.
@@ -82,12 +86,16 @@ class SampleFeed {
   struct Known {
     std::vector<float> radius;  ///< r_i, steps
     float max_support = 0;
+    UnitNormals normals;  ///< where they are filtered
   };
   void annotate(std::size_t bucket, ActiveBucket& out) const;
   /// The next bucket with samples from `bucket` on, the number of buckets when there is none.
   [[nodiscard]] std::size_t next_filled(std::size_t bucket) const;
   std::shared_ptr<const ActiveBucket> fetch(std::size_t bucket);
-  void learn(std::vector<float> radii, const OnReady& on_ready);
+  void learn(std::vector<float> radii);
+  /// Whether the filter knows all that acts on a bucket with radii.
+  [[nodiscard]] bool is_surrounded(std::size_t bucket) const;
+  void make_ready(const OnReady& on_ready);
 
   SlabStore& store_;
   Lattice lattice_;
@@ -98,8 +106,10 @@ class SampleFeed {
   float radius_limit_;
   std::size_t pushed_ = 0;     ///< buckets handed to the estimator
   std::size_t announced_ = 0;  ///< buckets the store knows are wanted
-  std::size_t ready_ = 0;      ///< buckets with known radii
+  std::size_t measured_ = 0;   ///< buckets with known radii
+  std::size_t ready_ = 0;      ///< of these, with their final normals
   std::size_t first_ = 0;      ///< first bucket not released
+  NormalFilter* filter_ = nullptr;
   std::unordered_map<std::size_t, Known> known_;
   BucketCache cache_;
   std::uint64_t released_ = 0;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "lamina/radii.h"
+#include "radii/survey_noise.h"
 
 namespace lamina {
 namespace {
@@ -247,6 +248,7 @@ RadiusSurvey survey_radii(const SlabStore& store, const ReadBucket& read, std::u
   survey.low = quantile(radii, total, 0.01);
   survey.median = quantile(radii, total, 0.5);
   survey.high = quantile(radii, total, 0.99);
+  survey.noise = survey_noise(store, read, survey.median);
   return survey;
 }
 

@@ -148,7 +148,8 @@ class Job {
     for (const SlabSpan& span : spans) {
       const ZRead z = z_read(settings_, resolved, span, all);
       wanted.push_back(span.empty() ? BucketSpan{}
-                                    : buckets_read(store, resolved.radii, input.info.has_radius, z.from, z.to));
+                                    : buckets_read(store, resolved.radii, input.info.has_radius, z.from, z.to,
+                                                   filter_reach(resolved)));
     }
     const auto rank = static_cast<std::size_t>(ranks_.rank());
     const SlabSpan own = spans[rank];

@@ -16,11 +16,13 @@ namespace {
 /// Samples whose support is more than so many of their cells leave gaps of several cells between them.
 constexpr float kSparse = 1.6F;
 
-ProjectSettings project_settings(const SurfaceSettings& s) {
+ProjectSettings project_settings(const SurfaceSettings& s, const SupportChoice& support) {
   ProjectSettings p;
   p.fit = s.fit == FitMode::sphere ? Fit::sphere : Fit::plane;
   p.steps = s.steps;
   p.centres = s.diffuse;
+  p.band = support.band;
+  p.good_reach = support.good_reach;
   return p;
 }
 
@@ -35,7 +37,7 @@ Pipeline::Pipeline(const SurfaceSettings& settings, const Resolved& resolved, co
       volume_(volume),
       kernel_(select_kernel()),
       window_(resolved.lattice, static_cast<int>(attributes), extent),
-      projector_(project_settings(settings), kernel_),
+      projector_(project_settings(settings, resolved.support), kernel_),
       output_(ClusterSettings{settings.cluster}, static_cast<float>(settings.chord),
               settings.vertex_levels ? static_cast<double>(resolved.lattice.cell_size(0)) : 0, frame, sink),
       all_(all_slabs(resolved.lattice, extent)),
@@ -56,8 +58,9 @@ ZRead z_read(const SurfaceSettings& settings, const Resolved& resolved, const Sl
   const Lattice& lattice = resolved.lattice;
   const std::int64_t height = lattice.slab_height();
   const StageSpans stages = stage_spans(span, all, settings.diffuse);
-  const double ahead = static_cast<double>(support_limit(resolved.feed, lattice)) +
-                       static_cast<double>(Projector(project_settings(settings), select_kernel()).margin(lattice));
+  const double ahead =
+      static_cast<double>(support_limit(resolved.feed, lattice)) +
+      static_cast<double>(Projector(project_settings(settings, resolved.support), select_kernel()).margin(lattice));
   ZRead z;
   if (span.begin > all.begin) {
     z.from = std::min(stages.marked.begin * height,

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "lamina/error.h"
+#include "surface/choose_support.h"
 #include "volume/surface_volume.h"
 
 namespace lamina {
@@ -56,7 +57,7 @@ void set_counting_cells(const SurfaceSettings& s, const RadiusSurvey& survey, Re
     const double octaves = std::log2(std::max(1.0F, survey.high / survey.low));
     out.radii.levels = std::clamp(static_cast<int>(std::ceil(octaves)) + 3, 3, kMaxLevels);
   } else {
-    const double blend = out.feed.cell_follows_support ? s.blend : 1.0;
+    const double blend = out.feed.cell_follows_support ? out.support.blend : 1.0;
     finest_radius = out.lattice.cell / (kMainCell * out.feed.cell_ratio * blend);
   }
   const double half = kHalfWidth * std::sqrt(s.density / 16.0) * finest_radius / s.radius_scale;
@@ -68,7 +69,7 @@ void set_counting_cells(const SurfaceSettings& s, const RadiusSurvey& survey, Re
 std::uint64_t expected_face_bytes(const SurfaceSettings& s, const Resolved& r, const RadiusSurvey& survey,
                                   std::uint64_t samples) {
   constexpr double kFaceBytes = 13;
-  const double ratio = r.feed.cell_ratio * (r.feed.cell_follows_support ? s.blend : 1.0);
+  const double ratio = r.feed.cell_ratio * (r.feed.cell_follows_support ? r.support.blend : 1.0);
   const double finest = r.lattice.cell;
   const double cell = r.feed.fixed_cell ? finest : std::max(finest, kMainCell * ratio * survey.median);
   const double cells = static_cast<double>(samples) * 0.25 * survey.median * survey.median / (cell * cell);
@@ -106,7 +107,7 @@ std::uint64_t expected_memory(const SurfaceSettings& s, const Resolved& r, const
   const double per_slab = std::min(per_step * r.lattice.slab_height(), static_cast<double>(store.total()));
   // A sample stands for a quarter of its radius squared of surface; around each cell of surface lie some four and a
   // half corners, and one and a half cells cross it. Coefficients: docs/performance.md.
-  const double main_cell = kMainCell * r.feed.cell_ratio * (r.feed.cell_follows_support ? s.blend : 1.0);
+  const double main_cell = kMainCell * r.feed.cell_ratio * (r.feed.cell_follows_support ? r.support.blend : 1.0);
   const double cells = r.feed.fixed_cell ? 1.0 : 0.25 / (main_cell * main_cell);
   const double corner_bytes =
       4.5 * cells * (4.0 * (static_cast<double>(kFirstAttribute) + static_cast<double>(attributes)) + 12);
@@ -124,12 +125,13 @@ std::uint64_t expected_memory(const SurfaceSettings& s, const Resolved& r, const
 }  // namespace
 
 void check_settings(const SurfaceSettings& s) {
-  require(s.blend > 0 && s.blend <= 64, "--blend", "in (0, 64]");
+  require(!s.blend || (*s.blend > 0 && *s.blend <= 64), "--blend", "auto or in (0, 64]");
+  require(!s.refit || (*s.refit >= 0 && *s.refit <= 8), "--refit", "auto or in 0..8");
   require(s.steps >= 1 && s.steps <= 16, "--steps", "in 1..16");
   require(s.levels >= 0 && s.levels <= kMaxLevels, "--levels", "in 1..12, or 0 to choose by the radii");
   require(s.density >= 2 && s.density <= 4096, "--density", "in 2..4096");
   require(s.radius_scale > 0 && s.radius_scale <= 1000, "--particlescale", "in (0, 1000]");
-  require(s.cell.value > 0, "--cell", "positive");
+  require(!s.cell || s.cell->value > 0, "--cell", "positive");
   require(s.boundary >= 0, "--boundary", "0 (no limit) or positive, in influence radii");
   require(s.chord >= 0 && s.chord <= 1, "--chord", "in 0..1");
   require(s.window >= 1 && s.window <= 1024, "--window", "in 1..1024");
@@ -142,7 +144,8 @@ void check_settings(const SurfaceSettings& s) {
 namespace {
 
 Resolved plan_once(const SurfaceSettings& s, const Frame& frame, const SlabStore& store, const Extent& bounds,
-                   RadiusSurvey survey, bool given_radii, std::size_t attributes) {
+                   RadiusSurvey survey, const SupportChoice& support, bool given_radii, std::size_t attributes) {
+  const Length cell = support.cell;
   if (!given_radii) {
     for (float* r : {&survey.low, &survey.median, &survey.high}) *r *= static_cast<float>(s.radius_scale);
   }
@@ -150,25 +153,26 @@ Resolved plan_once(const SurfaceSettings& s, const Frame& frame, const SlabStore
     throw Error(ExitCode::empty,
                 fmt::format("{}: no sampling density can be estimated: the samples lie at too few places", s.input));
   }
-  const double max_radius = resolve(s.max_radius, survey.median * frame.step, s.blend) / frame.step;
+  const double max_radius = resolve(s.max_radius, survey.median * frame.step, support.blend) / frame.step;
   if (max_radius > 0) {
     for (float* r : {&survey.low, &survey.median, &survey.high}) *r = std::min(*r, static_cast<float>(max_radius));
   }
 
   Resolved out;
   Levels levels{};
-  out.feed.blend = static_cast<float>(s.blend);
+  out.support = support;
+  out.feed.blend = static_cast<float>(support.blend);
   out.feed.radius_scale = static_cast<float>(s.radius_scale);
   out.feed.max_radius = static_cast<float>(max_radius);
-  if (s.cell.unit == Length::Unit::world) {
+  if (cell.unit == Length::Unit::world) {
     // A fixed cell: one level in use, whatever the radii.
-    levels = {s.cell.value / frame.step, s.levels > 0 ? s.levels : kDefaultLevels};
+    levels = {cell.value / frame.step, s.levels > 0 ? s.levels : kDefaultLevels};
     out.feed.fixed_cell = true;
     out.feed.cell_ratio = 1;
   } else {
-    out.feed.cell_follows_support = s.cell.unit == Length::Unit::influence_radius;
-    out.feed.cell_ratio = s.cell.value;
-    levels = choose_levels(s, s.cell.value * (out.feed.cell_follows_support ? s.blend : 1.0), survey);
+    out.feed.cell_follows_support = cell.unit == Length::Unit::influence_radius;
+    out.feed.cell_ratio = cell.value;
+    levels = choose_levels(s, cell.value * (out.feed.cell_follows_support ? support.blend : 1.0), survey);
   }
   double reach = 0;
   for (const std::int32_t end : {bounds.x_min, bounds.x_max, bounds.y_min, bounds.y_max, bounds.z_min, bounds.z_max}) {
@@ -176,8 +180,8 @@ Resolved plan_once(const SurfaceSettings& s, const Frame& frame, const SlabStore
   }
   const double smallest = std::max(static_cast<double>(kMinSteps), reach / kMaxCells);
   if (levels.finest < smallest) {
-    if (s.cell.unit == Length::Unit::world) {
-      usage(fmt::format("--cell {}: too small for a cloud of this extent; the least is {:.3g}", s.cell.value,
+    if (cell.unit == Length::Unit::world) {
+      usage(fmt::format("--cell {}: too small for a cloud of this extent; the least is {:.3g}", cell.value,
                         smallest * frame.step));
     }
     // Detail finer than the lattice can address: the finest level ends there.
@@ -187,8 +191,8 @@ Resolved plan_once(const SurfaceSettings& s, const Frame& frame, const SlabStore
   }
   // A lattice much coarser than the cloud adds nothing and would overflow the fixed-point range.
   constexpr double kMaxSlab = 1 << 28;
-  if (levels.finest > kMaxSlab && s.cell.unit == Length::Unit::world) {
-    usage(fmt::format("--cell {}: larger than the whole cloud", s.cell.value));
+  if (levels.finest > kMaxSlab && cell.unit == Length::Unit::world) {
+    usage(fmt::format("--cell {}: larger than the whole cloud", cell.value));
   }
   levels.finest = std::min(levels.finest, kMaxSlab);
   while (std::ldexp(levels.finest, levels.count - 1) > kMaxSlab) --levels.count;
@@ -196,10 +200,11 @@ Resolved plan_once(const SurfaceSettings& s, const Frame& frame, const SlabStore
   out.lattice.cell = static_cast<std::int32_t>(std::lrint(levels.finest));
   out.lattice.levels = levels.count;
   if (!out.feed.fixed_cell) {
-    const double ratio = s.cell.value * (out.feed.cell_follows_support ? s.blend : 1.0);
+    const double ratio = cell.value * (out.feed.cell_follows_support ? support.blend : 1.0);
     const double above_finest = std::log2(kMainCell * ratio * survey.median / out.lattice.cell);
     out.main_level = static_cast<int>(std::clamp(std::lround(above_finest), 0L, static_cast<long>(levels.count) - 1));
   }
+  out.refit = {static_cast<float>(support.refit), 1.5F * survey.high, out.main_level};
   out.radii.min_samples = s.density;
   set_counting_cells(s, survey, out);
 
@@ -213,6 +218,10 @@ Resolved plan_once(const SurfaceSettings& s, const Frame& frame, const SlabStore
   plan.radius_low = survey.low * frame.step;
   plan.radius_median = survey.median * frame.step;
   plan.radius_high = survey.high * frame.step;
+  plan.noise = static_cast<double>(survey.noise);
+  plan.blend = support.blend;
+  plan.refit = support.refit;
+  plan.cell = cell;
   plan.finest_cell = out.lattice.cell * frame.step;
   plan.levels = out.lattice.levels;
   plan.slab_height = out.lattice.slab_height() * frame.step;
@@ -232,7 +241,8 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
 
 Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabStore& store, const Extent& bounds,
                       const RadiusSurvey& radii, bool given_radii, std::size_t attributes) {
-  Resolved out = plan_once(s, frame, store, bounds, radii, given_radii, attributes);
+  const SupportChoice support = choose_support(s, radii);
+  Resolved out = plan_once(s, frame, store, bounds, radii, support, given_radii, attributes);
   // Where most cells are of the finest level, the coarsest of the default levels only makes slabs higher: faster on
   // small clouds, but twice the memory.
   SurfaceSettings bare = s;  // the mesh must not depend on whether there is a volume beside it
@@ -241,9 +251,13 @@ Resolved resolve_plan(const SurfaceSettings& s, const Frame& frame, const SlabSt
       expected_memory(bare, out, store, attributes) > kRoomy) {
     SurfaceSettings lower = s;
     lower.levels = kDefaultLevels - 1;
-    return plan_once(lower, frame, store, bounds, radii, given_radii, attributes);
+    return plan_once(lower, frame, store, bounds, radii, support, given_radii, attributes);
   }
   return out;
+}
+
+double filter_reach(const Resolved& r) {
+  return r.refit.support > 0 ? RefitNormals(r.refit, r.lattice, select_kernel()).reach() : 0;
 }
 
 double expected_cpu_seconds(const SurfaceSettings& s, const Resolved& r, std::size_t attributes) {
@@ -257,12 +271,12 @@ double expected_cpu_seconds(const SurfaceSettings& s, const Resolved& r, std::si
   constexpr double kVoxels = 150e-9;     // --vdb: for each voxel of the band's half width and two more
   constexpr double kStep = 0.75;         // a further projection step against the first
   constexpr double kSupport = 1 / 0.63;  // influence radius of a main cell, cells
-  const double influence = s.blend * r.plan.radius_median;
+  const double influence = r.support.blend * r.plan.radius_median;
   const double main_cell =
-      r.feed.fixed_cell
-          ? r.plan.finest_cell
-          : std::max(r.plan.finest_cell, kMainCell * r.feed.cell_ratio * (r.feed.cell_follows_support ? s.blend : 1.0) *
-                                             r.plan.radius_median);
+      r.feed.fixed_cell ? r.plan.finest_cell
+                        : std::max(r.plan.finest_cell, kMainCell * r.feed.cell_ratio *
+                                                           (r.feed.cell_follows_support ? r.support.blend : 1.0) *
+                                                           r.plan.radius_median);
   const double reach = std::max(1.0, influence / main_cell / kSupport);
   const double cells = 0.25 * r.plan.radius_median * r.plan.radius_median / (main_cell * main_cell);
   const double sums = kSums * reach * reach * (1 + kStep * (s.steps - 1)) * (s.diffuse ? 2 : 1);
@@ -283,12 +297,12 @@ std::string about(double seconds) {
 
 }  // namespace
 
-std::string describe(const SurfacePlan& p, const SurfaceSettings& s) {
+std::string describe(const SurfacePlan& p) {
   const auto mb = [](std::uint64_t bytes) { return static_cast<double>(bytes) / 1e6; };
   std::string out;
   out += fmt::format("samples {}, extent {:.4g} x {:.4g} x {:.4g}\n", p.samples, p.extent[0], p.extent[1], p.extent[2]);
   out += fmt::format("radius r {:.4g} (1 % {:.4g}, 99 % {:.4g}), influence R = {:g} r\n", p.radius_median, p.radius_low,
-                     p.radius_high, s.blend);
+                     p.radius_high, p.blend);
   out += fmt::format("levels {}, cells {:.4g} to {:.4g}, slabs {} of {:.4g}\n", p.levels, p.finest_cell,
                      std::ldexp(p.finest_cell, p.levels - 1), p.slabs, p.slab_height);
   out += fmt::format("expected memory {:.0f} MB, temporary disk {:.0f} MB", mb(p.memory_bytes), mb(p.disk_bytes));

@@ -6,6 +6,8 @@
 #include "lamina/radii.h"
 #include "lamina/slab_store.h"
 #include "lamina/surface.h"
+#include "project/refit_normals.h"
+#include "surface/choose_support.h"
 #include "surface/ingest.h"
 
 namespace lamina {
@@ -15,8 +17,13 @@ struct Resolved {
   FeedSettings feed;
   RadiiSettings radii;
   SurfacePlan plan;
-  int main_level = 0;  ///< of most cells
+  SupportChoice support;
+  RefitSettings refit;  ///< support 0: normals stay
+  int main_level = 0;   ///< of most cells
 };
+
+/// NormalFilter::reach() of what `refit` asks for.
+double filter_reach(const Resolved& resolved);
 
 /// Throws Error(usage) for settings out of range. Called before the input is opened.
 void check_settings(const SurfaceSettings& settings);
@@ -36,6 +43,6 @@ double expected_cpu_seconds(const SurfaceSettings& settings, const Resolved& res
 inline constexpr double kReferenceRead = 80e-9;
 
 /// The plan in lines for a reader.
-std::string describe(const SurfacePlan& plan, const SurfaceSettings& settings);
+std::string describe(const SurfacePlan& plan);
 
 }  // namespace lamina

@@ -17,6 +17,7 @@
 #include "lamina/error.h"
 #include "lamina/mesh_sink.h"
 #include "lamina/points.h"
+#include "project/refit_normals.h"
 #include "surface/choose_normals.h"
 #include "surface/clean_ingested.h"
 #include "surface/ingest.h"
@@ -105,7 +106,7 @@ std::uint64_t table_bytes(const Lattice& lattice, const Ingested& in) {
 /// Changes that lower the memory a run takes, mildest first. A larger support has larger cells unless these follow r.
 std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceSettings& settings, int levels_now) {
   std::vector<std::pair<std::string, SurfaceSettings>> runs;
-  SurfaceSettings s = settings;
+  SurfaceSettings s = settings;  // of support and cells, what was chosen
   std::string base;
   if (s.window > 1) {
     s.window = 1;
@@ -122,12 +123,12 @@ std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceS
   }
   for (const double factor : {1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0}) {
     SurfaceSettings coarser = s;
-    if (s.cell.unit == Length::Unit::influence_radius) {
-      coarser.blend = s.blend * factor;
-      if (coarser.blend <= 64) runs.emplace_back(fmt::format("{}--blend {:g}", base, coarser.blend), coarser);
+    if (s.cell->unit == Length::Unit::influence_radius) {
+      coarser.blend = *s.blend * factor;
+      if (*coarser.blend <= 64) runs.emplace_back(fmt::format("{}--blend {:g}", base, *coarser.blend), coarser);
     } else {
-      coarser.cell.value = s.cell.value * factor;
-      runs.emplace_back(fmt::format("{}--cell {}", base, to_string(coarser.cell)), coarser);
+      coarser.cell->value = s.cell->value * factor;
+      runs.emplace_back(fmt::format("{}--cell {}", base, to_string(*coarser.cell)), coarser);
     }
   }
   return runs;
@@ -327,9 +328,10 @@ Resolved plan_surface(const SurfaceSettings& settings, const SweepInput& input, 
     }
   }
   refuse_two_levels(settings, info);
-  run.info(describe(resolved.plan, settings));
+  run.info(describe(resolved.plan));
+  if (const std::string choice = describe_choice(settings, resolved.plan); !choice.empty()) run.info(choice);
   constexpr std::uint64_t kLargestTables = std::uint64_t{1} << 30;  // a scan of 380 million samples needs a few MB
-  if (is_out_of_reach(resolved.plan, settings.blend) ||
+  if (is_out_of_reach(resolved.plan, resolved.support.blend) ||
       table_bytes(resolved.lattice, input.ingested) > kLargestTables) {
     throw Error(ExitCode::empty,
                 fmt::format("{}: some of the {} samples lie so far away from the others ({:.3g}, r {:.3g}) that the "
@@ -339,7 +341,11 @@ Resolved plan_surface(const SurfaceSettings& settings, const SweepInput& input, 
                             resolved.plan.radius_median));
   }
   if (run.max_memory > 0 && resolved.plan.memory_bytes > run.max_memory) {
-    refuse_memory(settings, resolved.plan.levels, resolved.plan.memory_bytes, run.max_memory,
+    SurfaceSettings chosen = settings;
+    chosen.blend = resolved.support.blend;
+    chosen.cell = resolved.support.cell;
+    chosen.refit = resolved.support.refit;
+    refuse_memory(chosen, resolved.plan.levels, resolved.plan.memory_bytes, run.max_memory,
                   [&](const SurfaceSettings& s) { return plan_for(s).plan.memory_bytes; });
   }
   stats.disk_bytes = input.ingested.store.disk_bytes();
@@ -358,6 +364,11 @@ void sweep(const SurfaceSettings& settings, SweepInput& input, const Resolved& r
            SlabSink& sink, SurfaceVolume* volume, const RunContext& run, Stopwatch& watch, SurfaceStats& stats) {
   const PointSourceInfo& info = input.info;
   SampleFeed feed(input.ingested.store, resolved.lattice, resolved.feed, resolved.radii, info.has_radius);
+  std::optional<RefitNormals> refit;
+  if (resolved.refit.support > 0) {
+    refit.emplace(resolved.refit, resolved.lattice, select_kernel());
+    feed.filter_normals(*refit);
+  }
   Pipeline pipeline(settings, resolved, input.frame, input.ingested.extent, feed, info.attributes.size(), sink, span,
                     volume);
   pipeline.run(run, watch);
@@ -454,7 +465,7 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
       volume.emplace(grids, input.frame, resolved.lattice, resolved.main_level, input.info.attributes, tmp);
     }
     const PruneRule rule{settings.prune_triangles,
-                         resolve(settings.prune_size, resolved.plan.radius_median, settings.blend)};
+                         resolve(settings.prune_size, resolved.plan.radius_median, resolved.support.blend)};
     const bool prunes = rule.triangles > 0 || rule.size > 0;
     Pruner pruner(rule, tmp, sink);
     MeshFileSlabs whole(sink);

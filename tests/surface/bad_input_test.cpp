@@ -182,7 +182,10 @@ TEST_F(SurfaceBadInput, SettingsOutOfRange) {
       {"--levels", [](auto& s) { s.levels = 13; }},
       {"--density", [](auto& s) { s.density = 1; }},
       {"--particlescale", [](auto& s) { s.radius_scale = -1; }},
-      {"--cell", [](auto& s) { s.cell.value = 0; }},
+      {"--cell",
+       [](auto& s) {
+         s.cell = {0, Length::Unit::sample_radius};
+       }},
       {"--cell",
        [](auto& s) {
          s.cell = {1e-9, Length::Unit::world};
