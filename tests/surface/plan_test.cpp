@@ -19,6 +19,7 @@ SurfacePlan plan_of(
   SurfaceSettings s;
   s.input = test::write_cloud(cloud, folder / "in.ply");
   s.dry_run = true;
+  s.blend = 1.2;
   change(s);
   RunContext run;
   run.tmp_dir = folder.path();
@@ -139,13 +140,14 @@ TEST(SurfacePlan, TheVolumeDoesNotChooseTheLevels) {
 TEST(SurfacePlan, TimeGrowsWithSamplesStepsAndCells) {
   const auto seconds = [](std::size_t samples, const std::function<void(SurfaceSettings&)>& change) {
     SurfaceSettings s;
-    s.cell.value = 0.9;
+    s.blend = 1.2;
     change(s);
     Resolved r;
+    r.support.blend = *s.blend;
     r.feed.cell_ratio = 0.9;
     r.plan.samples = samples;
     r.plan.radius_median = 1;
-    r.plan.finest_cell = 0.63 * s.blend;
+    r.plan.finest_cell = 0.63 * *s.blend;
     return expected_cpu_seconds(s, r, 0);
   };
   const auto as_it_is = [](auto&) {};
