@@ -1,6 +1,7 @@
 // The whole job on clouds whose surface is known.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
 #include <cmath>
 
 #include "surface/clouds.h"
