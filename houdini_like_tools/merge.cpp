@@ -78,7 +78,7 @@ void merge_chunks(const MergeOptions& o, const RunContext& context) {
 }
 
 void run_merge(const MergeOptions& o) {
-  const RunContext context = make_context(o.run);
+  const RunContext context = make_context(o.run, o.output);
   if (std::any_of(o.inputs.begin(), o.inputs.end(), is_part)) return merge_chunks(o, context);
   const auto word = [](FileContent content) {
     return content == FileContent::points ? "points" : content == FileContent::mesh ? "a mesh" : "a volume";

@@ -271,12 +271,7 @@ void add_surface(CLI::App& app) {
       ->group(samples);
 
   add_clean_options(*tool, s.clean, "Cleaning");
-  tool->add_option("--normals", s.normals,
-                   "whose normals: the file's; auto: found where the file has none; estimate: all found")
-      ->transform(words<NormalsChoice>(
-          {{"file", NormalsChoice::file}, {"auto", NormalsChoice::automatic}, {"estimate", NormalsChoice::estimate}}))
-      ->option_text("file|auto|estimate [file]")
-      ->group("Normals");
+  add_normals_choice(*tool, s.normals, "Normals");
   add_normals_options(*tool, s.normal_search, "Normals");
 
   const std::string fit = "Fit";

@@ -5,6 +5,7 @@
 #include "lamina/error.h"
 #include "lamina/version.h"
 #include "surface/choose_normals.h"
+#include "surface/clean_ingested.h"
 
 namespace lamina {
 
@@ -15,17 +16,18 @@ std::string mesh_settings(const SurfaceSettings& settings) {
                clean, max_radius, blend, steps, fit, diffuse, cell, levels, boundary, cluster, chord, vertex_levels,
                prune_triangles, prune_size, local, window, dry_run, volume] = settings;
   // Jobs of several runs refuse these: require_mesh_alone().
-  (void)clean, (void)prune_triangles, (void)prune_size, (void)local;
+  (void)prune_triangles, (void)prune_size, (void)local;
   (void)input, (void)more_inputs, (void)output, (void)normals, (void)normal_search, (void)window, (void)dry_run;
   const std::string frame_word = frame             ? fmt::format("{}", static_cast<int>(*frame))
                                  : volume.wanted() ? "grid"
                                                    : "auto";
   return fmt::format(
-      "columns {}\nframe {}\nbad_samples {}\nnormals {}\nparticlescale {}\ndensity {}\nmax_radius {}\nblend {}\nsteps "
+      "columns {}\nframe {}\nbad_samples {}\nnormals {}\ncleaning {}\nparticlescale {}\ndensity {}\nmax_radius "
+      "{}\nblend {}\nsteps "
       "{}\nfit {}\n"
       "diffuse {}\ncell {}\nlevels {}\nboundary {}\ncluster {}\nchord {}\nlevel {}\n",
-      columns, frame_word, static_cast<int>(bad_samples), normals_words(settings), radius_scale, density,
-      to_string(max_radius), blend, steps, static_cast<int>(fit), diffuse, to_string(cell), levels, boundary,
+      columns, frame_word, static_cast<int>(bad_samples), normals_words(settings), cleaning_words(clean), radius_scale,
+      density, to_string(max_radius), blend, steps, static_cast<int>(fit), diffuse, to_string(cell), levels, boundary,
       static_cast<int>(cluster), chord, vertex_levels);
 }
 
@@ -42,11 +44,6 @@ void require_mesh_alone(const SurfaceSettings& settings, const std::string& opti
   if (settings.volume.wanted()) {
     throw Error(ExitCode::usage,
                 fmt::format("{} makes the mesh alone: leave --vdb and --vdb-points to a run of their own", option));
-  }
-  if (settings.clean.looks_around() || !settings.clean.pick.takes_all()) {
-    throw Error(
-        ExitCode::usage,
-        fmt::format("{} cannot clean samples as they are read; clean the points before, with lamina clean", option));
   }
   if (settings.prune_triangles > 0 || settings.prune_size.value > 0 || settings.local)
     throw Error(ExitCode::usage,

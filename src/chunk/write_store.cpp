@@ -1,4 +1,4 @@
-
+#include <filesystem>
 
 #include "chunk/new_folder.h"
 #include "lamina/chunk.h"
@@ -6,8 +6,10 @@
 
 namespace lamina {
 
-SurfaceStats write_store(const SurfaceSettings& given, const std::string& store, const RunContext& run) {
+SurfaceStats write_store(const SurfaceSettings& given, const std::string& store, const RunContext& given_run) {
   SurfaceSettings settings = given;
+  RunContext run = given_run;
+  if (run.tmp_dir.empty()) run.tmp_dir = (std::filesystem::absolute(store) / "..").lexically_normal().string();
   settings.dry_run = true;  // nothing but the store is written
   settings.output.clear();
   check_settings(settings);

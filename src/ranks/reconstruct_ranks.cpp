@@ -30,6 +30,12 @@ bool is_store(const SurfaceSettings& settings) {
 void check_job(const SurfaceSettings& settings, const RunContext& run, bool first) {
   check_settings(settings);
   require_mesh_alone(settings, "mpirun");
+  if (!is_store(settings) && (settings.clean.looks_around() || !settings.clean.pick.takes_all())) {
+    throw Error(
+        ExitCode::usage,
+        "ranks that share out an input's rows cannot clean them: clean the points before, with 'lamina clean', "
+        "or put them into a store with the same options, 'lamina sort IN... --store DIR', and give mpirun that");
+  }
   if (settings.output == "-")
     throw Error(ExitCode::usage, "several ranks write one file together: give --output a name");
   if (!first) return;

@@ -217,14 +217,6 @@ void clean(Ingested& in, const SurfaceSettings& settings, double step, const std
     run.info(fmt::format("{} of {} samples left: {}", in.store.total(), rows, said));
 }
 
-/// What is left out is not written down with samples that are kept for several runs.
-void require_uncleaned(const SurfaceSettings& settings) {
-  if (settings.clean.looks_around() || !settings.clean.pick.takes_all())
-    throw Error(ExitCode::usage,
-                "samples that are kept for several runs cannot be cleaned as they are read; clean the "
-                "points before, with lamina clean");
-}
-
 }  // namespace
 
 /// Next to the output unless told otherwise; the system's temporary folder for standard output, pipes and devices.
@@ -289,7 +281,6 @@ FrameMode chosen_frame(const SurfaceSettings& settings) {
 SweepInput read_surface_input(const SurfaceSettings& settings, const std::string& directory, bool keep,
                               const RunContext& run, Stopwatch& watch, SurfaceStats& stats) {
   const bool kept = settings.more_inputs.empty() && is_kept_input(settings.input);
-  if (keep || kept) require_uncleaned(settings);
   if (kept && !keep) return open_kept_input(settings.input, settings);
   const std::string scratch = keep ? temporary_directory(settings, run) : directory;
   std::unique_ptr<PointSource> source = open_inputs(settings, scratch, run);
