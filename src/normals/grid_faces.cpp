@@ -7,6 +7,7 @@
 namespace lamina::normals {
 namespace {
 
+constexpr std::size_t kEnough = 3;   ///< of the four faces around a sample
 constexpr double kGrazing = 0.17;    ///< cosine of 80 degrees
 constexpr double kNearPlane = 0.5;   ///< of a face of the second ring: its slope out of the first ring's plane
 constexpr double kSameFacing = 0.5;  ///< cosine between the two
@@ -70,8 +71,13 @@ std::array<float, 3> GridFaces::normal_at(std::size_t at) const {
     }
   };
   Eigen::Vector3d sum(0, 0, 0);
-  for_faces(1, [&](const Face& f) { sum += f.normal; });
-  if (sum.isZero()) return {};
+  std::size_t faces = 0;
+  for_faces(1, [&](const Face& f) {
+    sum += f.normal;
+    ++faces;
+  });
+  // At rims faces lie on one side, and curved surfaces seen at a grazing angle lean away there.
+  if (faces < kEnough || sum.isZero()) return {};
   const Eigen::Vector3d first = sum.normalized();
   sum.setZero();
   for_faces(kRing, [&](const Face& f) {

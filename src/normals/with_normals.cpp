@@ -289,6 +289,7 @@ std::unique_ptr<PointSource> with_normals(std::unique_ptr<PointSource> source, c
   std::unique_ptr<RowNormals> found;
   meshes::with_threads(run.threads, [&] { found = Job(*source, settings, report, run).work(); });
   report.estimated += by_grid;
+  report.by_viewpoint += by_grid;
   return give_normals(std::move(source), std::move(found));
 }
 

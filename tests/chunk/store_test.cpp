@@ -1,10 +1,13 @@
 // The folder that chunks are made from.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 
 #include <filesystem>
 
 #include "chunk/chunked.h"
+#include "files/descriptor.h"
 
 namespace lamina {
 namespace {
@@ -55,6 +58,18 @@ TEST_F(KeptStore, AppearsWhenCompleteOnly) {
   settings_.input = folder_ / "missing.ply";
   EXPECT_THROW(write_store(settings_, folder_ / "other", {}), Error);
   EXPECT_EQ(folder_.entries(), before);
+}
+
+TEST_F(KeptStore, ThoseOfKilledRunsAreRemoved) {
+  fs::create_directory(folder_ / ".other.partial-1");
+  test::write_file(folder_ / ".other.partial-1/samples.00", "what a killed run has left");
+  const std::string live = folder_ / ".other.partial-2";
+  fs::create_directory(live);
+  const Descriptor held(::open(live.c_str(), O_RDONLY | O_DIRECTORY));
+  ASSERT_EQ(::flock(held.get(), LOCK_EX), 0);
+  write_store(settings_, folder_ / "other", {});
+  EXPECT_FALSE(fs::exists(folder_ / ".other.partial-1"));
+  EXPECT_TRUE(fs::exists(live));
 }
 
 TEST_F(KeptStore, RefusesOtherWaysOfReading) {

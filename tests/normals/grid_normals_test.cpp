@@ -87,8 +87,8 @@ TEST(GridNormals, FaceTheScannerOnASphereBeforeAWall) {
   const GridNormals found =
       grid_normals(std::make_unique<test::OrientedSource>(s.truth, false), {{0, s.grid}}, origin, "/tmp", {});
   const Agreement a = compare(*found.source, s.truth);
-  EXPECT_GT(a.found, 0.98);
-  EXPECT_GT(a.near, 0.99);
+  EXPECT_GT(a.found, 0.9);
+  EXPECT_GT(a.near, 0.995);
   EXPECT_EQ(a.right_side, 1);
   EXPECT_NEAR(static_cast<double>(found.found), a.found * static_cast<double>(s.truth.size()), 0.5);
 }
@@ -116,8 +116,8 @@ TEST(GridNormals, ThroughTheWholeSearch) {
                                   NormalsSettings{}, report);
   const Agreement a = compare(*found, truth);
   EXPECT_EQ(a.found, 1);
-  EXPECT_GT(a.near, 0.985);
-  EXPECT_GT(a.right_side, 0.999);
+  EXPECT_GT(a.near, 0.99);
+  EXPECT_EQ(a.right_side, 1);
   EXPECT_EQ(report.estimated, truth.size());
   EXPECT_EQ(report.by_viewpoint, truth.size());
 }
