@@ -2,7 +2,6 @@
 #include "lamina/surface.h"
 
 #include <fmt/format.h>
-#include <malloc.h>
 
 #include <filesystem>
 #include <map>
@@ -106,15 +105,6 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
   return j;
 }
 
-/// Large arrays go back to the system when they are freed. By default the C library raises the size from which they do
-/// with the first one freed, and keeps gaps between what lives long: a fifth of the memory at 16 million samples.
-void return_large_arrays() {
-#ifdef __GLIBC__
-  constexpr int kLarge = 128 << 10;
-  mallopt(M_MMAP_THRESHOLD, kLarge);
-#endif
-}
-
 /// A picture of the mesh file: of its triangles where they can be held, of its vertices where they cannot.
 void draw_preview(const SurfaceOptions& o, const std::string& mesh, const RunContext& context) {
   // Positions become doubles, and normals, projected vertices and lists of triangles come on top.
@@ -133,7 +123,6 @@ void draw_preview(const SurfaceOptions& o, const std::string& mesh, const RunCon
 }
 
 void run_surface(const SurfaceOptions& o) {
-  return_large_arrays();
   SurfaceSettings settings = o.settings;
   settings.input = pipe_name(o.inputs.front());
   for (auto name = o.inputs.begin() + 1; name != o.inputs.end(); ++name)

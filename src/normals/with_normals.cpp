@@ -280,14 +280,14 @@ std::uint64_t take_grid_normals(std::unique_ptr<PointSource>& source, NormalsSet
 
 }  // namespace
 
-std::unique_ptr<PointSource> with_normals(std::unique_ptr<PointSource> source, const NormalsSettings& given,
+std::unique_ptr<PointSource> with_normals(std::unique_ptr<PointSource> source, const NormalsSettings& settings,
                                           NormalsReport& report, const RunContext& run) {
-  require_sane(given, source->info());
+  require_sane(settings, source->info());
   report = {};
-  NormalsSettings settings = given;
-  const std::uint64_t by_grid = take_grid_normals(source, settings, run);
+  NormalsSettings search = settings;
+  const std::uint64_t by_grid = take_grid_normals(source, search, run);
   std::unique_ptr<RowNormals> found;
-  meshes::with_threads(run.threads, [&] { found = Job(*source, settings, report, run).work(); });
+  meshes::with_threads(run.threads, [&] { found = Job(*source, search, report, run).work(); });
   report.estimated += by_grid;
   report.by_viewpoint += by_grid;
   return give_normals(std::move(source), std::move(found));

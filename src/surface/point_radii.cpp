@@ -167,7 +167,9 @@ PointRadiiReport write_radii(PointSource& source, PointsWriter& writer, const Po
   constexpr std::uint64_t kProgram = std::uint64_t{80} << 20;  // measured: the store's buffers, the window, the program
   constexpr std::uint64_t kRecord = sizeof(float) + 12;
   const std::uint64_t records = std::min<std::uint64_t>(memory, source.info().count * kRecord);
-  require_memory(run, kProgram + records + records / 2, source.info().path, "finding radii");
+  constexpr std::uint64_t kRow = 7;
+  require_memory(run, kProgram + records + records / 2 + kRow * source.info().count, source.info().path,
+                 "finding radii");
   RunContext silent = run;  // what is left out is told by whoever writes the rows
   silent.log = nullptr;
   NumberedRows positions(source);
