@@ -1,6 +1,5 @@
 // The band grows: a known voxel gives those that lie beyond it along its normal the distance of its tangent plane.
 #include <tbb/parallel_for.h>
-#include <xmmintrin.h>
 
 #include <algorithm>
 #include <bit>
@@ -8,120 +7,14 @@
 #include <span>
 
 #include "volume/band.h"
+#include "volume/band_reach.h"
 #include "window/bits.h"
 
 namespace lamina::volume {
 namespace {
 
-struct Offset {
-  int x, y, z;
-  float squared;  ///< length
-};
-
-/// Rows along y, then x, then z. The middle is one of them, and out of everybody's reach.
-constexpr std::array<Offset, 27> make_offsets() {
-  std::array<Offset, 27> out{};
-  for (int i = 0; i < 27; ++i) {
-    const int x = i / 3 % 3 - 1, y = i % 3 - 1, z = i / 9 - 1;
-    out[static_cast<std::size_t>(i)] = {x, y, z, static_cast<float>(x * x + y * y + z * z)};
-  }
-  return out;
-}
-constexpr std::array<Offset, 27> kOffsets = make_offsets();
-constexpr std::array<int, 27> make_steps() {
-  std::array<int, 27> out{};
-  for (std::size_t i = 0; i < 27; ++i) out[i] = kOffsets[i].x + 8 * kOffsets[i].y + 64 * kOffsets[i].z;
-  return out;
-}
-constexpr std::array<int, 27> kSteps = make_steps();  ///< in a brick
-
-/// A voxel reaches another as far as the way to it leads along its normal: squared sideways distance below this. The
-/// best of 26 directions is off by 0.35 at most; a whole voxel sideways would let the band grow over a rim.
-constexpr float kSideways = 0.75F;
 /// Repaired corners count within this distance of the surface, voxels.
 constexpr float kRepaired = 1;
-
-/// The offsets behind the middle, four at a time; those before it are their opposites. What fills the last four is out
-/// of reach.
-constexpr int kFours = 4, kBehind = 14;
-struct FourOffsets {
-  Plane x, y, z, room;  ///< `room`: what is left of kSideways
-};
-constexpr std::array<FourOffsets, kFours> make_fours() {
-  std::array<FourOffsets, kFours> out{};
-  for (std::size_t i = 0; i < kFours; ++i) {
-    std::array<Offset, 4> o{};
-    for (std::size_t k = 0; k < 4; ++k)
-      o[k] = 4 * i + k + kBehind < 27 ? kOffsets[4 * i + k + kBehind] : Offset{0, 0, 0, 1};
-    const auto four = [&o](auto value) { return Plane{value(o[0]), value(o[1]), value(o[2]), value(o[3])}; };
-    out[i] = {four([](const Offset& to) { return static_cast<float>(to.x); }),
-              four([](const Offset& to) { return static_cast<float>(to.y); }),
-              four([](const Offset& to) { return static_cast<float>(to.z); }),
-              four([](const Offset& to) { return kSideways - to.squared; })};
-  }
-  return out;
-}
-constexpr std::array<FourOffsets, kFours> kFourOffsets = make_fours();
-
-/// What a voxel says to those around it.
-struct Reach {
-  /// The offsets behind the middle of which either they or their opposites are reached, and which of the two.
-  std::uint32_t pairs = 0, behind = 0;
-  std::array<Plane, kFours> up, weight;
-
-  /// Away from the surface only: what lies towards it is a hole in the data, not a part of the band.
-  explicit Reach(const Plane& plane) {
-    const float away = plane[3] < 0 ? -1 : 1;
-    const auto bits_of = [](const auto& four, std::size_t i) {
-      return static_cast<std::uint32_t>(_mm_movemask_ps(std::bit_cast<__m128>(four))) << (4 * i);
-    };
-    for (std::size_t i = 0; i < kFours; ++i) {
-      const FourOffsets& to = kFourOffsets[i];
-      up[i] = plane[0] * to.x + plane[1] * to.y + plane[2] * to.z;
-      const Plane near = to.room + up[i] * up[i];
-      weight[i] = near * near * near * near;
-      pairs |= bits_of(near > 0, i);
-      behind |= bits_of(up[i] * away > 0, i);
-    }
-  }
-};
-
-/// A voxel's eight bits of a row, three places apart.
-constexpr std::array<std::uint32_t, 256> make_spread() {
-  std::array<std::uint32_t, 256> out{};
-  for (std::uint32_t row = 0; row < 256; ++row)
-    for (std::uint32_t x = 0; x < 8; ++x) out[row] |= (row >> x & 1) << (3 * x);
-  return out;
-}
-constexpr std::array<std::uint32_t, 256> kSpread = make_spread();
-
-/// The voxels of a brick that want a value, laid out for those around a source to lie side by side.
-class Targets {
- public:
-  Targets(const BlockMask& wanted, int begin, int end) {
-    for (int z = begin; z < end; ++z) {
-      for (int y = 0; y < 8; ++y) {
-        const std::uint64_t row = std::uint64_t{kSpread[wanted.words[z] >> (8 * y) & 0xFF]} << 6;
-        if (row == 0) continue;
-        rows_[at(z, y - 1)] |= row << 2;
-        rows_[at(z, y)] |= row << 1;
-        rows_[at(z, y + 1)] |= row;
-      }
-    }
-  }
-  /// As bits of kOffsets; the voxel may lie one beside the brick.
-  [[nodiscard]] std::uint32_t beside(int x, int y, int z) const {
-    const int shift = 3 * (x + 1);
-    const auto nine = [&](int layer) { return static_cast<std::uint32_t>(rows_[at(layer, y)] >> shift) & 0x1FF; };
-    return nine(z - 1) | nine(z) << 9 | nine(z + 1) << 18;
-  }
-
- private:
-  static constexpr int kRows = 10, kLayers = 12;  ///< y from -1, z from -2
-  static std::size_t at(int z, int y) { return static_cast<std::size_t>((z + 2) * kRows + y + 1); }
-  /// Three bits, those of the rows y - 1, y, y + 1, for each x from -2 on.
-  std::array<std::uint64_t, std::size_t{kRows} * kLayers> rows_{};
-};
 
 /// Weighted sums at the voxels of a brick.
 struct Sums {
@@ -202,7 +95,7 @@ class Step {
   /// A source with something to say.
   struct Pusher {
     const Brick* from;
-    std::uint32_t beside;   ///< the offsets of wanted voxels
+    PairBits beside;        ///< wanted voxels
     std::int16_t at, here;  ///< its place in its own brick, and as seen from this one
   };
 
@@ -222,8 +115,8 @@ class Step {
       for (int z = std::max(begin_ - 1, dz * 8); z < std::min(end_ + 1, dz * 8 + 8); ++z) {
         for (std::uint64_t w = from->source[round].words[z & 7] & near; w != 0; w &= w - 1) {
           const int bit = std::countr_zero(w), x = (bit & 7) + 8 * dx, y = (bit >> 3) + 8 * dy;
-          const std::uint32_t beside = targets.beside(x, y, z);
-          if (beside == 0) continue;
+          const PairBits beside = targets.beside(x, y, z);
+          if (!beside.any()) continue;
           const int at = (z & 7) * 64 + bit;
           __builtin_prefetch(&from->plane[at]);
           waiting[count++] = {from, beside, static_cast<std::int16_t>(at),
@@ -241,13 +134,13 @@ class Step {
     for (const Pusher& p : pushers) {
       const Plane plane = p.from->plane[p.at];
       const Reach reach(plane);
-      for (std::uint32_t list = reach.pairs; list != 0; list &= list - 1) {
+      const std::uint32_t behind = reach.pairs & reach.behind & p.beside.behind;
+      const std::uint32_t before = reach.pairs & ~reach.behind & p.beside.before;
+      for (std::uint32_t list = behind | before; list != 0; list &= list - 1) {
         const auto i = static_cast<std::size_t>(std::countr_zero(list));
-        const bool behind = (reach.behind >> i & 1) != 0;
-        const std::size_t o = behind ? kBehind + i : 26 - kBehind - i;
-        if ((p.beside >> o & 1) == 0) continue;
-        const float up = behind ? reach.up[i / 4][i % 4] : -reach.up[i / 4][i % 4];
-        sums_.add(p.here + kSteps[o], reach.weight[i / 4][i % 4], plane + Plane{0, 0, 0, up}, *p.from, p.at, channels_);
+        const int way = (behind >> i & 1) != 0 ? 1 : -1;
+        sums_.add(p.here + way * kPairSteps[i], reach.weight(i),
+                  plane + Plane{0, 0, 0, static_cast<float>(way) * reach.up[i]}, *p.from, p.at, channels_);
       }
     }
   }
