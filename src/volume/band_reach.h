@@ -68,6 +68,11 @@ constexpr std::array<FourPairs, kFours> make_fours() {
 }
 inline constexpr std::array<FourPairs, kFours> kFourPairs = make_fours();
 
+/// The nearer to the normal, the more.
+inline float weight_of(float near) {
+  return near * near * near * near;
+}
+
 /// What a voxel says to those around it.
 struct Reach {
   /// The pairs of which one is reached, and whether it is the one behind.
@@ -91,10 +96,6 @@ struct Reach {
     }
     pairs = ~pairs;
     if (!(plane[3] < 0)) behind = ~behind;
-  }
-  [[nodiscard]] float weight(std::size_t pair) const {
-    const float n = near[pair];
-    return n * n * n * n;
   }
 };
 

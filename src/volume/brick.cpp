@@ -40,8 +40,9 @@ Brick& BrickMap::touch(const Block& b) {
   Brick& brick = *place;
   brick.block = b;
   brick.around.fill(nullptr);
-  std::fill_n(brick.known.begin(), rounds_ + 1, BlockMask{});
-  std::fill_n(brick.source.begin(), std::min(rounds_ + 1, kMaxRounds), BlockMask{});
+  const auto rounds = static_cast<std::size_t>(rounds_);
+  brick.known.assign(rounds + 1, {});
+  brick.source.assign(rounds + 1, {});
   brick.contested = {};
   brick.repaired = {};
   own.add(std::move(place));

@@ -24,9 +24,9 @@ struct Brick {
   /// The bricks around, x fastest, itself in the middle; null where there is none.
   std::array<Brick*, 27> around;
   /// By round: the projected voxels first, the whole band last.
-  std::array<BlockMask, kMaxRounds + 1> known;
+  std::vector<BlockMask> known;
   /// By round: the voxels new in it that the band grows from.
-  std::array<BlockMask, kMaxRounds> source;
+  std::vector<BlockMask> source;
   /// Voxels that the planes around disagree on.
   BlockMask contested;
   /// Corners that extraction gives a value from their trusted neighbours.
@@ -58,6 +58,7 @@ class BrickMap {
   std::vector<std::unique_ptr<Brick>> take_lowest();
   /// Bricks taken out, to be used again: fresh memory costs more than growing the band in it.
   void give_back(std::vector<std::unique_ptr<Brick>> bricks);
+  void free_spare() { spare_ = std::vector<std::unique_ptr<Brick>>(); }
 
  private:
   /// Bricks of one z in order of arrival, and a table of them by y, x with open addressing.

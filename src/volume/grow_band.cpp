@@ -4,9 +4,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <span>
+#include <optional>
 
 #include "volume/band.h"
+#include "volume/band_push.h"
 #include "volume/band_reach.h"
 #include "window/bits.h"
 
@@ -16,47 +17,36 @@ namespace {
 /// Repaired corners count within this distance of the surface, voxels.
 constexpr float kRepaired = 1;
 
-/// Weighted sums at the voxels of a brick.
-struct Sums {
-  std::array<float, 512> weight;
-  std::array<Plane, 512> total;  ///< normal and distance
-  std::vector<float> extra;
-
-  void clear(int at, std::size_t channels) {
-    weight[at] = 0;
-    total[at] = Plane{};
-    extra.resize(std::max(extra.size(), 512 * channels));
-    for (std::size_t c = 0; c < channels; ++c) extra[c * 512 + at] = 0;
-  }
-  void add(int at, float w, const Plane& plane, const Brick& from, int from_at, std::size_t channels) {
-    weight[at] += w;
-    total[at] += w * plane;
-    for (std::size_t c = 0; c < channels; ++c) extra[c * 512 + at] += w * from.extra[c * 512 + from_at];
-  }
-  /// False where neighbours of two sheets that face each other say nothing together.
-  bool store(int at, float least, std::size_t channels, Brick& to) const {
-    const Plane t = total[at], squares = t * t;
-    const float squared = squares[0] + squares[1] + squares[2];
-    if (!(squared > least * least * weight[at] * weight[at])) return false;
-    const float inverse = 1 / weight[at], unit = 1 / std::sqrt(squared);
-    to.plane[at] = t * Plane{unit, unit, unit, inverse};
-    for (std::size_t c = 0; c < channels; ++c) to.extra[c * 512 + at] = extra[c * 512 + at] * inverse;
-    return true;
-  }
-};
+/// What the sums at a voxel say; its distance, or nothing where neighbours of two sheets that face each other say
+/// nothing together.
+std::optional<float> store(const Sums& sums, int at, float least, std::size_t channels, Brick& to) {
+  const float weight = sums.weight[at];
+  const Plane t = sums.total[at], squares = t * t;
+  const float squared = squares[0] + squares[1] + squares[2];
+  if (!(squared > least * least * weight * weight)) return std::nullopt;
+  const float length = std::sqrt(squared), both = 1 / (weight * length);
+  const float inverse = both * length, unit = both * weight;
+  const Plane plane = t * Plane{unit, unit, unit, inverse};
+  to.plane[at] = plane;
+  for (std::size_t c = 0; c < channels; ++c) to.extra[c * 512 + at] = sums.extra[c * 512 + at] * inverse;
+  return plane[3];  // reading it again would wait for its way to memory
+}
 
 /// One step of one brick: from the voxels that the step before made known, in a fixed order, to those beside them that
 /// are not. What older voxels reach is known already, but for places between two sheets that face each other.
 class Step {
  public:
-  Step(Brick& brick, int round, int begin, int end, const BandSettings& settings, float farthest, Sums& sums)
+  Step(Brick& brick, int round, int begin, int end, const BandSettings& settings, float farthest, Push way, Sums& sums)
       : brick_(brick),
         round_(round),
         begin_(begin),
         end_(end),
         channels_(settings.channels.size()),
         farthest_(farthest),
-        sums_(sums) {}
+        push_(way),
+        sums_(sums) {
+    sums_.extra.resize(std::max(sums_.extra.size(), 512 * channels_));
+  }
 
   void run() {
     for (int z = begin_; z < end_; ++z) brick_.known[round_].words[z] = brick_.known[round_ - 1].words[z];
@@ -70,16 +60,18 @@ class Step {
       contested.words[z] = wanted.words[z] & brick_.contested.words[z];
     }
     if (wanted.any()) {
-      for_each(wanted, [&](int at) { sums_.clear(at, channels_); });
+      for_each(wanted, [&](int at) {
+        sums_.clear(at, channels_);
+        __builtin_prefetch(&brick_.plane[at], 1);
+      });
       push(round_ - 1, wanted);
       for (int r = 0; contested.any() && r < round_ - 1; ++r) push(r, contested);
       for_each(wanted, [&](int at) {
         if (!(sums_.weight[at] > 0)) return;
-        if (sums_.store(at, 0.5F, channels_, brick_)) {
-          know(at);
-        } else {
+        if (const auto distance = store(sums_, at, 0.5F, channels_, brick_))
+          know(at, *distance);
+        else
           brick_.contested.set(at);
-        }
       });
     }
     if (round_ == 1) repair_gaps();
@@ -91,13 +83,6 @@ class Step {
     for (int z = begin_; z < end_; ++z)
       for (std::uint64_t w = mask.words[z]; w != 0; w &= w - 1) visit(z * 64 + std::countr_zero(w));
   }
-
-  /// A source with something to say.
-  struct Pusher {
-    const Brick* from;
-    PairBits beside;        ///< wanted voxels
-    std::int16_t at, here;  ///< its place in its own brick, and as seen from this one
-  };
 
   void push(int round, const BlockMask& wanted) {
     const Targets targets(wanted, begin_, end_);
@@ -122,46 +107,31 @@ class Step {
           waiting[count++] = {from, beside, static_cast<std::int16_t>(at),
                               static_cast<std::int16_t>(x + 8 * y + 64 * z)};
           if (count < waiting.size()) continue;
-          push_all({waiting.data(), count});
+          push_({waiting.data(), count}, channels_, sums_);
           count = 0;
         }
       }
     }
-    push_all({waiting.data(), count});
+    push_({waiting.data(), count}, channels_, sums_);
   }
 
-  void push_all(std::span<const Pusher> pushers) {
-    for (const Pusher& p : pushers) {
-      const Plane plane = p.from->plane[p.at];
-      const Reach reach(plane);
-      const std::uint32_t behind = reach.pairs & reach.behind & p.beside.behind;
-      const std::uint32_t before = reach.pairs & ~reach.behind & p.beside.before;
-      for (std::uint32_t list = behind | before; list != 0; list &= list - 1) {
-        const auto i = static_cast<std::size_t>(std::countr_zero(list));
-        const int way = (behind >> i & 1) != 0 ? 1 : -1;
-        sums_.add(p.here + way * kPairSteps[i], reach.weight(i),
-                  plane + Plane{0, 0, 0, static_cast<float>(way) * reach.up[i]}, *p.from, p.at, channels_);
-      }
-    }
-  }
-
-  void know(int at) {
+  void know(int at, float distance) {
     brick_.known[round_].set(at);
-    if (std::abs(brick_.distance(static_cast<std::size_t>(at))) < farthest_) brick_.source[round_].set(at);
+    if (std::abs(distance) < farthest_) brick_.source[round_].set(at);
   }
 
   void repair_gaps() {
     for (int z = begin_; z < end_; ++z) {
       for (std::uint64_t w = brick_.repaired.words[z] & ~brick_.known[1].words[z]; w != 0; w &= w - 1) {
         const int at = z * 64 + std::countr_zero(w);
-        if (repair(at)) know(at);
+        if (const auto distance = repair(at)) know(at, *distance);
       }
     }
   }
 
   /// A gap between samples that extraction bridges. As corner_value() does it: the mean of all neighbours' planes,
   /// weights 1 / m^2.
-  bool repair(int at) {
+  std::optional<float> repair(int at) {
     sums_.clear(at, channels_);
     for (const Offset& o : kOffsets) {
       if (o.squared == 0) continue;
@@ -174,14 +144,15 @@ class Step {
                             plane[2] * static_cast<float>(o.z));
       sums_.add(at, 1 / (o.squared * o.squared), plane + Plane{0, 0, 0, along}, *from, from_at, channels_);
     }
-    return sums_.weight[at] > 0 && std::abs(sums_.total[at][3]) <= kRepaired * sums_.weight[at] &&
-           sums_.store(at, 1e-6F, channels_, brick_);
+    const bool near = sums_.weight[at] > 0 && std::abs(sums_.total[at][3]) <= kRepaired * sums_.weight[at];
+    return near ? store(sums_, at, 1e-6F, channels_, brick_) : std::nullopt;
   }
 
   Brick& brick_;
   int round_, begin_, end_;
   std::size_t channels_;
   float farthest_;
+  Push push_;
   Sums& sums_;
 };
 
@@ -198,9 +169,10 @@ void Band::grow(int round, std::int32_t begin, std::int32_t end) {
       jobs.push_back({&brick, std::max(0, begin - bz * 8), std::min(8, end - bz * 8)});
     });
   }
+  static const Push way = available_pushes().back();
   tbb::parallel_for(std::size_t{0}, jobs.size(), [&](std::size_t j) {
     static thread_local Sums sums;
-    Step(*jobs[j].brick, round, jobs[j].begin, jobs[j].end, settings_, farthest_, sums).run();
+    Step(*jobs[j].brick, round, jobs[j].begin, jobs[j].end, settings_, farthest_, way, sums).run();
   });
 }
 
