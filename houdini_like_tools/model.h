@@ -38,8 +38,8 @@ struct ModelOptions {
 };
 
 /// Points are streamed from the file for every frame; meshes, level sets, fogs and points grids are held. A
-/// level set that is painted, or has to have triangles, becomes a mesh. Throws what the readers throw, and Error: usage (something to
-/// paint that is not there), empty (nothing to draw).
+/// level set that is painted, or has to have triangles, becomes a mesh. Throws what the readers throw, and Error: usage
+/// (something to paint that is not there), empty (nothing to draw).
 std::unique_ptr<Model> open_model(const std::string& path, const ModelOptions& options, const RunContext& context);
 
 /// A mesh file too large to be held: its vertices, streamed as points.
