@@ -73,6 +73,36 @@ class Walker {
   std::uint64_t left_ = 0, size_ = 0;
 };
 
+/// A compressed piece of so many bytes; returns the size of what is in it.
+std::uint64_t check_blosc(Walker& w, std::uint64_t bytes) {
+  if (bytes > w.left()) throw std::ios::failure("the end");
+  if (bytes < BLOSC_MIN_HEADER_LENGTH) wrong("a compressed piece is too short");
+  std::vector<char> chunk(bytes);
+  w.read(chunk.data(), bytes);
+  std::size_t unpacked = 0;
+  if (blosc_cbuffer_validate(chunk.data(), bytes, &unpacked) != 0) wrong("a compressed piece is damaged");
+  return unpacked;
+}
+
+/// Where a grid's leaves lie, for readers that load them later: two arrays, a byte and eight for each leaf.
+void check_leaf_table(Walker& w, std::uint64_t bytes) {
+  constexpr std::uint32_t kNone = 0xFFFFFFFF;
+  constexpr std::uint64_t kPadding = 256;
+  const std::uint64_t before = w.left();
+  const std::uint64_t leaves = w.number<std::uint32_t>();
+  for (const std::uint64_t width : {1, 8}) {
+    const auto packed = w.number<std::uint32_t>();
+    if (packed == kNone && width > 1) continue;
+    if (packed == 0) {
+      w.skip(width * leaves);
+      continue;
+    }
+    const std::uint64_t unpacked = check_blosc(w, packed);
+    if (unpacked < width * leaves || unpacked > width * (leaves + kPadding)) wrong("a table of leaves is damaged");
+  }
+  if (before - w.left() != bytes) wrong("a table of leaves has a wrong length");
+}
+
 /// OpenVDB reads metadata by its type, whatever length stands before it. Returns whether it says that values are saved
 /// with 16 bits.
 bool check_metadata(Walker& w) {
@@ -91,6 +121,8 @@ bool check_metadata(Walker& w) {
     if (bytes > w.left()) wrong(fmt::format("metadata {} of {} bytes does not fit into it", name, bytes));
     if (name == "is_saved_as_half_float" && type == "bool")
       half = w.number<std::uint8_t>() != 0;
+    else if (type == "__delayedload")
+      check_leaf_table(w, bytes);
     else
       w.skip(bytes);
   }
@@ -231,12 +263,8 @@ class TreeWalk {
       w_.skip(bytes);
       return;
     }
-    if (bytes > expected + kBloscExtra || bytes < BLOSC_MIN_HEADER_LENGTH) wrong("a compressed piece has a wrong size");
-    chunk_.resize(bytes);
-    w_.read(chunk_.data(), bytes);
-    std::size_t unpacked = 0;
-    if (blosc_cbuffer_validate(chunk_.data(), bytes, &unpacked) != 0 || unpacked != expected)
-      wrong("a compressed piece is damaged");
+    if (bytes > expected + kBloscExtra) wrong("a compressed piece has a wrong size");
+    if (check_blosc(w_, bytes) != expected) wrong("a compressed piece is damaged");
   }
 
   static constexpr std::uint64_t kBloscExtra = 4096;
@@ -244,7 +272,6 @@ class TreeWalk {
   ValueKind kind_;
   std::uint32_t compression_, stored_;
   bool half_ = false;
-  std::vector<char> chunk_;
 };
 
 }  // namespace

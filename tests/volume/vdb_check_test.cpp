@@ -58,7 +58,7 @@ TEST(VdbCheck, TakesEveryKindOfGrid) {
 
 TEST(VdbCheck, SeesWhereAFileEndsTooEarly) {
   const std::string bytes = every_kind(true);
-  for (std::size_t size = 0; size < bytes.size(); size += 97)
+  for (std::size_t size = 0; size < bytes.size(); size += 389)
     EXPECT_THROW(check(bytes.substr(0, size)), std::exception) << size;
   EXPECT_THROW(check(bytes.substr(0, bytes.size() - 1)), std::ios::failure);
 }
@@ -85,14 +85,14 @@ TEST_F(DamagedVdb, IsReadOrRefusedWithOneLine) {
   EXPECT_EQ(read(whole), "");
   std::mt19937 random(7);
   int refused = 0;
-  for (int i = 0; i < 150; ++i) {
+  for (int i = 0; i < 100; ++i) {
     std::string bytes = whole;
     for (int k = 0; k < 1 + i % 3; ++k) bytes[random() % bytes.size()] ^= static_cast<char>(1 << random() % 8);
     const std::string what = read(bytes);
     EXPECT_EQ(what.find('\n'), std::string::npos);
     refused += what.empty() ? 0 : 1;
   }
-  EXPECT_GT(refused, 30);
+  EXPECT_GT(refused, 20);
 }
 
 TEST_F(DamagedVdb, IsNotBelievedAboutItsLengths) {
