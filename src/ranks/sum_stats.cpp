@@ -36,6 +36,7 @@ void sum_stats(Ranks& ranks, SurfaceStats& stats) {
   std::vector<std::uint64_t*> counts{&undersampled,
                                      &cpu,
                                      &stats.corners,
+                                     &stats.corner_sums,
                                      &stats.corners_seen,
                                      &stats.corners_good,
                                      &stats.corners_torn,
