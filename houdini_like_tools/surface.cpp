@@ -83,7 +83,8 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
   }
   add_cleaning(j, s, settings);
   j["replaced_attribute_values"] = s.replaced_attributes;
-  j["corners"] = {{"projected", s.corners}, {"seen", s.corners_seen}, {"trusted", s.corners_good}, {"sums", s.corner_sums}};
+  j["corners"] = {
+      {"projected", s.corners}, {"seen", s.corners_seen}, {"trusted", s.corners_good}, {"sums", s.corner_sums}};
   j["contradicting_normals"] = {
       {"corners", s.corners_torn}, {"worst_slab", s.torn_slab}, {"worst_share", s.torn_share}};
   j["isosurface"] = {{"vertices", s.isovertices},

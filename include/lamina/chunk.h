@@ -48,10 +48,10 @@ struct MergedParts {
 bool is_part(const std::string& path);
 
 /// Joins all the parts (`paths`) of one reconstruction, given in any order, to the mesh `output` ("-": standard
-/// output), and closes its holes. Memory does not grow with the mesh, but with the rims of a part. `tmp_dir` is for what goes to standard output; empty: the system's.
-/// Throws Error(unreadable) naming the part that is missing, there twice, truncated, damaged, of another run or of a
-/// version this program does not know; Error(empty) when no part has surface; Error(budget) when the mesh has more than
-/// 2^32 - 1 vertices or cannot be written.
+/// output), and closes its holes. Memory does not grow with the mesh, but with the rims of a part. `tmp_dir` is for
+/// what goes to standard output; empty: the system's. Throws Error(unreadable) naming the part that is missing, there
+/// twice, truncated, damaged, of another run or of a version this program does not know; Error(empty) when no part has
+/// surface; Error(budget) when the mesh has more than 2^32 - 1 vertices or cannot be written.
 MergedParts merge_parts(const std::vector<std::string>& paths, const std::string& output, const RunContext& run);
 
 struct Checkpoint {

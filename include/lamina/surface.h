@@ -54,14 +54,14 @@ struct SurfaceSettings {
   double boundary = 0;  ///< isovertices whose corners' projections lie farther than this from the average of
                         ///< their samples (in R) are rejected; 0: no limit
   ClusterMode cluster = ClusterMode::preserving;
-  double chord = 0.17;                ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
-  bool vertex_levels = false;         ///< give vertices an attribute `level`: of the octree, 0 the finest
+  double chord = 0.17;         ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
+  bool vertex_levels = false;  ///< give vertices an attribute `level`: of the octree, 0 the finest
   /// Give vertices an attribute `curvature`: mean curvature of the fitted sphere, 1 / input unit, positive where the
   /// surface is convex seen from outside.
   bool vertex_curvature = false;
   /// Boundary loops shorter than this, in local influence radii R, are closed where the surface around them tells how
-  /// it goes on; 0: none, and none with ClusterMode::free. R is taken from the octree's cells, which follow it by powers
-  /// of two.
+  /// it goes on; 0: none, and none with ClusterMode::free. R is taken from the octree's cells, which follow it by
+  /// powers of two.
   double close_holes = 8;
   std::uint64_t prune_triangles = 0;  ///< connected parts of the mesh with fewer triangles are left out
   Length prune_size;     ///< parts whose box has a shorter diagonal, too; `r`, `R`: of the median sample; 0: none

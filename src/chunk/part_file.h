@@ -42,8 +42,9 @@ using PartTriangle = std::array<std::int32_t, 3>;
 /// Writes slab after slab; keeps a megabyte. The file appears with commit().
 ///
 /// Layout, little-endian: 16 bytes that name the format and its version; blocks of a slab's vertices (records of the
-/// final PLY), triangles (PartTriangle) or rims (rim_bytes.h, records of a byte), each as kind and count (8 bytes both),
-/// records, and their CRC-32; at the end the PartInfo as JSON, its length, its CRC-32, and 8 bytes that say that the file is complete.
+/// final PLY), triangles (PartTriangle) or rims (rim_bytes.h, records of a byte), each as kind and count (8 bytes
+/// both), records, and their CRC-32; at the end the PartInfo as JSON, its length, its CRC-32, and 8 bytes that say that
+/// the file is complete.
 class PartWriter {
  public:
   /// Throws as OutputFile.

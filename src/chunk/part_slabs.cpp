@@ -34,8 +34,7 @@ void make_relative(const std::vector<std::array<std::uint32_t, 3>>& triangles, s
   }
 }
 
-PartSlabs::PartSlabs(std::vector<Part> parts, int count, std::uint64_t job, double close_holes,
-                     MeshSinkSettings layout)
+PartSlabs::PartSlabs(std::vector<Part> parts, int count, std::uint64_t job, double close_holes, MeshSinkSettings layout)
     : parts_(std::move(parts)), count_(count), job_(job), close_holes_(close_holes), layout_(std::move(layout)) {}
 
 void PartSlabs::open() {

@@ -42,9 +42,9 @@ class PartSlabs : public SlabSink {
   std::size_t at_ = 0;  ///< part that the next slab may belong to
   std::optional<PartWriter> writer_;
   PartInfo info_;
-  SlabMark previous_;           ///< the slab written last
-  VertexBatch below_;           ///< its vertices
-  holes::RimFinder finder_;     ///< of the part
+  SlabMark previous_;        ///< the slab written last
+  VertexBatch below_;        ///< its vertices
+  holes::RimFinder finder_;  ///< of the part
   holes::RimPiece piece_;
   std::uint64_t numbered_ = 0;  ///< vertices so far, as the clusterer counts
   std::uint64_t first_ = 0;     ///< number of the part's first vertex

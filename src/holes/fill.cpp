@@ -21,6 +21,10 @@ constexpr double kCone = 0.26;
 constexpr double kOffSphere = 0.4;
 /// Facets fold by less than 100 degrees (one less the cosine), with each other and with those around.
 constexpr double kMostFold = 1.17;
+/// Rims no longer than this (R), hardly wider than one sample acts, need no sphere: ends of thin things. Facets there
+/// fold by less than 140 degrees, which still tells a gap from the outer rim of a flake.
+constexpr double kSmall = 5;
+constexpr double kMostSmallFold = 1.77;
 /// Rims so near to a filling (R) take its place.
 constexpr double kOccupied = 0.5;
 
@@ -39,6 +43,14 @@ struct Base {
   [[nodiscard]] Vec3 local(const Vec3& p) const { return axes * (p - middle); }
 };
 
+void stand_across(const Vec3& normal, Base& base) {
+  if (!(normal.norm() > 0)) return;
+  const Vec3 up = normal.normalized();
+  base.axes.row(2) = up;
+  base.axes.row(0) = up.unitOrthogonal();
+  base.axes.row(1) = up.cross(Vec3(base.axes.row(0)));
+}
+
 Base base_of(const Loop& loop) {
   Base base;
   const std::size_t n = loop.vertices.size();
@@ -52,11 +64,20 @@ Base base_of(const Loop& loop) {
     base.radius += static_cast<double>(v.radius) / static_cast<double>(n);
     normal += edges * to_vec(v.normal);
   }
-  if (!(normal.norm() > 0)) return base;
-  const Vec3 up = normal.normalized();
-  base.axes.row(2) = up;
-  base.axes.row(0) = up.unitOrthogonal();
-  base.axes.row(1) = up.cross(Vec3(base.axes.row(0)));
+  stand_across(normal, base);
+  return base;
+}
+
+/// The plane in which the rim encloses most, on the side from which it runs anticlockwise.
+Base widest_base(const Loop& loop) {
+  Base base = base_of(loop);
+  Vec3 area = Vec3::Zero();
+  const std::size_t n = loop.vertices.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    area += (to_vec(loop.vertices[i].position) - base.middle)
+                .cross(to_vec(loop.vertices[(i + 1) % n].position) - base.middle);
+  }
+  stand_across(area, base);
   return base;
 }
 
@@ -151,11 +172,11 @@ std::vector<double> weights_at(const Vec2& at, const std::vector<Vec3>& rim) {
   return weights;
 }
 
-bool folds_too_far(const std::vector<Vec3>& points, const std::vector<Vec3>& facing,
+bool folds_too_far(const std::vector<Vec3>& points, const std::vector<Vec3>& facing, double most,
                    const std::vector<std::array<std::uint32_t, 3>>& triangles) {
-  const auto folded = [](const Vec3& a, const Vec3& b) {
+  const auto folded = [most](const Vec3& a, const Vec3& b) {
     const double length = std::sqrt(a.squaredNorm() * b.squaredNorm());
-    return !(length > 0) || 1 - a.dot(b) / length > kMostFold;
+    return !(length > 0) || 1 - a.dot(b) / length > most;
   };
   const auto n = static_cast<std::uint32_t>(facing.size());
   for (const auto& t : triangles) {
@@ -194,7 +215,8 @@ bool place_inner(const Loop& loop, const Base& base, const Sphere& sphere, const
         {static_cast<float>(normal.x()), static_cast<float>(normal.y()), static_cast<float>(normal.z())});
     for (std::size_t a = 0; a < attributes; ++a) {
       double value = 0;
-      for (std::size_t i = 0; i < n; ++i) value += weights[i] * static_cast<double>(loop.attributes[i * attributes + a]);
+      for (std::size_t i = 0; i < n; ++i)
+        value += weights[i] * static_cast<double>(loop.attributes[i * attributes + a]);
       out.attributes.push_back(static_cast<float>(value));
     }
   }
@@ -204,6 +226,69 @@ bool place_inner(const Loop& loop, const Base& base, const Sphere& sphere, const
 Filling refused(Verdict verdict) {
   Filling filling;
   filling.verdict = verdict;
+  return filling;
+}
+
+/// The loop as its base sees it.
+struct Rim {
+  Rim(const Loop& loop, const Base& base) : taken(loop.taken.begin(), loop.taken.end()) {
+    for (std::size_t i = 0; i < loop.vertices.size(); ++i) {
+      points.push_back(base.local(to_vec(loop.vertices[i].position)));
+      normals.push_back(base.axes * to_vec(loop.vertices[i].normal));
+      facing.push_back(base.axes * to_vec(loop.facing[i]));
+    }
+  }
+  [[nodiscard]] bool allows(std::uint32_t i, std::uint32_t j) const {
+    return j >= points.size() || !taken.contains({i, j});
+  }
+  std::vector<Vec3> points, normals, facing;
+  std::set<std::array<std::uint32_t, 2>> taken;
+};
+
+/// Where one surface goes on all around.
+Filling fill_smooth(const Loop& loop) {
+  const Base base = base_of(loop);
+  const Rim rim(loop, base);
+  const std::size_t n = rim.points.size();
+  if (signed_area(rim.points) <= 0) return refused(Verdict::outer_rim);
+  const Sphere sphere(rim.points, rim.normals);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (rim.normals[i].z() < kCone || std::abs(sphere.distance(rim.points[i])) > kOffSphere * base.radius ||
+        sphere.gradient(rim.points[i]).z() <= 0)
+      return refused(Verdict::bent);
+  }
+  if (!is_simple(rim.points)) return refused(Verdict::bent);
+  const auto allowed = [&](std::uint32_t i, std::uint32_t j) { return rim.allows(i, j); };
+  auto triangles = triangulate_polygon(rim.points, rim.facing, allowed);
+  if (!triangles) return refused(Verdict::bent);
+  Filling filling;
+  filling.triangles = std::move(*triangles);
+  std::vector<Vec2> plane;
+  std::vector<double> scale;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec3& p = rim.points[i];
+    plane.push_back(p.head<2>());
+    scale.push_back(0.5 * ((p - rim.points[(i + 1) % n]).norm() + (p - rim.points[(i + n - 1) % n]).norm()));
+  }
+  refine_triangles(plane, scale, filling.triangles, allowed);
+  std::vector<Vec3> points = rim.points;
+  if (!place_inner(loop, base, sphere, rim.points, plane, points, filling) ||
+      folds_too_far(points, rim.facing, kMostFold, filling.triangles))
+    return refused(Verdict::bent);
+  filling.verdict = Verdict::filled;
+  return filling;
+}
+
+/// A gap so small that its triangles hardly matter.
+Filling fill_small(const Loop& loop) {
+  const Rim rim(loop, widest_base(loop));
+  if (!is_simple(rim.points)) return refused(Verdict::bent);
+  auto triangles =
+      triangulate_polygon(rim.points, rim.facing, [&](std::uint32_t i, std::uint32_t j) { return rim.allows(i, j); });
+  if (!triangles || folds_too_far(rim.points, rim.facing, kMostSmallFold, *triangles)) return refused(Verdict::bent);
+  Filling filling;
+  filling.triangles = std::move(*triangles);
+  filling.verdict = Verdict::filled;
   return filling;
 }
 
@@ -226,48 +311,18 @@ const char* describe(Verdict verdict) {
 }
 
 Filling fill_loop(const Loop& loop, double longest) {
-  const auto n = static_cast<std::uint32_t>(loop.vertices.size());
-  if (n < 3) return refused(Verdict::bent);
-  const Base base = base_of(loop);
-  std::vector<Vec3> rim, normals, facing;
-  for (std::uint32_t i = 0; i < n; ++i) {
-    rim.push_back(base.local(to_vec(loop.vertices[i].position)));
-    normals.push_back(base.axes * to_vec(loop.vertices[i].normal));
-    facing.push_back(base.axes * to_vec(loop.facing[i]));
-  }
-  const double area = signed_area(rim);
-  if (area <= 0) return refused(Verdict::outer_rim);
-  if (!(length_in_radii(loop) <= longest)) return refused(Verdict::too_long);
-  const Sphere sphere(rim, normals);
-  for (std::uint32_t i = 0; i < n; ++i) {
-    if (normals[i].z() < kCone || std::abs(sphere.distance(rim[i])) > kOffSphere * base.radius ||
-        sphere.gradient(rim[i]).z() <= 0)
-      return refused(Verdict::bent);
-  }
-  if (!is_simple(rim)) return refused(Verdict::bent);
-
-  const std::set<std::array<std::uint32_t, 2>> taken(loop.taken.begin(), loop.taken.end());
-  const auto allowed = [&](std::uint32_t i, std::uint32_t j) { return j >= n || !taken.contains({i, j}); };
-  auto triangles = triangulate_polygon(rim, facing, allowed);
-  if (!triangles) return refused(Verdict::bent);
-  Filling filling;
-  filling.triangles = std::move(*triangles);
-  std::vector<Vec2> plane;
-  std::vector<double> scale;
-  for (std::uint32_t i = 0; i < n; ++i) {
-    plane.push_back(rim[i].head<2>());
-    scale.push_back(0.5 * ((rim[i] - rim[(i + 1) % n]).norm() + (rim[i] - rim[(i + n - 1) % n]).norm()));
-  }
-  refine_triangles(plane, scale, filling.triangles, allowed);
-  std::vector<Vec3> points = rim;
-  if (!place_inner(loop, base, sphere, rim, plane, points, filling)) return refused(Verdict::bent);
-  if (folds_too_far(points, facing, filling.triangles)) return refused(Verdict::bent);
-  filling.verdict = Verdict::filled;
-  return filling;
+  if (loop.vertices.size() < 3) return refused(Verdict::bent);
+  const double length = length_in_radii(loop);
+  Filling filling = fill_smooth(loop);
+  // What an outer rim is does not depend on its length.
+  if (filling.verdict != Verdict::outer_rim && !(length <= longest)) return refused(Verdict::too_long);
+  if (filling.verdict == Verdict::filled || length > std::min(longest, kSmall)) return filling;
+  Filling small = fill_small(loop);
+  return small.verdict == Verdict::filled ? small : filling;
 }
 
 bool occupies(const RimVertex& other, const Loop& loop, const Filling& filling) {
-  const Base base = base_of(loop);
+  const Base base = widest_base(loop);
   const Vec3 p = base.local(to_vec(other.position));
   std::vector<Vec3> points;
   for (const RimVertex& v : loop.vertices) points.push_back(base.local(to_vec(v.position)));

@@ -147,8 +147,7 @@ void HoleCloser::append(const Loop& loop, const Filling& filling, std::uint64_t 
     v.nx.push_back(filling.normals[i][0]);
     v.ny.push_back(filling.normals[i][1]);
     v.nz.push_back(filling.normals[i][2]);
-    for (std::size_t a = 0; a < attributes_; ++a)
-      v.attributes[a].push_back(filling.attributes[i * attributes_ + a]);
+    for (std::size_t a = 0; a < attributes_; ++a) v.attributes[a].push_back(filling.attributes[i * attributes_ + a]);
   }
 }
 

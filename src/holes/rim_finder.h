@@ -49,12 +49,12 @@ class RimFinder {
     std::array<std::uint32_t, 3> triangle{};
   };
 
-  std::uint64_t origin_ = 0;        ///< number of the first vertex that is not `below`
-  std::array<Slab, 3> slabs_{};     ///< two before, the one before, the last
-  Triangles before_, last_;         ///< of the one before and of the last
+  std::uint64_t origin_ = 0;          ///< number of the first vertex that is not `below`
+  std::array<Slab, 3> slabs_{};       ///< two before, the one before, the last
+  Triangles before_, last_;           ///< of the one before and of the last
   std::vector<std::uint64_t> turns_;  ///< of the three slabs' vertices
-  std::uint64_t base_ = 0;          ///< vertex of turns_[0]
-  bool part_below_ = false;         ///< the slab before is another part's
+  std::uint64_t base_ = 0;            ///< vertex of turns_[0]
+  bool part_below_ = false;           ///< the slab before is another part's
   std::vector<HalfEdge> found_;
 };
 

@@ -65,7 +65,7 @@ class RimPaths {
   std::function<void(Loop&&, const RimExtent&)> closed_;
   std::function<void(const RimExtent&)> left_;
   std::unordered_map<Number, Node> nodes_;
-  std::unordered_map<Number, Path> by_first_;    ///< open paths by their first vertex
+  std::unordered_map<Number, Path> by_first_;  ///< open paths by their first vertex
   std::unordered_map<Number, Number> last_to_first_;
 };
 

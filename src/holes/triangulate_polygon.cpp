@@ -110,8 +110,7 @@ Edge edge_of(std::uint32_t a, std::uint32_t b) {
 /// d lies in the circle around the anticlockwise triangle abc.
 bool in_circle(const Vec2& a, const Vec2& b, const Vec2& c, const Vec2& d) {
   const Vec2 p = a - d, q = b - d, r = c - d;
-  const double det =
-      p.squaredNorm() * cross(q, r) - q.squaredNorm() * cross(p, r) + r.squaredNorm() * cross(p, q);
+  const double det = p.squaredNorm() * cross(q, r) - q.squaredNorm() * cross(p, r) + r.squaredNorm() * cross(p, q);
   const double size = p.squaredNorm() + q.squaredNorm() + r.squaredNorm();
   return det > 1e-9 * size * size;
 }

@@ -49,8 +49,8 @@ class MeshOutput {
   /// last attribute, else 0. `radius_per_cell`: the influence radius (input units) that goes with a cell of one step.
   /// `curvature`: vertices have it as the last attribute.
   /// The sink is the caller's; nobody else may write to it.
-  MeshOutput(const ClusterSettings& settings, float chord, double finest, double radius_per_cell,
-             bool curvature, const Frame& frame, SlabSink& sink);
+  MeshOutput(const ClusterSettings& settings, float chord, double finest, double radius_per_cell, bool curvature,
+             const Frame& frame, SlabSink& sink);
   /// Drops what is not written yet.
   ~MeshOutput();
   MeshOutput(const MeshOutput&) = delete;

@@ -62,7 +62,8 @@ Edges ends(const std::vector<RimEdge>& edges, Number first = 0) {
 RC_GTEST_PROP(RimFinder, FindsWhatTheWholeMeshShows, ()) {
   std::mt19937 random(*rc::gen::arbitrary<std::uint32_t>());
   const auto rows = *rc::gen::inRange<std::uint32_t>(1, 8);
-  const Rows sheet = ragged_sheet(random, rows, *rc::gen::inRange<std::uint32_t>(2, 9), *rc::gen::element(0.0, 0.1, 0.6));
+  const Rows sheet =
+      ragged_sheet(random, rows, *rc::gen::inRange<std::uint32_t>(2, 9), *rc::gen::element(0.0, 0.1, 0.6));
   RimFinder finder;
   RimPiece piece;
   for (std::size_t r = 0; r < rows; ++r) finder.add(sheet.vertices[r], sheet.triangles[r], piece);

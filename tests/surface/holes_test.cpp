@@ -90,7 +90,9 @@ TEST(Holes, OfTwoNearSheetsAreNotJoined) {
   EXPECT_EQ(closed.facts.euler, (std::vector<long>{1, 1}));
   EXPECT_TRUE(closed.facts.is_manifold());
   for (const Point3& p : closed.mesh.positions) {
-    if (std::hypot(p[0], p[1]) < 0.5) EXPECT_NEAR(std::abs(p[2]), apart / 2, 0.1 * r);
+    if (std::hypot(p[0], p[1]) < 0.5) {
+      EXPECT_NEAR(std::abs(p[2]), apart / 2, 0.1 * r);
+    }
   }
 }
 
