@@ -1,25 +1,23 @@
-
-
 #include "chunk/new_folder.h"
 #include "lamina/chunk.h"
 #include "surface/kept_input.h"
 
 namespace lamina {
 
-SurfaceStats write_store(const SurfaceSettings& given, const std::string& store, const RunContext& run) {
-  SurfaceSettings settings = given;
-  settings.dry_run = true;  // nothing but the store is written
-  settings.output.clear();
-  check_settings(settings);
-  settings.dry_run = false;
+SurfaceStats write_store(const SurfaceSettings& settings, const std::string& store, const RunContext& run) {
+  SurfaceSettings own = settings;
+  own.dry_run = true;  // nothing but the store is written
+  own.output.clear();
+  check_settings(own);
+  own.dry_run = false;
   SurfaceStats stats;
   Stopwatch watch;
   const Stopwatch::Moment began = Stopwatch::now();
   NewFolder folder(store);
   run_in_arena(run, [&] {
-    const SweepInput input = read_surface_input(settings, folder.path(), /*keep=*/true, run, watch, stats);
-    plan_surface(settings, input, run, watch, Stopwatch::now().wall - began.wall, stats);
-    watch.time("store", [&] { save_input(input, settings, folder.path()); });
+    const SweepInput input = read_surface_input(own, folder.path(), /*keep=*/true, run, watch, stats);
+    plan_surface(own, input, run, watch, Stopwatch::now().wall - began.wall, stats);
+    watch.time("store", [&] { save_input(input, own, folder.path()); });
   });
   folder.publish();
   finish_stats(watch, began, stats);

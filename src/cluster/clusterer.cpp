@@ -47,6 +47,8 @@ void Clusterer::Impl::decide(std::int64_t slab) {
 
 void Clusterer::Impl::advance(std::shared_ptr<const IsoSlab> iso) {
   const std::int64_t slab = iso->slab;
+  // Five records are read: the one before them gives the new one its storage.
+  if (slab - 5 >= first) std::swap(window.at(slab), window.at(slab - 5));
   cluster::lay_out(window.at(slab), std::move(iso));
   if (slab - 1 < first) return;
   cluster::tally(window, slab - 1, settings.mode);

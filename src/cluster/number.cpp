@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "cluster/chunks.h"
+#include "ground/resize_anew.h"
 
 namespace lamina::cluster {
 namespace {
@@ -12,8 +13,10 @@ constexpr std::size_t kLeastTriangles = 1 << 15;
 /// Writes vertices and counts their global numbers up.
 class Numberer {
  public:
-  /// `room`: at most so many vertices come.
-  Numberer(std::uint64_t next, std::size_t room, FinalSlab& out) : next_(next), out_(out) { out.vertices.resize(room); }
+  /// `room`: add() is called at most so many times.
+  Numberer(std::uint64_t next, std::size_t room, FinalSlab& out) : next_(next), out_(out) {
+    resize_anew(out.vertices, room);
+  }
 
   /// The number `vertex` gets if it counts.
   std::uint32_t add(const FinalVertex& vertex, bool counts = true) {
@@ -21,6 +24,11 @@ class Numberer {
     const auto number = static_cast<std::uint32_t>(next_ + size_);
     size_ += counts ? 1 : 0;
     return number;
+  }
+  /// Of vertices nobody counted before; not before the last add().
+  std::uint32_t append(const FinalVertex& vertex) {
+    if (size_ == out_.vertices.size()) out_.vertices.resize(size_ + size_ / 8 + 256);
+    return add(vertex);
   }
   /// Returns the next free number.
   std::uint64_t close() {
@@ -115,7 +123,7 @@ void number_isovertices(Window& window, std::int64_t slab, Numberer& numberer, C
       vertex.corner = iso.low;
       vertex.other = iso.high;
       vertex.t = iso.t;
-      note.number = numberer.add(vertex);
+      note.number = numberer.append(vertex);
       ++counts.kept_isovertices;
     } else if (!note.crossing()) {
       note.number = collapsed_number(here, corner, note.piece);
@@ -181,7 +189,7 @@ void number(Window& window, std::int64_t slab, std::uint64_t& next_number, Final
   out.triangles.clear();
   std::size_t pieces = 0;
   for (const HardCluster& hard : here.hard) pieces += hard.pieces.size();
-  Numberer numberer(next_number, here.corners.size() + here.vertices.size() + pieces + 1, out);
+  Numberer numberer(next_number, here.corners.size() + pieces + 1, out);
   number_corners(here, numberer, counts);
   number_isovertices(window, slab, numberer, counts);
   next_number = numberer.close();

@@ -1,6 +1,7 @@
 #include "cluster/tally.h"
 
 #include "cluster/chunks.h"
+#include "ground/resize_anew.h"
 
 namespace lamina::cluster {
 namespace {
@@ -206,11 +207,11 @@ void lay_out(SlabRecord& record, std::shared_ptr<const IsoSlab> iso) {
   record.border.clear();
   record.hard.clear();
   record.hard_triangles.clear();
-  record.corners.resize(corners.size());
+  resize_anew(record.corners, corners.size());
   record.verdicts.assign(corners.size(), Verdict::kept);
   record.vetoes.assign(corners.size(), 0);
   record.seats.assign(corners.size(), kNone);
-  record.vertices.resize(vertices.size());
+  resize_anew(record.vertices, vertices.size());
   for_chunks(corners.size(), chunk_count(corners.size(), kLeastTriangles),
              [&](std::size_t, std::size_t begin, std::size_t end) {
                for (std::size_t c = begin; c < end; ++c) {

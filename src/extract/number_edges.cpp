@@ -6,6 +6,7 @@
 
 #include "extract/crossing.h"
 #include "extract/extract.h"
+#include "ground/resize_anew.h"
 #include "project/corner_value.h"
 
 namespace lamina {
@@ -43,10 +44,10 @@ void assign_numbers(const Window& window, const std::vector<TileView>& views, Is
       corners += static_cast<std::uint32_t>(std::popcount(leaf.surface.words[z]));
     }
   }
-  out.vertices.resize(vertices);
-  out.corners.resize(corners);
+  resize_anew(out.vertices, vertices);
+  resize_anew(out.corners, corners);
   out.corner_attributes.resize(static_cast<std::size_t>(window.attributes()));
-  for (std::vector<float>& a : out.corner_attributes) a.resize(corners);
+  for (std::vector<float>& a : out.corner_attributes) resize_anew(a, corners);
 }
 
 /// Beyond a rim, and around things thinner than a cell, neighbours' planes lead far away from all samples: the

@@ -6,6 +6,7 @@
 #include "extract/cell_emitter.h"
 #include "extract/extract.h"
 #include "extract/tile_view.h"
+#include "ground/resize_anew.h"
 
 namespace lamina {
 namespace {
@@ -261,7 +262,7 @@ void join(const std::vector<TriangleRun>& runs, IsoSlab& out, ExtractCounts& cou
     counts.general_cells += runs[i].counts.general_cells;
     counts.rejected_loops += runs[i].counts.rejected_loops;
   }
-  out.triangles.resize(first.back());
+  resize_anew(out.triangles, first.back());
   tbb::parallel_for(std::size_t{0}, runs.size(), [&](std::size_t i) {
     const auto begin = out.triangles.begin() + static_cast<std::ptrdiff_t>(first[i]);
     const auto end = std::copy(runs[i].triangles.begin(), runs[i].triangles.end(), begin);

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ground/resize_anew.h"
+
 namespace lamina {
 namespace {
 
@@ -161,9 +163,9 @@ void SampleFeed::learn(std::vector<float> radii, const OnReady& on_ready) {
 void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
   const Known& known = known_.at(bucket);
   const std::size_t n = out.samples.size();
-  out.support.resize(n);
-  out.weight.resize(n);
-  out.level.resize(n);
+  resize_anew(out.support, n);
+  resize_anew(out.weight, n);
+  resize_anew(out.level, n);
   out.max_support = known.max_support;
   const auto finest = static_cast<float>(lattice_.cell);
   const double ratio = settings_.cell_ratio * (settings_.cell_follows_support ? settings_.blend : 1.0F);

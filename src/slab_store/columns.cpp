@@ -9,6 +9,7 @@
 #include <limits>
 #include <type_traits>
 
+#include "ground/resize_anew.h"
 #include "lamina/error.h"
 
 namespace lamina {
@@ -107,8 +108,8 @@ void SampleColumns::resize(LocalSamples& samples, std::size_t n) const {
   if (!has_radius_) samples.radius.clear();
   if (!has_quality_) samples.quality.clear();
   samples.attributes.resize(size() - first_attribute_);
-  for (const auto position : kPositions) (samples.*position).resize(n);
-  for (std::size_t c = 3; c < size(); ++c) floats(samples, c).resize(n);
+  for (const auto position : kPositions) resize_anew(samples.*position, n);
+  for (std::size_t c = 3; c < size(); ++c) resize_anew(floats(samples, c), n);
 }
 
 void SampleColumns::scatter(const LocalSamples& samples, const PackedNormals& normals, std::size_t column,

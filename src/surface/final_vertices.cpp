@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ground/resize_anew.h"
+
 namespace lamina {
 namespace {
 
@@ -34,10 +36,10 @@ void place_vertices(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* n
                     VertexBatch& out) {
   const std::size_t n = slab.vertices.size();
   const std::size_t attributes = here.corner_attributes.size();
-  for (auto* v : {&out.x, &out.y, &out.z}) v->resize(n);
-  for (auto* v : {&out.nx, &out.ny, &out.nz}) v->resize(n);
+  for (auto* v : {&out.x, &out.y, &out.z}) resize_anew(*v, n);
+  for (auto* v : {&out.nx, &out.ny, &out.nz}) resize_anew(*v, n);
   out.attributes.resize(attributes);
-  for (auto& a : out.attributes) a.resize(n);
+  for (auto& a : out.attributes) resize_anew(a, n);
   const auto look_up = [&](SlabIndex i) {
     const IsoSlab& s = i.next() ? *next : here;
     return Corner{&s.corners[i.index()], &s.corner_attributes, i.index()};
