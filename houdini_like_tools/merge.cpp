@@ -75,6 +75,7 @@ void merge_chunks(const MergeOptions& o, const RunContext& context) {
   const MergedParts merged = merge_parts(o.inputs, o.output, context);
   context.info(fmt::format("{} vertices, {} triangles of {} parts", count_text(merged.vertices),
                            count_text(merged.triangles), merged.parts));
+  context.info(describe(merged.holes));
 }
 
 void run_merge(const MergeOptions& o) {

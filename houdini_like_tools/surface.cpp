@@ -16,6 +16,7 @@
 #include "model.h"
 #include "normal_options.h"
 #include "result_file.h"
+#include "surface_holes.h"
 #include "surface_parts.h"
 #include "surface_ranks.h"
 #include "text.h"
@@ -81,7 +82,8 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
   }
   add_cleaning(j, s, settings);
   j["replaced_attribute_values"] = s.replaced_attributes;
-  j["corners"] = {{"projected", s.corners}, {"seen", s.corners_seen}, {"trusted", s.corners_good}};
+  j["corners"] = {
+      {"projected", s.corners}, {"seen", s.corners_seen}, {"trusted", s.corners_good}, {"sums", s.corner_sums}};
   j["contradicting_normals"] = {
       {"corners", s.corners_torn}, {"worst_slab", s.torn_slab}, {"worst_share", s.torn_share}};
   j["isosurface"] = {{"vertices", s.isovertices},
@@ -102,6 +104,7 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
                    {"patches", s.clusters.patches},
                    {"kept_isovertices", s.clusters.kept_isovertices},
                    {"hard", s.clusters.hard}};
+  j["holes"] = holes_json(s.holes);
   return j;
 }
 
@@ -164,6 +167,7 @@ void run_surface(const SurfaceOptions& o) {
                              stats.vertices, stats.triangles, stats.wall,
                              static_cast<double>(stats.samples_read) / stats.cpu * 1e-6,
                              static_cast<double>(stats.peak_memory) * 1e-6));
+    if (!parts.chunk) context.info(describe(stats.holes));
     const VolumeExportStats& v = stats.volume;
     if (v.files.size() == 1) context.info(fmt::format("{}: {}", v.files[0], bytes_text(v.bytes)));
     if (v.files.size() > 1)
@@ -174,6 +178,7 @@ void run_surface(const SurfaceOptions& o) {
   if (!stats_file) return;
   nlohmann::ordered_json json = to_json(stats, settings);
   if (parts.chunk) {
+    json.erase("holes");  // are known to the merge
     json["chunk"] = {{"number", o.parts.chunk.number},
                      {"count", o.parts.chunk.count},
                      {"first_slab", parts.chunk->first_slab},
@@ -267,7 +272,14 @@ void add_surface(CLI::App& app) {
   tool->add_option("--blend", s.blend, "H: the influence radius R is H times a sample's radius r")
       ->capture_default_str()
       ->group(fit);
-  tool->add_option("--steps", s.steps, "N: projection steps")->capture_default_str()->group(fit);
+  tool->add_option("--steps", s.steps, "N: projection steps; auto: as many as each corner needs")
+      ->transform(CLI::Transformer(std::map<std::string, std::string>{{"auto", "0"}}))
+      ->option_text("N|auto [1]")
+      ->group(fit);
+  tool->add_option("--step-tolerance", s.step_tolerance,
+                   "with --steps auto: a corner is done when a step moves it no more than so many radii r")
+      ->capture_default_str()
+      ->group(fit);
   tool->add_option("--fit", s.fit, "surface fitted to the samples around a corner")
       ->transform(words<FitMode>({{"plane", FitMode::plane}, {"sphere", FitMode::sphere}}))
       ->option_text("plane|sphere [sphere]")
@@ -299,6 +311,11 @@ void add_surface(CLI::App& app) {
                  "give vertices their octree level, 0 the finest, as property level; 'lamina render --paint level'")
       ->group(mesh);
 
+  tool->add_flag("--curvature", s.vertex_curvature,
+                 "give vertices the mean curvature, 1 / length, as property curvature; convex is positive")
+      ->group(mesh);
+
+  add_hole_options(*tool, s, mesh);
   tool->add_option("--prune", s.prune_triangles, "leave out connected parts of fewer triangles")
       ->type_name("N")
       ->capture_default_str()

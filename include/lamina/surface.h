@@ -9,6 +9,7 @@
 #include "lamina/bad_samples.h"
 #include "lamina/clean.h"
 #include "lamina/cluster.h"
+#include "lamina/holes.h"
 #include "lamina/length.h"
 #include "lamina/normals.h"
 #include "lamina/run.h"
@@ -43,7 +44,8 @@ struct SurfaceSettings {
   CleanSettings clean;            ///< what is left out before radii are estimated
   Length max_radius;              ///< samples with a larger radius are discarded as undersampled; 0: none
   double blend = 1.2;             ///< H > 0: R = H r (paper, section 3.2)
-  int steps = 1;                  ///< N in 1..16: projection steps
+  int steps = 1;                  ///< N in 1..16: projection steps; 0: as many as each corner needs, at most 16
+  double step_tolerance = 0.01;   ///< with 0 steps: a corner is done when a step moves it no more than so many r
   FitMode fit = FitMode::sphere;
   bool diffuse = false;  ///< project cell centres, then corners by their cells (paper, section 3.3)
   Length cell{0.9,
@@ -52,8 +54,15 @@ struct SurfaceSettings {
   double boundary = 0;  ///< isovertices whose corners' projections lie farther than this from the average of
                         ///< their samples (in R) are rejected; 0: no limit
   ClusterMode cluster = ClusterMode::preserving;
-  double chord = 0.17;                ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
-  bool vertex_levels = false;         ///< give vertices an attribute `level`: of the octree, 0 the finest
+  double chord = 0.17;         ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
+  bool vertex_levels = false;  ///< give vertices an attribute `level`: of the octree, 0 the finest
+  /// Give vertices an attribute `curvature`: mean curvature of the fitted sphere, 1 / input unit, positive where the
+  /// surface is convex seen from outside.
+  bool vertex_curvature = false;
+  /// Boundary loops shorter than this, in local influence radii R, are closed where the surface around them tells how
+  /// it goes on; 0: none, and none with ClusterMode::free. R is taken from the octree's cells, which follow it by
+  /// powers of two.
+  double close_holes = 8;
   std::uint64_t prune_triangles = 0;  ///< connected parts of the mesh with fewer triangles are left out
   Length prune_size;     ///< parts whose box has a shorter diagonal, too; `r`, `R`: of the median sample; 0: none
   bool local = false;    ///< write coordinates less a shift (SurfaceStats::shift), which floats then hold
@@ -105,6 +114,7 @@ struct SurfaceStats {
   std::uint64_t replaced_attributes = 0;  ///< attribute values that were NaN or out of range
   std::uint64_t vertices = 0, triangles = 0;
   std::uint64_t corners = 0, corners_seen = 0, corners_good = 0;
+  std::uint64_t corner_sums = 0;  ///< how often samples were summed up at a corner: once for each of its steps
   /// Corners whose samples' normals contradict each other; the slab (counted from the first) with the largest share of
   /// them among the corners with samples, and that share.
   std::uint64_t corners_torn = 0;
@@ -113,6 +123,7 @@ struct SurfaceStats {
   std::uint64_t isovertices = 0, isotriangles = 0, rejected_loops = 0, general_cells = 0, crossing_cells = 0;
   std::vector<std::uint64_t> leaf_cells;  ///< by level, finest first
   ClusterCounts clusters;
+  HoleStats holes;
   std::optional<NormalsReport> normals;  ///< where they were found
   VolumeExportStats volume;              ///< where grids were asked for
   std::vector<StageTime> stages;

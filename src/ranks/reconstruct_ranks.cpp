@@ -16,6 +16,7 @@
 #include "ranks/read_together.h"
 #include "ranks/sum_stats.h"
 #include "ranks/write_together.h"
+#include "surface/closing_slabs.h"
 #include "surface/kept_input.h"
 #include "surface/pipeline.h"
 
@@ -116,8 +117,8 @@ class Job {
     });
     own_.sweeping = Stopwatch::now().wall - before;
     watch_.time("commit", [&] {
-      const Place place =
-          write_together(ranks_, span, *part, settings_.output, settings_.input, resolved.plan.samples, run_);
+      const Place place = write_together(ranks_, span, *part, settings_.output, settings_.input, resolved.plan.samples,
+                                         longest_closed(settings_), stats_.holes, run_);
       stats_.vertices = place.vertices;
       stats_.triangles = place.triangles;
     });
