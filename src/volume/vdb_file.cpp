@@ -20,7 +20,9 @@ namespace lamina::volume {
 namespace {
 
 [[noreturn]] void refuse(const std::string& path, const std::string& what) {
-  throw Error(ExitCode::unreadable, fmt::format("{}: {}", path, what));
+  std::string line = what;  // it may quote the file
+  std::replace_if(line.begin(), line.end(), [](char c) { return c >= 0 && c < ' '; }, '?');
+  throw Error(ExitCode::unreadable, fmt::format("{}: {}", path, line));
 }
 
 /// The file's magic number and what comes behind it: lengths in a file that is none would be taken for real.
