@@ -26,7 +26,7 @@ void run_clean(const CleanOptions& o) {
   require_sane(o.settings);
   if (!o.settings.looks_around() && o.settings.pick.takes_all())
     throw Error(ExitCode::usage, "clean: nothing to do; give --clip, --every, --merge, --outliers or --spacing");
-  const RunContext context = make_context(o.run);
+  const RunContext context = make_context(o.run, o.output);
   const auto source = open_point_input(o.input, o.columns, context);
   if (source->info().geographic && o.settings.looks_around())
     throw Error(ExitCode::unreadable, shown_name(o.input) +

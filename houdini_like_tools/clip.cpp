@@ -60,7 +60,7 @@ void clip_grids(const ClipOptions& o, const RunContext& context) {
 
 void run_clip(const ClipOptions& o) {
   require_sane(o.region);
-  const RunContext context = make_context(o.run);
+  const RunContext context = make_context(o.run, o.output);
   switch (content_of(o.input, o.run.tmp_dir)) {
     case FileContent::points:
       return clip_points(o, context);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 #include <csignal>
+#include <filesystem>
 #include <memory>
 #include <utility>
 
@@ -58,6 +59,16 @@ std::string progress_text(const Progress& p, double fraction, double elapsed) {
   return text;
 }
 
+/// Where a large cloud's temporary files fit as well as the output does; the system's folder for pipes and devices.
+std::string folder_beside(const std::string& output) {
+  std::error_code ignored;
+  const auto kind = std::filesystem::status(output, ignored).type();
+  const bool file = kind == std::filesystem::file_type::regular || kind == std::filesystem::file_type::not_found;
+  if (output.empty() || output == "-" || !file) return {};
+  const std::string parent = std::filesystem::path(output).parent_path().string();
+  return parent.empty() ? "." : parent;
+}
+
 }  // namespace
 
 void add_run_options(CLI::App& app, RunOptions& options) {
@@ -94,6 +105,12 @@ RunContext make_context(const RunOptions& options) {
   context.progress = [console](const Progress& p) { console->progress(p); };
   context.log = [console](LogLevel level, std::string_view text) { console->message(level, text); };
   context.cancel = &cancel_requested();
+  return context;
+}
+
+RunContext make_context(const RunOptions& options, const std::string& output) {
+  RunContext context = make_context(options);
+  if (context.tmp_dir.empty()) context.tmp_dir = folder_beside(output);
   return context;
 }
 

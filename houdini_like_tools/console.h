@@ -28,6 +28,8 @@ void add_run_options(CLI::App& app, RunOptions& options);
 
 /// The context of a run: messages and progress go to standard error, and SIGINT and SIGTERM cancel it.
 RunContext make_context(const RunOptions& options);
+/// The same, with temporary files beside the output unless told otherwise: where that fits, they do.
+RunContext make_context(const RunOptions& options, const std::string& output);
 
 /// Set by SIGINT and SIGTERM after cancel_on_signals(); a second signal ends the program at once.
 const std::atomic<bool>& cancel_requested();

@@ -174,7 +174,7 @@ void convert_volume(const ConvertOptions& o, const RunContext& context) {
 }
 
 void run_convert(const ConvertOptions& o) {
-  const RunContext context = make_context(o.run);
+  const RunContext context = make_context(o.run, o.output);
   switch (content_of(o.input, o.run.tmp_dir)) {
     case FileContent::points:
       return convert_points(o, context);

@@ -1,8 +1,24 @@
 // The program: one sub-command per tool.
+#include <malloc.h>
+
 #include "command_line.h"
 #include "tool.h"
 
+namespace {
+
+/// Large arrays go back to the system when they are freed. By default the C library raises the size from which they do
+/// with the first one freed, and keeps gaps between what lives long: a fifth of the memory at 16 million samples.
+void return_large_arrays() {
+#ifdef __GLIBC__
+  constexpr int kLarge = 128 << 10;
+  mallopt(M_MMAP_THRESHOLD, kLarge);
+#endif
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
+  return_large_arrays();
   using namespace lamina::tools;
   const std::vector<AddTool> tools{
       // One tool a line, in the order of the help.

@@ -75,10 +75,11 @@ void merge_chunks(const MergeOptions& o, const RunContext& context) {
   const MergedParts merged = merge_parts(o.inputs, o.output, context);
   context.info(fmt::format("{} vertices, {} triangles of {} parts", count_text(merged.vertices),
                            count_text(merged.triangles), merged.parts));
+  context.info(describe(merged.holes));
 }
 
 void run_merge(const MergeOptions& o) {
-  const RunContext context = make_context(o.run);
+  const RunContext context = make_context(o.run, o.output);
   if (std::any_of(o.inputs.begin(), o.inputs.end(), is_part)) return merge_chunks(o, context);
   const auto word = [](FileContent content) {
     return content == FileContent::points ? "points" : content == FileContent::mesh ? "a mesh" : "a volume";

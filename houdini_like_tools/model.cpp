@@ -5,62 +5,16 @@
 #include <algorithm>
 #include <utility>
 
-#include "inputs.h"
 #include "lamina/error.h"
 #include "lamina/info.h"
-#include "lamina/points.h"
 #include "lamina/volume_fog.h"
 #include "lamina/volume_info.h"
 #include "lamina/volume_points.h"
+#include "point_models.h"
 #include "text.h"
 
 namespace lamina::tools {
 namespace {
-
-constexpr std::size_t kBatch = std::size_t{1} << 20;  // points held at a time
-
-class StreamedPoints : public Model {
- public:
-  StreamedPoints(const std::string& path, const RunContext& context)
-      : source_(open_point_input(path, {}, context)), context_(context) {
-    if (source_->info().count == 0) throw Error(ExitCode::empty, fmt::format("{}: no points to draw", path));
-  }
-  void frame(Renderer& renderer) override {
-    for_batches("frame", [&](const SampleBatch& batch) { renderer.frame(batch); });
-  }
-  void draw(Renderer& renderer) override {
-    for_batches("draw", [&](const SampleBatch& batch) { renderer.draw(batch, source_->info().attributes); });
-  }
-  [[nodiscard]] std::string what() const override { return count_text(source_->info().count) + " points"; }
-
- private:
-  /// Every batch of the file, with progress.
-  template <class Take>
-  void for_batches(std::string_view stage, const Take& take) {
-    SampleBatch batch;
-    const std::uint64_t total = source_->info().count;
-    for (std::uint64_t first = 0; first < total; first += batch.size()) {
-      if (context_.cancelled()) throw Error(ExitCode::internal, "cancelled");
-      source_->read(first, kBatch, batch);
-      take(batch);
-      if (context_.progress) context_.progress({stage, first + batch.size(), total, 0, 0});
-    }
-  }
-  std::unique_ptr<PointSource> source_;
-  const RunContext& context_;
-};
-
-class HeldPoints : public Model {
- public:
-  HeldPoints(PointArrays points, std::string what) : points_(std::move(points)), what_(std::move(what)) {}
-  void frame(Renderer& renderer) override { renderer.frame(points_.samples); }
-  void draw(Renderer& renderer) override { renderer.draw(points_.samples, points_.layout); }
-  [[nodiscard]] std::string what() const override { return what_; }
-
- private:
-  PointArrays points_;
-  std::string what_;
-};
 
 class HeldMesh : public Model {
  public:
@@ -120,7 +74,7 @@ PointArrays as_points(TriangleMesh& mesh) {
 
 std::vector<double> values_to_paint(const TriangleMesh& mesh, const std::string& path, const PaintOptions& paint,
                                     const RunContext& context) {
-  if (paint.what == "distance") return vertex_distances(mesh, read_mesh_input(paint.reference, context), context);
+  if (paint.what == "distance") return vertex_distances(mesh, read_reference(paint.reference, context), context);
   std::string names;
   for (std::size_t a = 0; a < mesh.layout.size(); ++a) {
     if (mesh.layout[a].name == paint.what) return {mesh.attributes[a].begin(), mesh.attributes[a].end()};
@@ -136,11 +90,7 @@ void paint_mesh(TriangleMesh& mesh, const std::string& path, const PaintOptions&
   const PaintRange range = options.range ? *options.range : paint_range(values);
   paint(mesh, values, range);
   const auto [least, most] = std::minmax_element(values.begin(), values.end());
-  context.info(fmt::format(
-      "painted {}: dark blue {:.4g}, turquoise {:.4g}, yellow-green {:.4g}, orange {:.4g}, dark red "
-      "{:.4g}; values lie between {:.4g} and {:.4g}",
-      options.what, range.low, range.low + 0.25 * (range.high - range.low), range.low + 0.5 * (range.high - range.low),
-      range.low + 0.75 * (range.high - range.low), range.high, *least, *most));
+  say_scale(options.what, range, *least, *most, context);
 }
 
 std::unique_ptr<Model> model_of(TriangleMesh mesh, const std::string& path, const PaintOptions& paint,
@@ -149,7 +99,7 @@ std::unique_ptr<Model> model_of(TriangleMesh mesh, const std::string& path, cons
   if (!paint.what.empty()) paint_mesh(mesh, path, paint, context);
   if (!mesh.triangles.empty()) return std::make_unique<HeldMesh>(std::move(mesh));
   const std::string what = count_text(mesh.positions.size()) + " vertices; there are no faces";
-  return std::make_unique<HeldPoints>(as_points(mesh), what);
+  return held_points(as_points(mesh), what, path, {}, context);
 }
 
 std::unique_ptr<Model> volume_model(const std::string& path, const ModelOptions& options, const RunContext& context) {
@@ -165,7 +115,7 @@ std::unique_ptr<Model> volume_model(const std::string& path, const ModelOptions&
     PointVolume volume = read_point_volume(path, options.grid);
     if (volume.points.samples.size() == 0) throw Error(ExitCode::empty, fmt::format("{}: no points to draw", path));
     const std::string what = count_text(volume.points.samples.size()) + " points";
-    return std::make_unique<HeldPoints>(std::move(volume.points), what);
+    return held_points(std::move(volume.points), what, path, options.paint, context);
   }
   const bool fog = options.grid.empty() ? std::none_of(info.grids.begin(), info.grids.end(), is_level_set) &&
                                               std::any_of(info.grids.begin(), info.grids.end(), is_fog)
@@ -173,7 +123,7 @@ std::unique_ptr<Model> volume_model(const std::string& path, const ModelOptions&
   if (fog) {
     if (options.as_triangles || !options.paint.what.empty()) {
       throw Error(ExitCode::usage, fmt::format("{}: a fog has no triangles: --flat, --wireframe, --mark-boundary and "
-                                               "--paint are for meshes and level sets",
+                                               "--paint are for meshes, points and level sets",
                                                path));
     }
     return std::make_unique<HeldFog>(read_fog(path, options.grid));
@@ -194,14 +144,11 @@ std::unique_ptr<Model> open_model(const std::string& path, const ModelOptions& o
     case FileContent::points:
       break;
   }
-  if (!options.paint.what.empty()) {
-    throw Error(ExitCode::usage, fmt::format("{}: --paint is for meshes; 'lamina surface' makes one of points", path));
-  }
-  return std::make_unique<StreamedPoints>(path, context);
+  return streamed_points(path, options.paint, context);
 }
 
 std::unique_ptr<Model> open_vertices(const std::string& path, const RunContext& context) {
-  return std::make_unique<StreamedPoints>(path, context);
+  return streamed_points(path, {}, context);
 }
 
 }  // namespace lamina::tools

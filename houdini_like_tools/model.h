@@ -26,8 +26,8 @@ class Model {
 
 /// Values shown as colours instead of the file's own.
 struct PaintOptions {
-  std::string what;       ///< "distance", to `reference`, or the name of a vertex attribute; empty: nothing
-  std::string reference;  ///< the truth: a mesh
+  std::string what;       ///< "distance", to `reference`, or the name of an attribute; empty: nothing
+  std::string reference;  ///< the truth: a mesh or a .vdb level set
   std::optional<PaintRange> range;
 };
 
@@ -37,9 +37,9 @@ struct ModelOptions {
   PaintOptions paint;
 };
 
-/// Points are streamed from the file for every frame; meshes, level sets, fogs and points grids are held. What is
-/// painted, or has to have triangles, becomes a mesh. Throws what the readers throw, and Error: usage (something to
-/// paint that is not there), empty (nothing to draw).
+/// Points are streamed from the file for every frame; meshes, level sets, fogs and points grids are held. A
+/// level set that is painted, or has to have triangles, becomes a mesh. Throws what the readers throw, and Error: usage
+/// (something to paint that is not there), empty (nothing to draw).
 std::unique_ptr<Model> open_model(const std::string& path, const ModelOptions& options, const RunContext& context);
 
 /// A mesh file too large to be held: its vertices, streamed as points.

@@ -3,7 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -37,16 +36,6 @@ NormalsMode mode_of(const NormalOptions& o) {
   return o.missing ? NormalsMode::complete : NormalsMode::estimate;
 }
 
-/// Where a large cloud's temporary files fit as well as the output does; the system's folder for pipes and devices.
-std::string folder_beside(const std::string& output) {
-  std::error_code ignored;
-  const auto kind = std::filesystem::status(output, ignored).type();
-  const bool file = kind == std::filesystem::file_type::regular || kind == std::filesystem::file_type::not_found;
-  if (output.empty() || output == "-" || !file) return {};
-  const std::string parent = std::filesystem::path(output).parent_path().string();
-  return parent.empty() ? "." : parent;
-}
-
 void run_normal(const NormalOptions& o) {
   NormalsSettings settings = o.settings;
   settings.mode = mode_of(o);
@@ -54,8 +43,7 @@ void run_normal(const NormalOptions& o) {
   if (o.check && !o.output.empty()) throw Error(ExitCode::usage, "--check writes no points; leave --output out");
   if (o.stats == "-" && o.output == "-")
     throw Error(ExitCode::usage, "--stats and --output both name standard output; give one of them a file");
-  RunContext context = make_context(o.run);
-  if (context.tmp_dir.empty()) context.tmp_dir = folder_beside(o.output);
+  const RunContext context = make_context(o.run, o.output);
   std::vector<std::string> names;
   for (const std::string& name : o.inputs) names.push_back(pipe_name(name));
   std::unique_ptr<PointSource> source = open_points(names, PointSettings{context.tmp_dir, o.columns});

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <map>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -24,6 +25,16 @@ void take_viewpoint(NormalsSettings& settings, const std::string& text) {
 }
 
 }  // namespace
+
+void add_normals_choice(CLI::App& tool, NormalsChoice& normals, const std::string& group) {
+  const std::map<std::string, NormalsChoice> words{
+      {"file", NormalsChoice::file}, {"auto", NormalsChoice::automatic}, {"estimate", NormalsChoice::estimate}};
+  tool.add_option("--normals", normals,
+                  "whose normals: the file's; auto: found where the file has none; estimate: all found")
+      ->transform(CLI::CheckedTransformer(words, CLI::ignore_case))
+      ->option_text("file|auto|estimate [file]")
+      ->group(group);
+}
 
 void add_normals_options(CLI::App& tool, NormalsSettings& s, const std::string& group) {
   tool.add_option("--k", s.k, "nearest samples that a normal's plane is fitted to")

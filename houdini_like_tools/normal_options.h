@@ -5,8 +5,12 @@
 #include <string>
 
 #include "lamina/normals.h"
+#include "lamina/surface.h"
 
 namespace lamina::tools {
+
+/// --normals.
+void add_normals_choice(CLI::App& tool, NormalsChoice& normals, const std::string& group);
 
 /// --k, --radius, --viewpoint, --up, --flip.
 void add_normals_options(CLI::App& tool, NormalsSettings& settings, const std::string& group);

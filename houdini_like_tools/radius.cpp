@@ -21,7 +21,7 @@ struct RadiusOptions {
 };
 
 void run_radius(const RadiusOptions& o) {
-  const RunContext context = make_context(o.run);
+  const RunContext context = make_context(o.run, o.output);
   const auto source = open_point_input(o.input, o.columns, context);
   if (source->info().geographic)
     throw Error(ExitCode::unreadable, shown_name(o.input) +

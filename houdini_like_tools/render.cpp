@@ -107,12 +107,13 @@ void add_look_options(CLI::App& tool, RenderSettings& s) {
 }
 
 void add_paint_options(CLI::App& tool, PaintOptions& paint) {
-  tool.add_option("--paint", paint.what,
-                  "A mesh's values as colours, blue to red: distance from --reference, or any attribute's name")
+  tool.add_option(
+          "--paint", paint.what,
+          "Values as colours, blue to red: distance from --reference, or the name of an attribute (radius, ...)")
       ->type_name("distance|NAME")
       ->group("Look");
-  tool.add_option("--reference", paint.reference, "The mesh from which --paint distance measures")
-      ->type_name("MESH")
+  tool.add_option("--reference", paint.reference, "The mesh or .vdb level set from which --paint distance measures")
+      ->type_name("FILE")
       ->group("Look");
   add_numbers(tool, "--paint-range", ',', 2, "LOW,HIGH",
               "Values of the first and the last colour [0, or the least, and what 99 % do not exceed]",

@@ -6,11 +6,13 @@
 #include <string>
 #include <vector>
 
+#include "clean_options.h"
 #include "console.h"
 #include "inputs.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "lamina/sort_points.h"
+#include "normal_options.h"
 #include "text.h"
 #include "tool.h"
 
@@ -44,7 +46,7 @@ void run_sort(const SortOptions& o) {
   if (o.output.empty()) throw Error(ExitCode::usage, "--output is required, or --store");
   if (o.inputs.size() > 1)
     throw Error(ExitCode::usage, "several inputs go into a --store only; put them into one file first: lamina merge");
-  const RunContext context = make_context(o.run);
+  const RunContext context = make_context(o.run, o.output);
   const auto source = open_point_input(o.inputs.front(), o.columns, context);
   const auto writer = open_points_writer(o.output, with_precision(columns_of(source->info()), o.precision),
                                          {.count = {}, .tmp_dir = o.run.tmp_dir});
@@ -52,6 +54,16 @@ void run_sort(const SortOptions& o) {
   warn_of_bad_rows(report, shown_name(o.inputs.front()), context);
   writer->commit();
   context.info(fmt::format("sorted {} points", count_text(report.written)));
+}
+
+/// What else lamina surface would do with the samples while it reads them: all of it needs --store.
+void add_reading(CLI::App& tool, CLI::Option& store, SurfaceSettings& reading) {
+  const std::size_t before = tool.get_options().size();
+  add_clean_options(tool, reading.clean, "Cleaning of the store");
+  add_normals_choice(tool, reading.normals, "Normals of the store");
+  add_normals_options(tool, reading.normal_search, "Normals of the store");
+  const std::vector<CLI::Option*> options = tool.get_options();
+  for (std::size_t i = before; i < options.size(); ++i) options[i]->needs(&store);
 }
 
 }  // namespace
@@ -116,6 +128,7 @@ void add_sort(CLI::App& app) {
       ->capture_default_str()
       ->needs(folder)
       ->group(store);
+  add_reading(*tool, *folder, o->reading);
   add_columns(*tool, o->columns);
   add_bad_samples(*tool, o->settings.bad_samples);
   add_precision(*tool, o->precision);
@@ -123,6 +136,7 @@ void add_sort(CLI::App& app) {
   add_examples(*tool,
                "  lamina sort scan.ply --by sweep -o swept.ply\n"
                "  lamina sort scan.ply --store scan.store\n"
+               "  lamina sort scan.ply --store cleaned.store --outliers 3 --normals auto\n"
                "  lamina sort scan.ply --attribute confidence --reverse -o best_first.ply");
   tool->callback([o] { run_sort(*o); });
 }

@@ -2,7 +2,6 @@
 #include "lamina/surface.h"
 
 #include <fmt/format.h>
-#include <malloc.h>
 
 #include <filesystem>
 #include <map>
@@ -17,6 +16,7 @@
 #include "model.h"
 #include "normal_options.h"
 #include "result_file.h"
+#include "surface_holes.h"
 #include "surface_parts.h"
 #include "surface_ranks.h"
 #include "text.h"
@@ -86,7 +86,8 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
   }
   add_cleaning(j, s, settings);
   j["replaced_attribute_values"] = s.replaced_attributes;
-  j["corners"] = {{"projected", s.corners}, {"seen", s.corners_seen}, {"trusted", s.corners_good}};
+  j["corners"] = {
+      {"projected", s.corners}, {"seen", s.corners_seen}, {"trusted", s.corners_good}, {"sums", s.corner_sums}};
   j["contradicting_normals"] = {
       {"corners", s.corners_torn}, {"worst_slab", s.torn_slab}, {"worst_share", s.torn_share}};
   j["isosurface"] = {{"vertices", s.isovertices},
@@ -107,6 +108,7 @@ nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& set
                    {"patches", s.clusters.patches},
                    {"kept_isovertices", s.clusters.kept_isovertices},
                    {"hard", s.clusters.hard}};
+  j["holes"] = holes_json(s.holes);
   return j;
 }
 
@@ -119,7 +121,7 @@ Length length_of(const char* option, const std::string& text) {
 }
 
 /// A number, or `auto` where the program chooses.
-CLI::Option* add_choice(CLI::App& app, const std::string& name, std::optional<double>& value,
+CLI::Option* add_choice(CLI::App& app, const std::string& name, std::optional<double>& value, const std::string& usual,
                         const std::string& description) {
   const auto take = [&value, name](const std::string& text) {
     double number = 0;
@@ -129,16 +131,7 @@ CLI::Option* add_choice(CLI::App& app, const std::string& name, std::optional<do
       throw CLI::ValidationError(name, text + ": is neither a number nor auto");
     value = number;
   };
-  return app.add_option_function<std::string>(name, take, description)->option_text("FLOAT|auto [auto]");
-}
-
-/// Large arrays go back to the system when they are freed. By default the C library raises the size from which they do
-/// with the first one freed, and keeps gaps between what lives long: a fifth of the memory at 16 million samples.
-void return_large_arrays() {
-#ifdef __GLIBC__
-  constexpr int kLarge = 128 << 10;
-  mallopt(M_MMAP_THRESHOLD, kLarge);
-#endif
+  return app.add_option_function<std::string>(name, take, description)->option_text("FLOAT|auto [" + usual + "]");
 }
 
 /// A picture of the mesh file: of its triangles where they can be held, of its vertices where they cannot.
@@ -159,7 +152,6 @@ void draw_preview(const SurfaceOptions& o, const std::string& mesh, const RunCon
 }
 
 void run_surface(const SurfaceOptions& o) {
-  return_large_arrays();
   SurfaceSettings settings = o.settings;
   settings.input = pipe_name(o.inputs.front());
   for (auto name = o.inputs.begin() + 1; name != o.inputs.end(); ++name)
@@ -201,6 +193,7 @@ void run_surface(const SurfaceOptions& o) {
                              stats.vertices, stats.triangles, stats.wall,
                              static_cast<double>(stats.samples_read) / stats.cpu * 1e-6,
                              static_cast<double>(stats.peak_memory) * 1e-6));
+    if (!parts.chunk) context.info(describe(stats.holes));
     const VolumeExportStats& v = stats.volume;
     if (v.files.size() == 1) context.info(fmt::format("{}: {}", v.files[0], bytes_text(v.bytes)));
     if (v.files.size() > 1)
@@ -211,6 +204,7 @@ void run_surface(const SurfaceOptions& o) {
   if (!stats_file) return;
   nlohmann::ordered_json json = to_json(stats, settings);
   if (parts.chunk) {
+    json.erase("holes");  // are known to the merge
     json["chunk"] = {{"number", o.parts.chunk.number},
                      {"count", o.parts.chunk.count},
                      {"first_slab", parts.chunk->first_slab},
@@ -297,23 +291,26 @@ void add_surface(CLI::App& app) {
       ->group(samples);
 
   add_clean_options(*tool, s.clean, "Cleaning");
-  tool->add_option("--normals", s.normals,
-                   "whose normals: the file's; auto: found where the file has none; estimate: all found")
-      ->transform(words<NormalsChoice>(
-          {{"file", NormalsChoice::file}, {"auto", NormalsChoice::automatic}, {"estimate", NormalsChoice::estimate}}))
-      ->option_text("file|auto|estimate [file]")
-      ->group("Normals");
+  add_normals_choice(*tool, s.normals, "Normals");
   add_normals_options(*tool, s.normal_search, "Normals");
 
   const std::string fit = "Fit";
-  add_choice(*tool, "--blend", s.blend, "H: the influence radius R is H times a sample's radius r; auto: by the noise")
+  add_choice(*tool, "--blend", s.blend, fmt::format("{:g}", *s.blend),
+             "H: the influence radius R is H times a sample's radius r; auto: H, and --cell and --refit where these "
+             "are not given, by the cloud's noise and the evenness of its sampling")
       ->group(fit);
-  add_choice(
-      *tool, "--refit", s.refit,
-      "before all else, replace normals by those fitted to the samples within so many radii; 0: keep them; auto: "
-      "with --blend auto, where noise asks for it")
+  add_choice(*tool, "--refit", s.refit, "0, with --blend auto: auto",
+             "first replace normals by those fitted to the samples within so many radii; 0: keep them; auto: keep "
+             "them but for noise that --blend auto finds")
       ->group(fit);
-  tool->add_option("--steps", s.steps, "N: projection steps")->capture_default_str()->group(fit);
+  tool->add_option("--steps", s.steps, "N: projection steps; auto: as many as each corner needs")
+      ->transform(CLI::Transformer(std::map<std::string, std::string>{{"auto", "0"}}))
+      ->option_text("N|auto [1]")
+      ->group(fit);
+  tool->add_option("--step-tolerance", s.step_tolerance,
+                   "with --steps auto: a corner is done when a step moves it no more than so many radii r")
+      ->capture_default_str()
+      ->group(fit);
   tool->add_option("--fit", s.fit, "surface fitted to the samples around a corner")
       ->transform(words<FitMode>({{"plane", FitMode::plane}, {"sphere", FitMode::sphere}}))
       ->option_text("plane|sphere [sphere]")
@@ -323,8 +320,8 @@ void add_surface(CLI::App& app) {
   const std::string lattice = "Octree";
   tool->add_option_function<std::string>(
           "--cell", [&s](const std::string& text) { s.cell = length_of("--cell", text); },
-          "largest leaf cell: a length, or times the smallest r or R around; 0.9R where --blend is given")
-      ->option_text("LENGTH [chosen with --blend]")
+          "largest leaf cell: a length, or times the smallest r or R around")
+      ->option_text("LENGTH [0.9R, with --blend auto: chosen]")
       ->group(lattice);
   tool->add_option("--levels", s.levels, "octree levels; 0: as the radii ask, at least 4")
       ->capture_default_str()
@@ -348,6 +345,11 @@ void add_surface(CLI::App& app) {
                  "give vertices their octree level, 0 the finest, as property level; 'lamina render --paint level'")
       ->group(mesh);
 
+  tool->add_flag("--curvature", s.vertex_curvature,
+                 "give vertices the mean curvature, 1 / length, as property curvature; convex is positive")
+      ->group(mesh);
+
+  add_hole_options(*tool, s, mesh);
   tool->add_option("--prune", s.prune_triangles, "leave out connected parts of fewer triangles")
       ->type_name("N")
       ->capture_default_str()

@@ -73,7 +73,7 @@ void transform_grids(const TransformOptions& o, const Eigen::Affine3d& transform
 
 void run_transform(const TransformOptions& o) {
   const Eigen::Affine3d transform = affine(o);
-  const RunContext context = make_context(o.run);
+  const RunContext context = make_context(o.run, o.output);
   switch (content_of(o.input, o.run.tmp_dir)) {
     case FileContent::points:
       return transform_points(o, transform, context);

@@ -50,11 +50,12 @@ void add_volume(CLI::App& app) {
       ->required()
       ->type_name("FILE");
   const std::string grid = "Grid";
-  tool->add_option("--voxel", s.voxel, "Edge of a voxel in the mesh's units; 0: the mean length of its edges")
+  tool->add_option("--voxelsize,--voxel", s.voxel,
+                   "Edge of a voxel in the mesh's units; 0: the mean length of its edges")
       ->type_name("LENGTH")
       ->capture_default_str()
       ->group(grid);
-  tool->add_option("--band", s.band, "Half width of the band that holds distances, in voxels")
+  tool->add_option("--halfbandvoxels,--band", s.band, "Half width of the band that holds distances, in voxels")
       ->type_name("N")
       ->capture_default_str()
       ->group(grid);
@@ -75,7 +76,7 @@ void add_volume(CLI::App& app) {
       ->group(grid);
   tool->add_flag("--half", s.half, "Store 16-bit floats")->group(grid);
   add_run_options(*tool, o->run);
-  add_examples(*tool, "  lamina volume mesh.ply --voxel 0.05 -o mesh.vdb");
+  add_examples(*tool, "  lamina volume mesh.ply --voxelsize 0.05 -o mesh.vdb");
   tool->callback([o] { run_volume(*o); });
 }
 

@@ -41,16 +41,17 @@ ChunkStats reconstruct_chunk(const SurfaceSettings& settings, const Chunk& chunk
 struct MergedParts {
   std::uint64_t vertices = 0, triangles = 0;
   int parts = 0;
+  HoleStats holes;
 };
 
 /// Whether a file claims to be a part.
 bool is_part(const std::string& path);
 
 /// Joins all the parts (`paths`) of one reconstruction, given in any order, to the mesh `output` ("-": standard
-/// output). Memory does not grow with the mesh. `tmp_dir` is for what goes to standard output; empty: the system's.
-/// Throws Error(unreadable) naming the part that is missing, there twice, truncated, damaged, of another run or of a
-/// version this program does not know; Error(empty) when no part has surface; Error(budget) when the mesh has more than
-/// 2^32 - 1 vertices or cannot be written.
+/// output), and closes its holes. Memory does not grow with the mesh, but with the rims of a part. `tmp_dir` is for
+/// what goes to standard output; empty: the system's. Throws Error(unreadable) naming the part that is missing, there
+/// twice, truncated, damaged, of another run or of a version this program does not know; Error(empty) when no part has
+/// surface; Error(budget) when the mesh has more than 2^32 - 1 vertices or cannot be written.
 MergedParts merge_parts(const std::vector<std::string>& paths, const std::string& output, const RunContext& run);
 
 struct Checkpoint {

@@ -12,6 +12,7 @@ struct PointRadiiSettings {
   double minradius = 0;        ///< input units: smaller ones become this
   double maxradius = 0;        ///< input units: larger ones become this; 0: no limit
   BadSamples bad_samples = BadSamples::drop;
+  std::size_t memory = std::size_t{256} << 20;  ///< for radii on their way to their rows; at most run.max_memory / 4
 };
 
 struct PointRadiiReport {
@@ -23,7 +24,7 @@ struct PointRadiiReport {
 /// Writes the source's rows in order, their `radius` (or what the writer's columns call it) estimated as
 /// reconstruct_surface() does (radii.h); one that the file brings is not looked at. Normals are not needed. Three
 /// passes over the input; the positions rest in a temporary file in run.tmp_dir (empty: the system's), the radii in
-/// memory up to 256 MB or a quarter of run.max_memory, then in another. Threads do not change the result. Does not
+/// settings.memory, then in another. Threads do not change the result. Does not
 /// commit.
 /// Throws Error: usage (settings out of range, a writer without a radius column), empty (no points, or all of them at
 /// one place), budget, and what the source throws.

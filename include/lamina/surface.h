@@ -9,6 +9,7 @@
 #include "lamina/bad_samples.h"
 #include "lamina/clean.h"
 #include "lamina/cluster.h"
+#include "lamina/holes.h"
 #include "lamina/length.h"
 #include "lamina/normals.h"
 #include "lamina/run.h"
@@ -37,27 +38,36 @@ struct SurfaceSettings {
   std::optional<FrameMode> frame;  ///< unset: pca, or axis where grids are asked for (they have the input's axes then)
   BadSamples bad_samples = BadSamples::drop;  ///< non-finite, without a normal, with a radius <= 0
   NormalsChoice normals = NormalsChoice::file;
-  NormalsSettings normal_search;  ///< how those that are found are; mode and bad_samples follow the others
-  double radius_scale = 1;        ///< > 0: multiplies every sample's radius, given or estimated
-  std::uint32_t density = 16;     ///< samples a counting cell must hold to give a radius (paper, section 3.1), >= 2
-  CleanSettings clean;            ///< what is left out before radii are estimated
-  Length max_radius;              ///< samples with a larger radius are discarded as undersampled; 0: none
-  std::optional<double> blend;    ///< H > 0: R = H r (paper, section 3.2); unset: chosen by the cloud's noise and the
-                                  ///< evenness of its sampling (SurfacePlan says what)
+  NormalsSettings normal_search;      ///< how those that are found are; mode and bad_samples follow the others
+  double radius_scale = 1;            ///< > 0: multiplies every sample's radius, given or estimated
+  std::uint32_t density = 16;         ///< samples a counting cell must hold to give a radius (paper, section 3.1), >= 2
+  CleanSettings clean;                ///< what is left out before radii are estimated
+  Length max_radius;                  ///< samples with a larger radius are discarded as undersampled; 0: none
+  std::optional<double> blend = 1.2;  ///< H > 0: R = H r (paper, section 3.2); unset: chosen, with `cell` and `refit`
+                                      ///< where these are unset, by the cloud's noise and the evenness of its
+                                      ///< sampling (SurfacePlan says what)
   /// >= 0, at most 8: before anything is projected each normal is replaced by that of the sphere fitted to the samples
-  /// within so many radii that face where it does; 0: normals stay; unset: chosen with `blend`, else 0.
+  /// within so many radii that face where it does; 0: normals stay. Unset: chosen where `blend` is, else 0.
   std::optional<double> refit;
-  int steps = 1;  ///< N in 1..16: projection steps
+  int steps = 1;                 ///< N in 1..16: projection steps; 0: as many as each corner needs, at most 16
+  double step_tolerance = 0.01;  ///< with 0 steps: a corner is done when a step moves it no more than so many r
   FitMode fit = FitMode::sphere;
   bool diffuse = false;        ///< project cell centres, then corners by their cells (paper, section 3.3)
-  std::optional<Length> cell;  ///< largest leaf cell a radius allows; leaves are half to all of it. Unset: chosen with
-                               ///< `blend`, 0.9 R where that is given
+  std::optional<Length> cell;  ///< largest leaf cell a radius allows; leaves are half to all of it. Unset: chosen where
+                               ///< `blend` is, else 0.9 R
   int levels = 0;              ///< octree levels, 1..12; 0: as the radii ask, at least 4
   double boundary = 0;         ///< isovertices whose corners' projections lie farther than this from the average of
                                ///< their samples (in R) are rejected; 0: no limit
   ClusterMode cluster = ClusterMode::preserving;
-  double chord = 0.17;                ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
-  bool vertex_levels = false;         ///< give vertices an attribute `level`: of the octree, 0 the finest
+  double chord = 0.17;         ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
+  bool vertex_levels = false;  ///< give vertices an attribute `level`: of the octree, 0 the finest
+  /// Give vertices an attribute `curvature`: mean curvature of the fitted sphere, 1 / input unit, positive where the
+  /// surface is convex seen from outside.
+  bool vertex_curvature = false;
+  /// Boundary loops shorter than this, in local influence radii R, are closed where the surface around them tells how
+  /// it goes on; 0: none, and none with ClusterMode::free. R is taken from the octree's cells, which follow it by
+  /// powers of two.
+  double close_holes = 8;
   std::uint64_t prune_triangles = 0;  ///< connected parts of the mesh with fewer triangles are left out
   Length prune_size;     ///< parts whose box has a shorter diagonal, too; `r`, `R`: of the median sample; 0: none
   bool local = false;    ///< write coordinates less a shift (SurfaceStats::shift), which floats then hold
@@ -112,6 +122,7 @@ struct SurfaceStats {
   std::uint64_t replaced_attributes = 0;  ///< attribute values that were NaN or out of range
   std::uint64_t vertices = 0, triangles = 0;
   std::uint64_t corners = 0, corners_seen = 0, corners_good = 0;
+  std::uint64_t corner_sums = 0;  ///< how often samples were summed up at a corner: once for each of its steps
   /// Corners whose samples' normals contradict each other; the slab (counted from the first) with the largest share of
   /// them among the corners with samples, and that share.
   std::uint64_t corners_torn = 0;
@@ -120,6 +131,7 @@ struct SurfaceStats {
   std::uint64_t isovertices = 0, isotriangles = 0, rejected_loops = 0, general_cells = 0, crossing_cells = 0;
   std::vector<std::uint64_t> leaf_cells;  ///< by level, finest first
   ClusterCounts clusters;
+  HoleStats holes;
   std::optional<NormalsReport> normals;  ///< where they were found
   VolumeExportStats volume;              ///< where grids were asked for
   std::vector<StageTime> stages;

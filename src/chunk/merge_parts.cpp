@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "files/output_file.h"
+#include "holes/hole_closer.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "mesh_sink/mesh_header.h"
@@ -41,6 +42,22 @@ void require_successive(const std::vector<PartReader>& parts) {
     below = info.last;
     owner = &part;
   }
+}
+
+/// What closes the holes of the whole mesh; counts it.
+holes::Addition close_holes(const std::vector<PartReader>& parts, MergedParts& merged) {
+  const PartInfo& info = parts.front().info();
+  holes::HoleCloser closer(info.close_holes, info.attributes.size());
+  std::uint64_t first = 0;
+  for (const PartReader& part : parts) {
+    if (!part.info().span.empty()) closer.add_part(part.read_rims(), first);
+    first += part.info().vertices;
+  }
+  holes::Addition addition = closer.finish(first);
+  merged.vertices += addition.vertices.size();
+  merged.triangles += addition.triangles.size();
+  merged.holes = closer.stats();
+  return addition;
 }
 
 void write(OutputFile& file, const void* data, std::size_t bytes) {
@@ -105,6 +122,22 @@ void encode_shifted(std::span<const PartTriangle> triangles, std::uint64_t first
   encode_faces(shifted.data(), shifted.size(), out.data());
 }
 
+std::vector<std::byte> encode_addition(const VertexBatch& vertices, const MeshSinkSettings& layout,
+                                       std::uint64_t first) {
+  require_writable(vertices, layout.attributes, layout.double_positions, first);
+  std::vector<std::byte> out(vertices.size() * vertex_record_bytes(layout.attributes, layout.double_positions));
+  encode_vertices(vertices, layout.attributes, layout.double_positions, 0, vertices.size(), out.data());
+  return out;
+}
+
+std::vector<std::byte> encode_addition(const std::vector<std::array<std::uint32_t, 3>>& triangles,
+                                       std::uint64_t vertices) {
+  std::vector<std::byte> out(triangles.size() * kFaceRecordBytes);
+  if (!triangles.empty() && encode_faces(triangles.data(), triangles.size(), out.data()) >= vertices)
+    refuse("a rim of a part names a vertex that is not there; make the chunks again");
+  return out;
+}
+
 MergedParts merge_parts(const std::vector<std::string>& paths, const std::string& output, const RunContext& run) {
   const std::vector<PartReader> parts = open_parts(paths);
   MergedParts merged;
@@ -126,7 +159,10 @@ MergedParts merge_parts(const std::vector<std::string>& paths, const std::string
                                              output, parts.size()));
   }
   OutputFile file(output, run.tmp_dir);
-  const std::string header = mesh_header(parts.front().info().layout(), merged.vertices, merged.triangles);
+  const std::uint64_t own_vertices = merged.vertices;
+  const holes::Addition addition = close_holes(parts, merged);
+  const MeshSinkSettings layout = parts.front().info().layout();
+  const std::string header = mesh_header(layout, merged.vertices, merged.triangles);
   std::uint64_t bytes = header.size();
   write(file, header.data(), header.size());
   std::int64_t done = 0;
@@ -142,17 +178,23 @@ MergedParts merge_parts(const std::vector<std::string>& paths, const std::string
     });
     step();
   }
+  const auto append = [&](const std::vector<std::byte>& encoded) {
+    write(file, encoded.data(), encoded.size());
+    bytes += encoded.size();
+  };
+  append(encode_addition(addition.vertices, layout, own_vertices));
   std::uint64_t first = 0;
   std::vector<std::byte> faces;
   for (const PartReader& part : parts) {
     part.read_triangles([&](std::span<const PartTriangle> triangles) {
-      encode_shifted(triangles, first, merged.vertices, part.path(), faces);
+      encode_shifted(triangles, first, own_vertices, part.path(), faces);
       write(file, faces.data(), faces.size());
       bytes += faces.size();
     });
     first += part.info().vertices;
     step();
   }
+  append(encode_addition(addition.triangles, merged.vertices));
   if (file.streams()) {
     Descriptor to = file.destination();
     int error = copy_all(file.fd(), bytes, to.get());

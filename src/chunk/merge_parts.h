@@ -17,4 +17,10 @@ std::vector<PartReader> open_parts(const std::vector<std::string>& paths);
 void encode_shifted(std::span<const PartTriangle> triangles, std::uint64_t first, std::uint64_t vertices,
                     const std::string& part, std::vector<std::byte>& out);
 
+/// The records of what closes a mesh's holes: vertices, the first of number `first`, and faces of a mesh of `vertices`.
+std::vector<std::byte> encode_addition(const VertexBatch& vertices, const MeshSinkSettings& layout,
+                                       std::uint64_t first);
+std::vector<std::byte> encode_addition(const std::vector<std::array<std::uint32_t, 3>>& triangles,
+                                       std::uint64_t vertices);
+
 }  // namespace lamina

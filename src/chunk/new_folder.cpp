@@ -1,13 +1,15 @@
 #include "chunk/new_folder.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstdio>
 #include <filesystem>
+#include <vector>
 
-#include "files/descriptor.h"
 #include "lamina/error.h"
 
 namespace lamina {
@@ -17,6 +19,25 @@ namespace fs = std::filesystem;
 
 [[noreturn]] void refuse(const std::string& name, const std::string& why) {
   throw Error(ExitCode::budget, fmt::format("{}: {}", name, why));
+}
+
+/// Locked for as long as the descriptor lives; empty where somebody else holds it, or the file system knows no locks.
+Descriptor locked(const fs::path& folder) {
+  Descriptor held(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!held || ::flock(held.get(), LOCK_EX | LOCK_NB) != 0) return {};
+  return held;
+}
+
+/// Folders of killed runs to the same name: those whose lock nobody holds any more.
+void remove_abandoned(const fs::path& name) {
+  const std::string prefix = fmt::format(".{}.partial-", name.filename().string());
+  const fs::path parent = name.has_parent_path() ? name.parent_path() : fs::path(".");
+  std::error_code error;
+  std::vector<fs::path> abandoned;
+  for (const fs::directory_entry& entry : fs::directory_iterator(parent, error)) {
+    if (entry.path().filename().string().starts_with(prefix) && locked(entry.path())) abandoned.push_back(entry.path());
+  }
+  for (const fs::path& folder : abandoned) fs::remove_all(folder, error);
 }
 
 }  // namespace
@@ -29,9 +50,10 @@ NewFolder::NewFolder(const std::string& name) : name_(name) {
     refuse(name_, "is there already; remove it or choose another name");
   const fs::path path(name_);
   path_ = (path.parent_path() / fmt::format(".{}.partial-{}", path.filename().string(), ::getpid())).string();
-  fs::remove_all(path_, error);  // of a run that was killed and had the same number
+  remove_abandoned(path);
   if (!fs::create_directory(path_, error))
     refuse(name_, fmt::format("cannot be made: {}", error ? error.message() : "it is there already"));
+  lock_ = locked(path_);
 }
 
 NewFolder::~NewFolder() {

@@ -2,9 +2,12 @@
 #pragma once
 #include <string>
 
+#include "files/descriptor.h"
+
 namespace lamina {
 
-/// Made hidden beside the final name; removed with all that is in it unless published.
+/// Made hidden beside the final name (.NAME.partial-PID) and locked; removed with all that is in it unless published.
+/// Those that killed runs to the same name have left are removed first.
 class NewFolder {
  public:
   /// Throws Error(budget) when something of that name is there that is no empty folder, or it cannot be made.
@@ -17,6 +20,7 @@ class NewFolder {
 
  private:
   std::string name_, path_;
+  Descriptor lock_;
 };
 
 }  // namespace lamina

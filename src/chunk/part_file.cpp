@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "attributes/ply_type.h"
+#include "holes/rim_bytes.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "mesh_sink/records.h"
@@ -18,12 +19,12 @@
 namespace lamina {
 namespace {
 
-constexpr std::string_view kMagic("lamina part 1\n\0\0", 16);
+constexpr std::string_view kMagic("lamina part 2\n\0\0", 16);
 constexpr std::string_view kEnd = "complete";
 static_assert(kMagic.size() == 16 && kEnd.size() == 8);
 constexpr std::size_t kMagicName = 12;  ///< without the version
 
-constexpr std::uint64_t kVertices = 1, kTriangles = 2;
+constexpr std::uint64_t kVertices = 1, kTriangles = 2, kRims = 3;
 constexpr std::size_t kBufferBytes = 1 << 20;
 constexpr std::size_t kEncoded = 4096;  ///< vertices encoded at once
 constexpr std::size_t kTailBytes = sizeof(std::uint64_t) + sizeof(std::uint32_t) + kEnd.size();
@@ -62,6 +63,7 @@ nlohmann::json to_json(const PartInfo& info) {
           {"double_positions", info.double_positions},
           {"attributes", attributes},
           {"comments", info.comments},
+          {"close_holes", info.close_holes},
           {"vertices", info.vertices},
           {"triangles", info.triangles},
           {"below", to_json(info.below)},
@@ -81,6 +83,7 @@ PartInfo info_from(const nlohmann::json& j) {
     info.attributes.push_back({a.at("name").get<std::string>(), *type});
   }
   info.comments = j.at("comments").get<std::vector<std::string>>();
+  info.close_holes = j.at("close_holes").get<double>();
   info.vertices = j.at("vertices").get<std::uint64_t>();
   info.triangles = j.at("triangles").get<std::uint64_t>();
   info.below = mark_from(j.at("below"));
@@ -124,10 +127,6 @@ void PartWriter::flush() {
 
 void PartWriter::add(const VertexBatch& vertices, std::span<const PartTriangle> triangles) {
   require_writable(vertices, layout_.attributes, layout_.double_positions, vertices_);
-  const auto begin_block = [&](std::uint64_t kind, std::uint64_t count) {
-    put(&kind, sizeof kind);
-    put(&count, sizeof count);
-  };
   last_ = {vertices.size(), 0};
   if (vertices.size() > 0) {
     begin_block(kVertices, vertices.size());
@@ -149,6 +148,21 @@ void PartWriter::add(const VertexBatch& vertices, std::span<const PartTriangle> 
   }
   vertices_ += vertices.size();
   triangles_ += triangles.size();
+}
+
+void PartWriter::begin_block(std::uint64_t kind, std::uint64_t count) {
+  put(&kind, sizeof kind);
+  put(&count, sizeof count);
+}
+
+void PartWriter::add(const holes::RimPiece& rims) {
+  if (rims.empty()) return;
+  packed_.clear();
+  holes::pack(rims, packed_);
+  begin_block(kRims, packed_.size());
+  put(packed_.data(), packed_.size());
+  const std::uint32_t sum = checksum(0, packed_.data(), packed_.size());
+  put(&sum, sizeof sum);
 }
 
 void PartWriter::commit(PartInfo info) {
@@ -225,8 +239,8 @@ void PartReader::read_blocks(std::uint64_t kind, std::size_t record,
     std::array<std::uint64_t, 2> head{};
     if (body_end_ - at < sizeof head + sizeof(std::uint32_t)) damaged(at);
     read(at, head.data(), sizeof head);
-    const std::size_t bytes_each = head[0] == kVertices ? vertex : sizeof(PartTriangle);
-    if ((head[0] != kVertices && head[0] != kTriangles) ||
+    const std::size_t bytes_each = head[0] == kVertices ? vertex : head[0] == kTriangles ? sizeof(PartTriangle) : 1;
+    if (head[0] < kVertices || head[0] > kRims ||
         head[1] > (body_end_ - at - sizeof head - sizeof(std::uint32_t)) / bytes_each)
       damaged(at);
     const std::uint64_t bytes = head[1] * bytes_each;
@@ -248,7 +262,7 @@ void PartReader::read_blocks(std::uint64_t kind, std::size_t record,
     }
     at += bytes + sizeof(std::uint32_t);
   }
-  if (count != (kind == kVertices ? info_.vertices : info_.triangles)) damaged(body_end_);
+  if (kind != kRims && count != (kind == kVertices ? info_.vertices : info_.triangles)) damaged(body_end_);
 }
 
 void PartReader::read_vertices(const std::function<void(std::span<const std::byte>)>& take) const {
@@ -262,6 +276,12 @@ void PartReader::read_triangles(const std::function<void(std::span<const PartTri
     std::memcpy(triangles.data(), bytes.data(), bytes.size());
     take(triangles);
   });
+}
+
+holes::RimPiece PartReader::read_rims() const {
+  std::vector<std::byte> all;
+  read_blocks(kRims, 1, [&](std::span<const std::byte> bytes) { all.insert(all.end(), bytes.begin(), bytes.end()); });
+  return holes::unpack(all);
 }
 
 }  // namespace lamina

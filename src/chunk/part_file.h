@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "files/output_file.h"
+#include "holes/rim.h"
 #include "lamina/mesh_sink.h"
 #include "surface/slab_span.h"
 
@@ -28,6 +29,7 @@ struct PartInfo {
   bool double_positions = false;
   AttributeLayout attributes;
   std::vector<std::string> comments;
+  double close_holes = 0;  ///< SurfaceSettings::close_holes, where it applies
   std::uint64_t vertices = 0, triangles = 0;
   SlabMark below;  ///< the slab before the first, as this part's run has it
   SlabMark last;   ///< the last slab
@@ -40,14 +42,17 @@ using PartTriangle = std::array<std::int32_t, 3>;
 /// Writes slab after slab; keeps a megabyte. The file appears with commit().
 ///
 /// Layout, little-endian: 16 bytes that name the format and its version; blocks of a slab's vertices (records of the
-/// final PLY) or triangles (PartTriangle), each as kind and count (8 bytes both), records, and their CRC-32; at the end
-/// the PartInfo as JSON, its length, its CRC-32, and 8 bytes that say that the file is complete.
+/// final PLY), triangles (PartTriangle) or rims (rim_bytes.h, records of a byte), each as kind and count (8 bytes
+/// both), records, and their CRC-32; at the end the PartInfo as JSON, its length, its CRC-32, and 8 bytes that say that
+/// the file is complete.
 class PartWriter {
  public:
   /// Throws as OutputFile.
   PartWriter(const std::string& path, const MeshSinkSettings& layout);
   /// Throws Error(internal) for numbers that are not finite, Error(budget) when the disk is full.
   void add(const VertexBatch& vertices, std::span<const PartTriangle> triangles);
+  /// What is known of the part's rims (RimFinder of a part).
+  void add(const holes::RimPiece& rims);
   [[nodiscard]] std::uint64_t vertices() const { return vertices_; }
   [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
   [[nodiscard]] const SlabMark& last() const { return last_; }
@@ -56,12 +61,14 @@ class PartWriter {
 
  private:
   void put(const void* data, std::size_t bytes);
+  void begin_block(std::uint64_t kind, std::uint64_t count);
   void flush();
 
   OutputFile file_;
   MeshSinkSettings layout_;
   std::vector<std::byte> buffer_;
   std::uint64_t written_ = 0, vertices_ = 0, triangles_ = 0;
+  std::vector<std::byte> packed_;
   SlabMark last_;
 };
 
@@ -78,6 +85,8 @@ class PartReader {
   /// the end: what was handed over before must not be used then.
   void read_vertices(const std::function<void(std::span<const std::byte>)>& take) const;
   void read_triangles(const std::function<void(std::span<const PartTriangle>)>& take) const;
+  /// All of them at once; in memory goes with the length of the rims.
+  [[nodiscard]] holes::RimPiece read_rims() const;
 
  private:
   void read_blocks(std::uint64_t kind, std::size_t record,

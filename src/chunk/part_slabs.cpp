@@ -34,8 +34,8 @@ void make_relative(const std::vector<std::array<std::uint32_t, 3>>& triangles, s
   }
 }
 
-PartSlabs::PartSlabs(std::vector<Part> parts, int count, std::uint64_t job, MeshSinkSettings layout)
-    : parts_(std::move(parts)), count_(count), job_(job), layout_(std::move(layout)) {}
+PartSlabs::PartSlabs(std::vector<Part> parts, int count, std::uint64_t job, double close_holes, MeshSinkSettings layout)
+    : parts_(std::move(parts)), count_(count), job_(job), close_holes_(close_holes), layout_(std::move(layout)) {}
 
 void PartSlabs::open() {
   writer_.emplace(parts_[at_].path, layout_);
@@ -44,12 +44,17 @@ void PartSlabs::open() {
   info_.number = parts_[at_].number;
   info_.count = count_;
   info_.span = parts_[at_].span;
+  info_.close_holes = close_holes_;
   info_.below = previous_;
   first_ = numbered_;
+  finder_ = holes::RimFinder(first_, below_);
 }
 
 void PartSlabs::close() {
   if (!writer_) open();  // no slab of it had surface
+  piece_.clear();
+  finder_.finish(/*more=*/true, piece_);
+  writer_->add(piece_);
   writer_->commit(info_);
   vertices_ += writer_->vertices();
   triangles_ += writer_->triangles();
@@ -69,9 +74,13 @@ void PartSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {
     make_relative(slab.triangles, first_, info_.below.vertices, relative_);
     writer_->add(vertices, relative_);
     previous_ = writer_->last();
+    piece_.clear();
+    finder_.add(vertices, slab.triangles, piece_);
+    writer_->add(piece_);
   } else {
     previous_ = mark_of(vertices, layout_);
   }
+  below_ = vertices;
   numbered_ += vertices.size();
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "chunk/part_file.h"
+#include "holes/rim_finder.h"
 #include "surface/mesh_output.h"
 
 namespace lamina {
@@ -18,8 +19,8 @@ class PartSlabs : public SlabSink {
     SlabSpan span;
     std::string path;
   };
-  /// `job`, `count`: of every part (PartInfo).
-  PartSlabs(std::vector<Part> parts, int count, std::uint64_t job, MeshSinkSettings layout);
+  /// `job`, `count`, `close_holes`: of every part (PartInfo).
+  PartSlabs(std::vector<Part> parts, int count, std::uint64_t job, double close_holes, MeshSinkSettings layout);
 
   /// Slabs below the first part only tell what it stands on.
   void write(const FinalSlab& slab, const VertexBatch& vertices) override;
@@ -36,11 +37,15 @@ class PartSlabs : public SlabSink {
   std::vector<Part> parts_;
   int count_;
   std::uint64_t job_;
+  double close_holes_;
   MeshSinkSettings layout_;
   std::size_t at_ = 0;  ///< part that the next slab may belong to
   std::optional<PartWriter> writer_;
   PartInfo info_;
-  SlabMark previous_;           ///< the slab written last
+  SlabMark previous_;        ///< the slab written last
+  VertexBatch below_;        ///< its vertices
+  holes::RimFinder finder_;  ///< of the part
+  holes::RimPiece piece_;
   std::uint64_t numbered_ = 0;  ///< vertices so far, as the clusterer counts
   std::uint64_t first_ = 0;     ///< number of the part's first vertex
   std::uint64_t vertices_ = 0, triangles_ = 0;

@@ -7,6 +7,7 @@
 #include "chunk/part_slabs.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
+#include "surface/closing_slabs.h"
 #include "surface/kept_input.h"
 
 namespace lamina {
@@ -28,7 +29,8 @@ ChunkStats run_chunk(const SurfaceSettings& settings, const Chunk& chunk, const 
   stats.slabs = span.end - span.begin;
   stats.all_slabs = all.end - all.begin;
   const std::uint64_t job = job_hash(settings, kept_input_id(settings.input), resolved);
-  PartSlabs parts({{chunk.number, span, settings.output}}, chunk.count, job, mesh_layout(settings, input, resolved));
+  PartSlabs parts({{chunk.number, span, settings.output}}, chunk.count, job, longest_closed(settings),
+                  mesh_layout(settings, input, resolved));
   if (!span.empty()) {
     const SlabSpan projected = stage_spans(span, all, settings.diffuse).projected;
     stats.overlap_slabs = projected.end - projected.begin - stats.slabs;

@@ -13,6 +13,7 @@
 #include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "lamina/version.h"
+#include "surface/closing_slabs.h"
 #include "surface/kept_input.h"
 
 namespace lamina {
@@ -130,7 +131,7 @@ class ResumableRun {
     if (folder_.resumed()) run_.info(fmt::format("{}: {} of {} parts are done", folder_.path(), done, count));
     if (left.empty()) return;
     const SlabSpan span{left.front().span.begin, all.end};
-    PartSlabs slabs(std::move(left), count, job, mesh_layout(settings_, input, resolved));
+    PartSlabs slabs(std::move(left), count, job, longest_closed(settings_), mesh_layout(settings_, input, resolved));
     if (!span.empty()) sweep(settings_, input, resolved, span, slabs, nullptr, run_, watch_, stats_);
     slabs.finish();
   }
@@ -147,6 +148,7 @@ class ResumableRun {
         const MergedParts merged = merge_parts(parts_, settings_.output, run_);
         stats_.vertices = merged.vertices;
         stats_.triangles = merged.triangles;
+        stats_.holes = merged.holes;
       });
     } catch (const Error& error) {
       if (error.code() != ExitCode::unreadable) throw;

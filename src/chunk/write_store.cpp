@@ -1,3 +1,5 @@
+#include <filesystem>
+
 #include "chunk/new_folder.h"
 #include "lamina/chunk.h"
 #include "surface/kept_input.h"
@@ -10,13 +12,15 @@ SurfaceStats write_store(const SurfaceSettings& settings, const std::string& sto
   own.output.clear();
   check_settings(own);
   own.dry_run = false;
+  RunContext here = run;
+  if (here.tmp_dir.empty()) here.tmp_dir = (std::filesystem::absolute(store) / "..").lexically_normal().string();
   SurfaceStats stats;
   Stopwatch watch;
   const Stopwatch::Moment began = Stopwatch::now();
   NewFolder folder(store);
   run_in_arena(run, [&] {
-    const SweepInput input = read_surface_input(own, folder.path(), /*keep=*/true, run, watch, stats);
-    plan_surface(own, input, run, watch, Stopwatch::now().wall - began.wall, stats);
+    const SweepInput input = read_surface_input(own, folder.path(), /*keep=*/true, here, watch, stats);
+    plan_surface(own, input, here, watch, Stopwatch::now().wall - began.wall, stats);
     watch.time("store", [&] { save_input(input, own, folder.path()); });
   });
   folder.publish();

@@ -105,9 +105,10 @@ class Candidates {
 
   /// The mean distance of sample i, which is one of them; negative when nearer neighbours may lie beyond.
   float mean_distance(std::uint32_t i) {
-    const std::int64_t x = positions_.x[i];
-    const std::int64_t y = positions_.y[i];
-    const std::int64_t z = positions_.z[i];
+    // Differences of 32 bits, several at a time: coordinates lie within +-2^30, and neighbours near each other.
+    const std::int32_t x = positions_.x[i];
+    const std::int32_t y = positions_.y[i];
+    const std::int32_t z = positions_.z[i];
     for (std::size_t j = 0; j < squares_.size(); ++j) {
       const auto dx = static_cast<float>(x_[j] - x);
       const auto dy = static_cast<float>(y_[j] - y);
@@ -131,7 +132,7 @@ class Candidates {
   float cell_;
   int reach_ = 0;
   std::vector<std::uint32_t> indices_;
-  std::vector<std::int64_t> x_, y_, z_;
+  std::vector<std::int32_t> x_, y_, z_;
   std::vector<float> squares_;
 };
 

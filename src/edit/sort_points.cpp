@@ -13,13 +13,13 @@
 #include "edit/extent.h"
 #include "edit/record_sorter.h"
 #include "files/descriptor.h"
+#include "ground/memory_limit.h"
 #include "lamina/error.h"
 #include "points/row_codec.h"
 
 namespace lamina {
 namespace {
 
-constexpr std::size_t kMemory = std::size_t{256} << 20;
 constexpr std::size_t kBatch = std::size_t{1} << 15;
 
 /// The order of doubles as the order of integers; -0 and 0 are the same.
@@ -141,8 +141,10 @@ EditReport sort_points(PointSource& source, PointsWriter& writer, const SortSett
   const Keys keys(settings, source, run);
   const PointColumns& columns = writer.columns();
   const RowCodec codec(columns);
-  const std::size_t memory = run.max_memory > 0 ? std::min(kMemory, run.max_memory / 4) : kMemory;
+  const std::size_t memory = run.max_memory > 0 ? std::min(settings.memory, run.max_memory / 4) : settings.memory;
   const std::uint64_t whole = source.info().count * (codec.row_bytes() + 12);
+  constexpr std::uint64_t kProgram = std::uint64_t{56} << 20;  // measured: batches on their way, and the program
+  require_memory(run, kProgram + std::min<std::uint64_t>(memory, whole), source.info().path, "sorting");
   edit::RecordSorter sorter(codec.row_bytes(), static_cast<std::size_t>(std::min<std::uint64_t>(memory, whole)),
                             run.tmp_dir.empty() ? system_tmp_dir() : run.tmp_dir);
   ToSorter filler(columns, keys, source.info().path, sorter, codec);

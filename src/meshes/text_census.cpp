@@ -44,9 +44,13 @@ std::array<double, 3> position(std::string_view text, const std::string& path, s
 /// its vertex and a normal that is not there.
 void require_face(std::string_view text, const std::string& path, std::uint64_t line, std::uint64_t normals) {
   const auto refuse = [&](const std::string& what) { fail(path, fmt::format("line {}: {}", line, what)); };
-  while (true) {
+  for (std::uint64_t corners = 0;;) {
     while (!text.empty() && is_blank(text.front())) text.remove_prefix(1);
-    if (text.empty() || text.front() == '#') return;
+    if (text.empty() || text.front() == '#') {
+      if (corners == 0) refuse("a face without corners");
+      return;
+    }
+    ++corners;
     for (int part = 0; part < 3; ++part) {
       std::int64_t number = 0;
       const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);

@@ -13,6 +13,7 @@
 #include "lamina/radii.h"
 #include "meshes/with_threads.h"
 #include "normals/directions.h"
+#include "normals/grid_normals.h"
 #include "normals/patches.h"
 #include "normals/row_normals.h"
 #include "normals/sample_window.h"
@@ -256,14 +257,39 @@ class Job {
   std::vector<std::pair<std::uint64_t, std::uint64_t>> given_;
 };
 
+/// Organised scans bring their neighbourhoods: normals by the faces of the grid, the search is for the others.
+/// Returns how many were found; then the settings are those of the search.
+std::uint64_t take_grid_normals(std::unique_ptr<PointSource>& source, NormalsSettings& settings,
+                                const RunContext& run) {
+  const bool all_wanted =
+      settings.mode == NormalsMode::estimate || (settings.mode == NormalsMode::complete && !source->info().has_normals);
+  if (!all_wanted || settings.flip || settings.radius > 0) return 0;
+  std::vector<SeenFrom> seen = scanners_of(source->info(), settings);
+  if (settings.viewpoints.size() == 1) seen = {{0, true, settings.viewpoints.front()}};
+  const std::vector<PlacedGrid> grids = grids_of(*source);
+  const bool known = std::any_of(seen.begin(), seen.end(), [](const SeenFrom& s) { return s.known; });
+  if (grids.empty() || !known) return 0;
+  GridNormals by_grid =
+      grid_normals(std::move(source), grids, seen, run.tmp_dir.empty() ? system_tmp_dir() : run.tmp_dir, run);
+  source = std::move(by_grid.source);
+  settings.mode = NormalsMode::complete;
+  run.info(fmt::format("{} of {} samples have normals by the faces of their scans' grids", by_grid.found,
+                       source->info().count));
+  return by_grid.found;
+}
+
 }  // namespace
 
 std::unique_ptr<PointSource> with_normals(std::unique_ptr<PointSource> source, const NormalsSettings& settings,
                                           NormalsReport& report, const RunContext& run) {
   require_sane(settings, source->info());
   report = {};
+  NormalsSettings search = settings;
+  const std::uint64_t by_grid = take_grid_normals(source, search, run);
   std::unique_ptr<RowNormals> found;
-  meshes::with_threads(run.threads, [&] { found = Job(*source, settings, report, run).work(); });
+  meshes::with_threads(run.threads, [&] { found = Job(*source, search, report, run).work(); });
+  report.estimated += by_grid;
+  report.by_viewpoint += by_grid;
   return give_normals(std::move(source), std::move(found));
 }
 

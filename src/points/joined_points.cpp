@@ -8,6 +8,7 @@
 
 #include "lamina/error.h"
 #include "lamina/points.h"
+#include "points/scan_grid.h"
 
 namespace lamina {
 namespace {
@@ -41,7 +42,7 @@ ScalarType wider(ScalarType a, ScalarType b) {
   return std::max(byte_size(a), byte_size(b)) == 4 ? ScalarType::float64 : ScalarType::int32;
 }
 
-class JoinedPoints final : public PointSource {
+class JoinedPoints final : public PointSource, public OrganisedPoints {
  public:
   explicit JoinedPoints(std::vector<std::unique_ptr<PointSource>> sources) {
     info_ = sources.front()->info();
@@ -77,6 +78,14 @@ class JoinedPoints final : public PointSource {
       copy(*part, piece, done, out);
       done += piece.size();
     }
+  }
+
+  [[nodiscard]] std::vector<PlacedGrid> grids() const override {
+    std::vector<PlacedGrid> placed;
+    for (const Part& part : parts_) {
+      for (const PlacedGrid& g : grids_of(*part.source)) placed.push_back({part.first + g.first, g.grid});
+    }
+    return placed;
   }
 
  private:

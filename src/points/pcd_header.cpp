@@ -142,6 +142,7 @@ class HeaderParser {
     if (has_size && (*width_ > kMost || *height_ > kMost)) fail_header("WIDTH or HEIGHT is absurd");
     if (!points_ && !has_size) fail_header("the header has neither POINTS nor WIDTH and HEIGHT");
     header_.points = points_ ? *points_ : *width_ * *height_;
+    if (has_size && *height_ > 1 && *width_ > 1) header_.width = *width_;
     if (has_size && *width_ * *height_ != header_.points) {
       fail_header(fmt::format("POINTS is {}, but WIDTH times HEIGHT {}", header_.points, *width_ * *height_));
     }

@@ -11,6 +11,7 @@
 #include "points/lzf.h"
 #include "points/pcd_ascii.h"
 #include "points/pcd_header.h"
+#include "points/scan_grid.h"
 
 namespace lamina {
 namespace {
@@ -156,6 +157,19 @@ class CompressedPcd final : public PointSource {
   std::vector<BinaryRows> layouts_;
 };
 
+std::unique_ptr<PointSource> open_encoded(InputFile file, const PcdHeader& header, PointSourceInfo info,
+                                          const std::string& tmp_dir) {
+  switch (header.data) {
+    case PcdData::ascii:
+      return open_ascii_pcd(std::move(file), header, std::move(info));
+    case PcdData::binary:
+      return std::make_unique<BinaryPcd>(std::move(file), header, std::move(info));
+    case PcdData::binary_compressed:
+      break;
+  }
+  return std::make_unique<CompressedPcd>(file, header, std::move(info), tmp_dir);
+}
+
 }  // namespace
 
 std::unique_ptr<PointSource> open_pcd(InputFile file, const std::string& path, const std::string& tmp_dir) {
@@ -166,15 +180,14 @@ std::unique_ptr<PointSource> open_pcd(InputFile file, const std::string& path, c
   info.path = path;
   info.count = header.points;
   remark(header, file.name, info);
-  switch (header.data) {
-    case PcdData::ascii:
-      return open_ascii_pcd(std::move(file), header, std::move(info));
-    case PcdData::binary:
-      return std::make_unique<BinaryPcd>(std::move(file), header, std::move(info));
-    case PcdData::binary_compressed:
-      break;
-  }
-  return std::make_unique<CompressedPcd>(file, header, std::move(info), tmp_dir);
+  // An organised cloud is a sensor's picture, taken from where its coordinates begin unless VIEWPOINT says otherwise.
+  if (header.width > 0 && !header.has_viewpoint) info.scans = {{0, ScanPart::Scanner::position, {0, 0, 0}}};
+  std::unique_ptr<PointSource> source = open_encoded(std::move(file), header, std::move(info), tmp_dir);
+  // Rows are known to be there by now; all places have one, of which some are not finite.
+  if (header.width == 0 || source->info().count != header.points) return source;
+  const auto grid = std::make_shared<ScanGrid>(header.width);
+  for (std::uint64_t row = 0; row < header.points; ++row) grid->add(true);
+  return organised_points(std::move(source), grid);
 }
 
 }  // namespace lamina

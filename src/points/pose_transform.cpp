@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "lamina/error.h"
+#include "points/scan_grid.h"
 
 namespace lamina {
 
@@ -70,7 +71,7 @@ void PoseTransform::apply(SampleBatch& batch, std::size_t begin, std::size_t end
 
 namespace {
 
-class PosedPoints final : public PointSource {
+class PosedPoints final : public PointSource, public OrganisedPoints {
  public:
   PosedPoints(std::unique_ptr<PointSource> source, const Pose& pose, bool seen_along_z)
       : source_(std::move(source)), transform_(pose, source_->info().path) {
@@ -90,6 +91,8 @@ class PosedPoints final : public PointSource {
     source_->read(first, count, out);
     transform_.apply(out, 0, out.size());
   }
+
+  [[nodiscard]] std::vector<PlacedGrid> grids() const override { return grids_of(*source_); }
 
  private:
   std::unique_ptr<PointSource> source_;

@@ -10,6 +10,7 @@
 #include "points/number.h"
 #include "points/pose_transform.h"
 #include "points/row_parser.h"
+#include "points/scan_grid.h"
 #include "points/text_file.h"
 
 namespace lamina {
@@ -32,7 +33,7 @@ bool is_return(std::string_view line) {
   return !is_missing(line);
 }
 
-class PtxPoints final : public PointSource {
+class PtxPoints final : public PointSource, public OrganisedPoints {
  public:
   PtxPoints(InputFile file, const std::string& path) : file_(std::move(file)), line_end_(line_end_of(file_)) {
     info_.path = path;
@@ -74,11 +75,18 @@ class PtxPoints final : public PointSource {
     }
   }
 
+  [[nodiscard]] std::vector<PlacedGrid> grids() const override {
+    std::vector<PlacedGrid> placed;
+    for (const Scan& scan : scans_) placed.push_back({scan.first, scan.grid});
+    return placed;
+  }
+
  private:
   struct Scan {
     std::uint64_t first = 0;
     PoseTransform transform;
     RowIndex rows;
+    std::shared_ptr<const ScanGrid> grid;
   };
 
   /// The next line of a scan's header: `wanted` numbers.
@@ -131,7 +139,9 @@ class PtxPoints final : public PointSource {
         const std::vector<double> values = next_header_line(lines, 4);
         for (std::size_t r = 0; r < 4; ++r) pose[r][c] = values[r];
       }
-      Scan scan{info_.count, PoseTransform(pose, fmt::format("{}, line {}", file_.name, matrix_line)), {}};
+      Scan scan{info_.count, PoseTransform(pose, fmt::format("{}, line {}", file_.name, matrix_line)), {}, {}};
+      const auto grid = std::make_shared<ScanGrid>(std::max<std::uint64_t>(down, 1));  // column by column
+      scan.grid = grid;
       for (std::uint64_t left = across * down; left > 0; --left) {
         if (!lines.next(line)) {
           throw Error(
@@ -145,7 +155,9 @@ class PtxPoints final : public PointSource {
           values_ = words.size();
           values_line_ = lines.line();
         }
-        if (!is_missing(line)) scan.rows.add(lines);
+        const bool filled = !is_missing(line);
+        grid->add(filled);
+        if (filled) scan.rows.add(lines);
       }
       if (scan.rows.count() > 0)
         info_.scans.push_back({info_.count, ScanPart::Scanner::position, {pose[0][3], pose[1][3], pose[2][3]}});

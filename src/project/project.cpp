@@ -103,6 +103,7 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
   std::atomic<std::uint64_t> seen = 0;
   std::atomic<std::uint64_t> good = 0;
   std::atomic<std::uint64_t> torn = 0;
+  std::atomic<std::uint64_t> sums = 0;
   // The sweep goes up: what no batch of this slab wants, none of the next ones will.
   std::size_t lowest = std::numeric_limits<std::size_t>::max();
   for (const auto& batch : batches) lowest = std::min(lowest, batch.front());
@@ -127,6 +128,7 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
       store_values(window, level, work[t], local.queries, state, local.fit);
       seen.fetch_add(tally.seen, std::memory_order_relaxed);
       good.fetch_add(tally.good, std::memory_order_relaxed);
+      sums.fetch_add(state.sums, std::memory_order_relaxed);
       torn.fetch_add(tally.torn, std::memory_order_relaxed);
       corners.fetch_add(local.queries.size(), std::memory_order_relaxed);
     };
@@ -193,6 +195,7 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
   counts_.seen += seen;
   counts_.good += good;
   counts_.torn += torn;
+  counts_.sums += sums;
   constexpr std::uint64_t kEnough = 256;
   const double share = seen < kEnough ? 0.0 : static_cast<double>(torn) / static_cast<double>(seen);
   if (share > counts_.torn_share) {

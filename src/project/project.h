@@ -16,6 +16,7 @@ struct ProjectSettings {
   Fit fit = Fit::sphere;  ///< sphere: algebraic sphere (Guennebaud & Gross 2007); plane: METHOD 3.2
   bool centres = false;   ///< project the centres of leaf cells instead of corners (METHOD 3.3; see diffuse.h)
   int steps = 1;          ///< N >= 1: almost orthogonal projection steps (Alexa & Adamson 2004)
+  float tolerance = 0;    ///< a point is done when a step moves it no more than so many supports; 0: next to nothing
   float band = 2.25F;     ///< a corner keeps a value only if a sample lies this near, in cells of the sample's level
   /// A point whose samples' mean normal is shorter than this sees two sheets, or one bent sharply, and counts only the
   /// samples on its own side, that face where the mean does; 0: all count always.
@@ -29,6 +30,7 @@ struct ProjectCounts {
   std::uint64_t corners = 0;  ///< corners projected
   std::uint64_t seen = 0;     ///< of these, with samples in reach
   std::uint64_t good = 0;     ///< of these, trusted
+  std::uint64_t sums = 0;     ///< how often samples were summed up at one: once for each of its steps
   std::uint64_t torn =
       0;  ///< of those with samples, whose normals contradict each other: their mean is under half long
   /// The slab with the largest share of those, among slabs with enough corners to tell.

@@ -90,6 +90,7 @@ void list_queries(const Work& work, std::vector<Query>& out) {
 void start(TileState& state, const std::vector<Query>& queries, std::size_t channels, float shift) {
   fill(state.all, queries.size(), channels, [&](std::size_t i) { return point_of(queries[i], shift); });
   state.stepped = false;
+  state.sums = queries.size();
 }
 
 void accumulate(const Kernel& kernel, const RowSamples& rows, TileState& state, std::size_t channels) {
@@ -153,7 +154,8 @@ bool advance(const Kernel& kernel, const ProjectSettings& settings, TileState& s
       const Point corner = point_of(queries[number(i)], shift);
       const Point p{corner.x - d * out.nx[l], corner.y - d * out.ny[l], corner.z - d * out.nz[l]};
       const Point by{p.x - here.x, p.y - here.y, p.z - here.z};
-      if (by.x * by.x + by.y * by.y + by.z * by.z <= kStill * kStill) continue;
+      const float still = std::max(kStill, settings.tolerance * sums[kWR][l] / sums[kW][l]);
+      if (by.x * by.x + by.y * by.y + by.z * by.z <= still * still) continue;
       moving.push_back(number(i));
       to.push_back(p);
       facing.push_back(behind ? Point{out.nx[l], out.ny[l], out.nz[l]} : Point{});
@@ -163,6 +165,7 @@ bool advance(const Kernel& kernel, const ProjectSettings& settings, TileState& s
   settle(kernel, settings, state, queries, channels);
   state.moving = std::move(moving);
   if (state.moving.empty()) return false;
+  state.sums += state.moving.size();
   fill(state.moved, to.size(), channels, [&](std::size_t i) { return to[i]; });
   if (any_facing) {
     state.moved.facing.resize(state.moved.points.size());

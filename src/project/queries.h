@@ -34,6 +34,7 @@ struct TileState {
   Lot all;                            ///< every query's
   std::vector<std::uint32_t> moving;  ///< queries that go on, after the first pass
   Lot moved;                          ///< of those
+  std::uint64_t sums = 0;             ///< points summed up so far, those of every pass
   bool stepped = false;               ///< `moved` is the one to add samples to
 };
 

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "chunk/part_slabs.h"
+#include "holes/rim_bytes.h"
 #include "lamina/error.h"
 #include "mesh_sink/records.h"
 
@@ -26,11 +27,15 @@ RankSlabs::RankSlabs(const SlabSpan& span, MeshSinkSettings layout, const std::s
 
 void RankSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {
   if (slab.slab < span_.begin) {
-    if (slab.slab == span_.begin - 1) below_ = mark_of(vertices, layout_);
+    if (slab.slab == span_.begin - 1) {
+      below_ = mark_of(vertices, layout_);
+      stands_on_ = vertices;
+    }
     first_ += vertices.size();
     return;
   }
   if (slab.slab >= span_.end) return;
+  if (!begun_) finder_ = holes::RimFinder(first_, stands_on_);
   begun_ = true;
   require_writable(vertices, layout_.attributes, layout_.double_positions, vertices_);
   const std::size_t record = vertex_record_bytes(layout_.attributes, layout_.double_positions);
@@ -45,6 +50,18 @@ void RankSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {
   put(faces_, std::as_bytes(std::span(relative_)));
   vertices_ += vertices.size();
   triangles_ += relative_.size();
+  piece_.clear();
+  finder_.add(vertices, slab.triangles, piece_);
+  if (!piece_.empty()) holes::pack(piece_, rims_);
+}
+
+std::vector<std::byte> RankSlabs::take_rims() {
+  if (begun_) {
+    piece_.clear();
+    finder_.finish(/*more=*/true, piece_);
+    holes::pack(piece_, rims_);
+  }
+  return std::move(rims_);
 }
 
 void RankSlabs::put(Spill& spill, std::span<const std::byte> bytes) {

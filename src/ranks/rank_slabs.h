@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "chunk/part_file.h"
+#include "holes/rim_finder.h"
 #include "surface/mesh_output.h"
 
 namespace lamina::ranks {
@@ -28,6 +29,8 @@ class RankSlabs : public SlabSink {
   [[nodiscard]] std::uint64_t disk_bytes() const { return records_.bytes + faces_.bytes; }
   /// After the sweep: hands over all of it, piece by piece, in order.
   void read_vertices(const std::function<void(std::span<const std::byte>)>& take);
+  /// After the sweep, once: the part's rims, packed (rim_bytes.h).
+  std::vector<std::byte> take_rims();
   void read_triangles(const std::function<void(std::span<const PartTriangle>)>& take);
 
  private:
@@ -45,6 +48,10 @@ class RankSlabs : public SlabSink {
   std::string directory_;
   Spill records_, faces_;
   bool begun_ = false;
+  VertexBatch stands_on_;  ///< vertices of the slab below the part
+  holes::RimFinder finder_;
+  holes::RimPiece piece_;
+  std::vector<std::byte> rims_;  ///< packed
   SlabMark below_, last_;
   std::uint64_t first_ = 0;  ///< vertices below the part, as the clusterer counts
   std::uint64_t vertices_ = 0, triangles_ = 0;

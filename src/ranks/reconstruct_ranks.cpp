@@ -16,6 +16,7 @@
 #include "ranks/read_together.h"
 #include "ranks/sum_stats.h"
 #include "ranks/write_together.h"
+#include "surface/closing_slabs.h"
 #include "surface/kept_input.h"
 #include "surface/pipeline.h"
 
@@ -30,6 +31,12 @@ bool is_store(const SurfaceSettings& settings) {
 void check_job(const SurfaceSettings& settings, const RunContext& run, bool first) {
   check_settings(settings);
   require_mesh_alone(settings, "mpirun");
+  if (!is_store(settings) && (settings.clean.looks_around() || !settings.clean.pick.takes_all())) {
+    throw Error(
+        ExitCode::usage,
+        "ranks that share out an input's rows cannot clean them: clean the points before, with 'lamina clean', "
+        "or put them into a store with the same options, 'lamina sort IN... --store DIR', and give mpirun that");
+  }
   if (settings.output == "-")
     throw Error(ExitCode::usage, "several ranks write one file together: give --output a name");
   if (!first) return;
@@ -110,8 +117,8 @@ class Job {
     });
     own_.sweeping = Stopwatch::now().wall - before;
     watch_.time("commit", [&] {
-      const Place place =
-          write_together(ranks_, span, *part, settings_.output, settings_.input, resolved.plan.samples, run_);
+      const Place place = write_together(ranks_, span, *part, settings_.output, settings_.input, resolved.plan.samples,
+                                         longest_closed(settings_), stats_.holes, run_);
       stats_.vertices = place.vertices;
       stats_.triangles = place.triangles;
     });

@@ -33,23 +33,15 @@ void sum_stats(Ranks& ranks, SurfaceStats& stats) {
   constexpr double kMicro = 1e-6;
   auto cpu = static_cast<std::uint64_t>(std::llround(stats.cpu / kMicro));
   ClusterCounts& c = stats.clusters;
-  std::vector<std::uint64_t*> counts{&undersampled,
-                                     &cpu,
-                                     &stats.corners,
-                                     &stats.corners_seen,
-                                     &stats.corners_good,
-                                     &stats.corners_torn,
-                                     &stats.isovertices,
-                                     &stats.isotriangles,
-                                     &stats.rejected_loops,
-                                     &stats.general_cells,
-                                     &stats.crossing_cells,
-                                     &stats.disk_bytes,
-                                     &c.corners,
-                                     &c.collapsed,
-                                     &c.patches,
-                                     &c.kept_isovertices,
-                                     &c.hard};
+  std::vector<std::uint64_t*> counts{&undersampled,        &cpu,
+                                     &stats.corners,       &stats.corner_sums,
+                                     &stats.corners_seen,  &stats.corners_good,
+                                     &stats.corners_torn,  &stats.isovertices,
+                                     &stats.isotriangles,  &stats.rejected_loops,
+                                     &stats.general_cells, &stats.crossing_cells,
+                                     &stats.disk_bytes,    &c.corners,
+                                     &c.collapsed,         &c.patches,
+                                     &c.kept_isovertices,  &c.hard};
   for (std::uint64_t& cells : stats.leaf_cells) counts.push_back(&cells);
   std::vector<std::uint64_t> values;
   values.reserve(counts.size());

@@ -2,12 +2,15 @@
 
 #include <fmt/format.h>
 
+#include <array>
 #include <filesystem>
 #include <limits>
 #include <optional>
 
 #include "chunk/merge_parts.h"
 #include "files/output_file.h"
+#include "holes/hole_closer.h"
+#include "holes/rim_bytes.h"
 #include "lamina/error.h"
 #include "mesh_sink/mesh_header.h"
 #include "mesh_sink/records.h"
@@ -58,6 +61,40 @@ void write_part(SharedFile& file, RankSlabs& part, const Place& place, bool firs
   });
 }
 
+/// What rank 0 finds closes the holes of all; of the others, only how much there is.
+holes::Addition close_together(Ranks& ranks, RankSlabs& part, const std::vector<Border>& borders, double longest,
+                               Place& place, HoleStats& stats) {
+  const std::vector<Bytes> rims = ranks.gather(part.take_rims());
+  holes::Addition addition;
+  std::array<std::uint64_t, 2> added{};
+  ranks.together([&] {
+    if (!ranks.first()) return;
+    holes::HoleCloser closer(longest, part.layout().attributes.size());
+    std::uint64_t first = 0;
+    for (std::size_t r = 0; r < rims.size(); ++r) {
+      if (borders[r].any) closer.add_part(holes::unpack(rims[r]), first);
+      first += borders[r].vertices;
+    }
+    addition = closer.finish(place.vertices);
+    stats = closer.stats();
+    added = {addition.vertices.size(), addition.triangles.size()};
+  });
+  ranks.sum(added);
+  place.vertices += added[0];
+  place.triangles += added[1];
+  return addition;
+}
+
+void write_addition(SharedFile& file, const RankSlabs& part, const Place& place, const holes::Addition& addition) {
+  const std::uint64_t record = vertex_record_bytes(part.layout().attributes, part.layout().double_positions);
+  const std::uint64_t own = place.vertices - addition.vertices.size();
+  const std::uint64_t header = make_header(part, place).size();
+  file.write(header + own * record, encode_addition(addition.vertices, part.layout(), own));
+  const std::uint64_t faces = place.triangles - addition.triangles.size();
+  file.write(header + place.vertices * record + faces * kFaceRecordBytes,
+             encode_addition(addition.triangles, place.vertices));
+}
+
 }  // namespace
 
 Place find_place(std::span<const Border> parts, std::size_t rank, const std::string& name) {
@@ -92,7 +129,8 @@ Place find_place(std::span<const Border> parts, std::size_t rank, const std::str
 }
 
 Place write_together(Ranks& ranks, const SlabSpan& span, RankSlabs& part, const std::string& output,
-                     const std::string& input, std::uint64_t samples, const RunContext& run) {
+                     const std::string& input, std::uint64_t samples, double close_holes, HoleStats& closed,
+                     const RunContext& run) {
   const std::vector<Border> borders =
       gather_borders(ranks, {span, part.any(), part.below(), part.last(), part.vertices(), part.triangles()});
   Place place;
@@ -101,6 +139,9 @@ Place write_together(Ranks& ranks, const SlabSpan& span, RankSlabs& part, const 
   ranks.together([&] {
     place = find_place(borders, static_cast<std::size_t>(ranks.rank()), output);
     if (place.triangles == 0) no_surface(input, samples);
+  });
+  const holes::Addition addition = close_together(ranks, part, borders, close_holes, place, closed);
+  ranks.together([&] {
     if (!ranks.first()) return;
     file.emplace(output, std::string());
     staged = std::filesystem::absolute(file->staged()).string();
@@ -112,7 +153,10 @@ Place write_together(Ranks& ranks, const SlabSpan& span, RankSlabs& part, const 
   staged = Unpacker(bytes).get_text();
   {
     SharedFile shared(ranks, staged, output);
-    ranks.together([&] { write_part(shared, part, place, ranks.first(), run); });
+    ranks.together([&] {
+      write_part(shared, part, place, ranks.first(), run);
+      if (ranks.first()) write_addition(shared, part, place, addition);
+    });
     shared.close();
   }
   ranks.together([&] {

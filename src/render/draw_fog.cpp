@@ -1,14 +1,13 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/RayIntersector.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
 #include "render/draw.h"
+#include "render/grid_colours.h"
+#include "render/ray_field.h"
 #include "render/shade.h"
 #include "volume/fog_data.h"
 
@@ -28,10 +27,6 @@ using Intersector = openvdb::tools::VolumeRayIntersector<FloatGrid>;
 constexpr double kDepthOfAll = 36;
 constexpr double kOpaque = 0.995;
 
-Vec3d to_vdb(const Eigen::Vector3d& v) {
-  return {v[0], v[1], v[2]};
-}
-
 /// Light that is gathered along a ray from the viewer on.
 struct Gathered {
   Rgb light{};
@@ -42,8 +37,12 @@ struct Gathered {
 class Marcher {
  public:
   Marcher(const FogVolume::Data& fog, const FloatGrid& cubes, const RenderSettings& settings, const View& view)
-      : intersector_(cubes, 1), values_(fog.grid->tree()), fog_(fog), settings_(settings), view_(view) {
-    if (fog.colours) colours_.emplace(fog.colours->tree());
+      : intersector_(cubes, 1),
+        values_(fog.grid->tree()),
+        colours_(fog.colours),
+        fog_(fog),
+        settings_(settings),
+        view_(view) {
     const CoordBBox box = fog.grid->evalActiveVoxelBoundingBox();
     const openvdb::math::Transform& transform = fog.grid->transform();
     const double diagonal = (transform.indexToWorld(box.max()) - transform.indexToWorld(box.min())).length();
@@ -90,27 +89,17 @@ class Marcher {
                                  static_cast<float>(outward[2])};
     Rgb base = kClay;
     if (settings_.colour == ColourMode::normals) base = normal_colour(n);
-    if (settings_.colour == ColourMode::automatic && colours_) base = colour(at);
+    if (settings_.colour == ColourMode::automatic)
+      base = colours_.at(fog_.grid->transform().indexToWorld(at)).value_or(kClay);
     // Where the density is even, light comes from everywhere.
     Eigen::Vector3f facing = known ? view_.direction(n) : Eigen::Vector3f(0, 0, 1);
     facing.z() = std::abs(facing.z());
     return lit(base, facing, false);
   }
 
-  Rgb colour(const Vec3d& at) const {
-    const Vec3d world = fog_.grid->transform().indexToWorld(at);
-    const openvdb::Vec3s c = Sampler::sample(*colours_, fog_.colours->transform().worldToIndex(world));
-    Rgb out;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const float byte = 255 * c[static_cast<int>(i)];
-      out[i] = decode(static_cast<std::uint8_t>(byte > 0 ? std::min(byte, 255.0F) + 0.5F : 0.0F));
-    }
-    return out;
-  }
-
   Intersector intersector_;
   FloatGrid::ConstAccessor values_;
-  std::optional<openvdb::Vec3SGrid::ConstAccessor> colours_;
+  GridColours colours_;
   const FogVolume::Data& fog_;
   const RenderSettings& settings_;
   const View& view_;
@@ -150,40 +139,15 @@ void draw_fog(const FogVolume& fog, const RenderSettings& settings, const View& 
   // OpenVDB's intersector wants cubic voxels; rays are given in index space, where all are.
   const FloatGrid::ConstPtr cubes =
       data.grid->copyReplacingTransform(openvdb::math::Transform::createLinearTransform(1.0));
-  const openvdb::math::Transform& transform = data.grid->transform();
-  const CoordBBox box = data.grid->evalActiveVoxelBoundingBox();
-  const Vec3d low = transform.indexToWorld(box.min()), high = transform.indexToWorld(box.max());
-  const Vec3d ball = 0.5 * (low + high), toward = to_vdb(view.toward);
-  double reach = 0;
-  for (int i = 0; i < 8; ++i) {
-    const Coord corner((i & 1) != 0 ? box.max()[0] + 1 : box.min()[0] - 1,
-                       (i & 2) != 0 ? box.max()[1] + 1 : box.min()[1] - 1,
-                       (i & 4) != 0 ? box.max()[2] + 1 : box.min()[2] - 1);
-    reach = std::max(reach, (transform.indexToWorld(corner) - ball).length());
-  }
-  const double farthest = toward.dot(ball - to_vdb(view.centre)) + reach;
-  const double start = std::min<double>(farthest, view.near);
-  const double length = start - farthest + 2 * reach;
-  if (!(length > 0)) return;
-  const Marcher prototype(data, *cubes, settings, view);
-  tbb::parallel_for(tbb::blocked_range<int>(0, view.tile.height), [&](const tbb::blocked_range<int>& rows) {
-    Marcher march = prototype;
-    for (int row = rows.begin(); row < rows.end(); ++row) {
-      for (int column = 0; column < view.tile.width; ++column) {
-        const double right = (column + 0.5 - 0.5 * view.tile.width) / view.scale;
-        const double up = (0.5 * view.tile.height - row - 0.5) / view.scale;
-        const Vec3d begin = to_vdb(view.centre + right * view.right + up * view.up + start * view.toward);
-        const Vec3d from = transform.worldToIndex(begin), to = transform.worldToIndex(begin - length * toward);
-        const double steps = (to - from).length();
-        if (!(steps > 2 * openvdb::math::Delta<double>::value())) continue;
-        const Ray ray(from, (to - from) / steps, openvdb::math::Delta<double>::value(), steps);
-        const Gathered g = march(ray, length / steps);
-        if (!(g.opacity > 0)) continue;
-        const auto depth = static_cast<float>(start - g.depth * length / steps);
-        const int x = view.tile.x + column, y = view.tile.y + row;
-        if (canvas.visible(x, y, depth)) canvas.blend(x, y, depth, g.light, static_cast<float>(g.opacity));
-      }
-    }
+  const RayField field(*data.grid, view);
+  if (!field.any()) return;
+  field.cast(Marcher(data, *cubes, settings, view), [&](Marcher& march, const PixelRay& r) {
+    const double least = openvdb::math::Delta<double>::value();
+    if (!(r.steps > 2 * least)) return;
+    const Gathered g = march(Ray(r.from, r.direction, least, r.steps), field.length() / r.steps);
+    if (!(g.opacity > 0)) return;
+    const auto depth = static_cast<float>(field.start() - g.depth * field.length() / r.steps);
+    if (canvas.visible(r.x, r.y, depth)) canvas.blend(r.x, r.y, depth, g.light, static_cast<float>(g.opacity));
   });
 }
 

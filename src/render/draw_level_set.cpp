@@ -1,13 +1,13 @@
 #include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/RayIntersector.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "render/draw.h"
+#include "render/grid_colours.h"
+#include "render/ray_field.h"
 #include "render/shade.h"
 #include "volume/level_set_data.h"
 #include "volume/vdb_file.h"
@@ -22,10 +22,6 @@ using Ray = openvdb::math::Ray<double>;
 using Sampler = openvdb::tools::BoxSampler;
 
 constexpr double kDifference = 1.0;  // voxels to either side of a gradient's difference
-
-Vec3d to_vdb(const Eigen::Vector3d& v) {
-  return {v[0], v[1], v[2]};
-}
 
 // OpenVDB's ray intersector wants a level set of cubic voxels. Rays are given in index space, where any linear
 // transform's voxels are cubes.
@@ -113,9 +109,7 @@ class BandSearch {
 class Caster {
  public:
   Caster(const FloatGrid& grid, const LevelSet::Data& level_set)
-      : intersector_(grid), values_(grid.tree()), data_(level_set) {
-    if (level_set.colours) colours_.emplace(level_set.colours->tree());
-  }
+      : intersector_(grid), values_(grid.tree()), colours_(level_set.colours), data_(level_set) {}
 
   // The first point of the surface along the ray, index space.
   bool hit(const Ray& ray, Vec3d& at) {
@@ -143,23 +137,14 @@ class Caster {
     return out.normalize() ? out : Vec3d(0);
   }
 
-  std::optional<Rgb> colour(const Vec3d& world) const {
-    if (!colours_) return std::nullopt;
-    const openvdb::Vec3s c = Sampler::sample(*colours_, data_.colours->transform().worldToIndex(world));
-    Rgb out;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const float byte = 255 * c[static_cast<int>(i)];
-      out[i] = decode(static_cast<std::uint8_t>(byte > 0 ? std::min(byte, 255.0F) + 0.5F : 0.0F));
-    }
-    return out;
-  }
+  std::optional<Rgb> colour(const Vec3d& world) const { return colours_.at(world); }
 
  private:
   bool known(const Vec3d& at) const { return in_band(values_, at); }
 
   openvdb::tools::LevelSetRayIntersector<FloatGrid, BandSearch> intersector_;
   FloatGrid::ConstAccessor values_;
-  std::optional<openvdb::Vec3SGrid::ConstAccessor> colours_;
+  GridColours colours_;
   const LevelSet::Data& data_;
 };
 
@@ -182,51 +167,24 @@ void draw_level_set(const LevelSet& level_set, const RenderSettings& settings, c
   const LevelSet::Data& data = level_set.data();
   const FloatGrid::ConstPtr grid = in_index_space(*data.grid, data.open);
   const openvdb::math::Transform& transform = data.grid->transform();
-  // Rays begin and end outside the sphere around the grid.
-  const openvdb::CoordBBox box = data.grid->evalActiveVoxelBoundingBox();
-  const Vec3d low = transform.indexToWorld(box.min()), high = transform.indexToWorld(box.max());
-  const Vec3d ball = 0.5 * (low + high);
-  const Vec3d toward = to_vdb(view.toward);
-  double reach = 0;
-  for (int i = 0; i < 8; ++i) {
-    const Coord corner((i & 1) != 0 ? box.max()[0] + 1 : box.min()[0] - 1,
-                       (i & 2) != 0 ? box.max()[1] + 1 : box.min()[1] - 1,
-                       (i & 4) != 0 ? box.max()[2] + 1 : box.min()[2] - 1);
-    reach = std::max(reach, (transform.indexToWorld(corner) - ball).length());
-  }
-  const double farthest = toward.dot(ball - to_vdb(view.centre)) + reach;
-  const double start = std::min<double>(farthest, view.near);
-  const double length = start - farthest + 2 * reach;
-  if (!(length > 0)) return;
-  const Caster prototype(*grid, data);
-  tbb::parallel_for(tbb::blocked_range<int>(0, view.tile.height), [&](const tbb::blocked_range<int>& rows) {
-    Caster caster = prototype;
-    for (int row = rows.begin(); row < rows.end(); ++row) {
-      for (int column = 0; column < view.tile.width; ++column) {
-        const double right = (column + 0.5 - 0.5 * view.tile.width) / view.scale;
-        const double up = (0.5 * view.tile.height - row - 0.5) / view.scale;
-        const Vec3d begin = to_vdb(view.centre + right * view.right + up * view.up + start * view.toward);
-        const Vec3d from = transform.worldToIndex(begin), to = transform.worldToIndex(begin - length * toward);
-        const double steps = (to - from).length();
-        Vec3d at;
-        if (!caster.hit(Ray(from, (to - from) / steps, 0, steps), at)) continue;
-        const Vec3d world = transform.indexToWorld(at);
-        const auto depth = static_cast<float>(toward.dot(world - to_vdb(view.centre)));
-        const int x = view.tile.x + column, y = view.tile.y + row;
-        if (!canvas.visible(x, y, depth)) continue;
-        const Vec3d n = caster.normal(at);
-        const std::array<float, 3> outward{static_cast<float>(n[0]), static_cast<float>(n[1]),
-                                           static_cast<float>(n[2])};
-        Rgb base = kClay;
-        if (settings.colour == ColourMode::normals) base = normal_colour(outward);
-        if (settings.colour == ColourMode::automatic) base = caster.colour(world).value_or(kClay);
-        Eigen::Vector3f facing = view.direction(outward);
-        const bool back = facing.z() < 0;
-        if (back) facing = -facing;
-        if (!(facing.norm() > 0)) facing = Eigen::Vector3f::UnitZ();
-        canvas.set(x, y, depth, lit(base, facing, back));
-      }
-    }
+  const RayField field(*data.grid, view);
+  if (!field.any()) return;
+  field.cast(Caster(*grid, data), [&](Caster& caster, const PixelRay& r) {
+    Vec3d at;
+    if (!caster.hit(Ray(r.from, r.direction, 0, r.steps), at)) return;
+    const Vec3d world = transform.indexToWorld(at);
+    const auto depth = static_cast<float>(to_vdb(view.toward).dot(world - to_vdb(view.centre)));
+    if (!canvas.visible(r.x, r.y, depth)) return;
+    const Vec3d n = caster.normal(at);
+    const std::array<float, 3> outward{static_cast<float>(n[0]), static_cast<float>(n[1]), static_cast<float>(n[2])};
+    Rgb base = kClay;
+    if (settings.colour == ColourMode::normals) base = normal_colour(outward);
+    if (settings.colour == ColourMode::automatic) base = caster.colour(world).value_or(kClay);
+    Eigen::Vector3f facing = view.direction(outward);
+    const bool back = facing.z() < 0;
+    if (back) facing = -facing;
+    if (!(facing.norm() > 0)) facing = Eigen::Vector3f::UnitZ();
+    canvas.set(r.x, r.y, depth, lit(base, facing, back));
   });
 }
 

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <zlib.h>
 
-#include <array>
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <string_view>
@@ -17,6 +17,10 @@ namespace lamina {
 namespace {
 
 constexpr std::string_view kMagic = "lamina store 1\n";
+/// Of a store that has been cleaned: every bucket's blocks are followed by which of their samples stay. As long as the
+/// other.
+constexpr std::string_view kCleanedMagic = "lamina store 2\n";
+static_assert(kMagic.size() == kCleanedMagic.size());
 constexpr const char* kIndexName = "index";
 
 /// Little-endian numbers one after the other.
@@ -53,9 +57,36 @@ class ByteReader {
   bool good_ = true;
 };
 
+/// A bit for each sample, lowest first, in whole bytes; none where all stay.
+void put_keep(const std::vector<bool>& keep, Bytes& out) {
+  out.put(std::uint64_t{keep.size()});
+  constexpr std::size_t kBits = 8;
+  for (std::size_t i = 0; i < keep.size(); i += kBits) {
+    unsigned byte = 0;
+    for (std::size_t bit = 0; bit < kBits && i + bit < keep.size(); ++bit) byte |= unsigned{keep[i + bit]} << bit;
+    out.put(static_cast<std::uint8_t>(byte));
+  }
+}
+
+/// False when the bits are not those of so many samples.
+bool take_keep(ByteReader& in, std::uint64_t samples, std::vector<bool>& keep) {
+  const auto size = in.take<std::uint64_t>();
+  constexpr std::uint64_t kBits = 8;
+  if (size == 0) return in.good();
+  if (size != samples || (size - 1) / kBits >= in.left()) return false;
+  keep.resize(size);
+  unsigned byte = 0;
+  for (std::uint64_t i = 0; i < size; ++i) {
+    if (i % kBits == 0) byte = in.take<std::uint8_t>();
+    keep[i] = (byte >> (i % kBits) & 1U) != 0;
+  }
+  return in.good();
+}
+
 std::vector<std::byte> index_bytes(std::size_t files, const std::vector<BucketIndex>& buckets) {
   Bytes out;
-  for (const char c : kMagic) out.put(c);
+  const bool cleaned = std::any_of(buckets.begin(), buckets.end(), [](const auto& b) { return !b.keep.empty(); });
+  for (const char c : cleaned ? kCleanedMagic : kMagic) out.put(c);
   out.put(std::uint64_t{files});
   out.put(std::uint64_t{buckets.size()});
   for (const BucketIndex& bucket : buckets) {
@@ -68,6 +99,7 @@ std::vector<std::byte> index_bytes(std::size_t files, const std::vector<BucketIn
       out.put(bucket.blocks[b].count);
       out.put(bucket.checksums[b]);
     }
+    if (cleaned) put_keep(bucket.keep, out);
   }
   return std::move(out.data);
 }
@@ -124,8 +156,12 @@ std::uint32_t SlabStore::save() const {
 SlabStore SlabStore::open(const std::string& directory, const StoreLayout& layout) {
   const std::string path = directory + "/" + kIndexName;
   const std::vector<std::byte> bytes = read_whole(path);
-  if (bytes.size() < kMagic.size() + sizeof(std::uint32_t) ||
-      std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0) {
+  const auto begins_with = [&](std::string_view magic) {
+    return bytes.size() >= magic.size() + sizeof(std::uint32_t) &&
+           std::memcmp(bytes.data(), magic.data(), magic.size()) == 0;
+  };
+  const bool cleaned = begins_with(kCleanedMagic);
+  if (!cleaned && !begins_with(kMagic)) {
     damaged(path, "is no index of a store, or one of another version");
   }
   const std::span<const std::byte> body(bytes.data(), bytes.size() - sizeof(std::uint32_t));
@@ -158,6 +194,11 @@ SlabStore SlabStore::open(const std::string& directory, const StoreLayout& layou
       bucket.blocks.push_back(entry);
       bucket.checksums.push_back(in.take<std::uint32_t>());
       bucket.count += entry.count;
+    }
+    if (cleaned) {
+      if (!take_keep(in, bucket.count, bucket.keep)) damaged(path, "is damaged: it says nothing of some samples");
+      if (!bucket.keep.empty())
+        bucket.count = static_cast<std::uint64_t>(std::count(bucket.keep.begin(), bucket.keep.end(), true));
     }
     impl->total += bucket.count;
   }

@@ -42,4 +42,23 @@ void clean_ingested(Ingested& in, const CleanSettings& settings, double step, co
   if (counts.merged + counts.outliers + counts.thinned > 0) in.extent = extent_of(in.store);
 }
 
+std::string cleaning_words(const CleanSettings& settings) {
+  // Every setting by name: one that is added must be dealt with here, or this does not compile.
+  const auto& [pick, merge, sigma, neighbours, spacing] = settings;
+  const auto& [clip, every] = pick;
+  std::string words;
+  const auto add = [&](bool given, const std::string& text) {
+    if (given) words += (words.empty() ? "" : " ") + text;
+  };
+  if (clip) {
+    const auto& [low, high] = *clip;
+    add(true, fmt::format("clip {},{},{},{},{},{}", low[0], low[1], low[2], high[0], high[1], high[2]));
+  }
+  add(every > 1, fmt::format("every {}", every));
+  add(merge.has_value(), fmt::format("merge {}", merge.value_or(0)));
+  add(sigma > 0, fmt::format("outliers {} neighbours {}", sigma, neighbours));
+  add(spacing > 0, fmt::format("spacing {}", spacing));
+  return words;
+}
+
 }  // namespace lamina

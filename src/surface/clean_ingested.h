@@ -12,4 +12,7 @@ namespace lamina {
 void clean_ingested(Ingested& in, const CleanSettings& settings, double step, const std::string& name,
                     const std::string& directory, CleanCounts& counts, const RunContext& run);
 
+/// What the settings leave out, in words: others where other samples stay; empty where all do.
+std::string cleaning_words(const CleanSettings& settings);
+
 }  // namespace lamina

@@ -7,6 +7,7 @@
 #include "clean/row_pick.h"
 #include "edit/batch_pipe.h"
 #include "files/descriptor.h"
+#include "ground/memory_limit.h"
 #include "lamina/error.h"
 #include "meshes/with_threads.h"
 #include "surface/ingest.h"
@@ -20,6 +21,10 @@ namespace {
 std::vector<bool> rows_to_drop(PointSource& source, const CleanSettings& settings, BadSamples bad, CleanCounts& counts,
                                const RunContext& run) {
   const std::string directory = run.tmp_dir.empty() ? system_tmp_dir() : run.tmp_dir;
+  // Measured: the store's buffers, the samples looked at together and the program; masks and the store's index.
+  constexpr std::uint64_t kProgram = std::uint64_t{92} << 20;
+  const std::uint64_t masks = source.info().count + source.info().count / 4;
+  require_memory(run, kProgram + masks, source.info().path, "cleaning");
   RunContext silent = run;  // what is left out is told by whoever writes the rows
   silent.log = nullptr;
   NumberedRows rows(source);

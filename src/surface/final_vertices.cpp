@@ -89,4 +89,24 @@ void place_levels(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* nex
   }
 }
 
+void place_curvatures(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, double step, VertexBatch& out) {
+  std::vector<float>& curvatures = out.attributes.emplace_back();
+  curvatures.reserve(slab.vertices.size());
+  const auto of = [&](SlabIndex i) { return (i.next() ? *next : here).corners[i.index()].curvature; };
+  for (const FinalVertex& v : slab.vertices) {
+    float curvature = of(v.corner);
+    if (v.kind == FinalVertex::Kind::isovertex) curvature = (1 - v.t) * curvature + v.t * of(v.other);
+    curvatures.push_back(static_cast<float>(static_cast<double>(curvature) / step));
+  }
+}
+
+void place_radii(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, double per_cell, VertexBatch& out) {
+  out.radius.clear();
+  out.radius.reserve(slab.vertices.size());
+  for (const FinalVertex& v : slab.vertices) {
+    const IsoSlab& s = v.corner.next() ? *next : here;
+    out.radius.push_back(static_cast<float>(per_cell * static_cast<double>(s.corners[v.corner.index()].cell)));
+  }
+}
+
 }  // namespace lamina

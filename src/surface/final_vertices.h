@@ -17,4 +17,10 @@ void place_vertices(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* n
 /// 0 the finest. `finest`: that level's cell, in steps.
 void place_levels(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, double finest, VertexBatch& out);
 
+/// Adds an attribute behind those that are there: mean curvature of the fit, 1 / input unit. `step`: Frame::step.
+void place_curvatures(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, double step, VertexBatch& out);
+
+/// The influence radius around each vertex: `per_cell` times the finest cell around its corner.
+void place_radii(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, double per_cell, VertexBatch& out);
+
 }  // namespace lamina

@@ -11,6 +11,7 @@
 #include "files/output_file.h"
 #include "lamina/error.h"
 #include "surface/choose_normals.h"
+#include "surface/clean_ingested.h"
 
 namespace lamina {
 namespace {
@@ -94,20 +95,35 @@ Json reading(const SurfaceSettings& settings, bool has_radius) {
   return {{"frame", frame == FrameMode::pca ? "pca" : "axis"},
           {"bad_samples", settings.bad_samples == BadSamples::drop ? "drop" : "refuse"},
           {"normals", normals_words(settings)},
+          {"cleaning", cleaning_words(settings.clean)},
           {"particlescale", has_radius ? settings.radius_scale : 1.0}};
+}
+
+bool is_asked_for(const std::string& key, const SurfaceSettings& settings) {
+  if (key == "bad_samples") return false;
+  if (key == "normals") return settings.normals != NormalsChoice::file;
+  if (key == "cleaning") return !cleaning_words(settings.clean).empty();
+  return key != "frame" || settings.frame || settings.volume.wanted();
 }
 
 void require_same_reading(const Json& stored, const SurfaceSettings& settings, bool has_radius,
                           const std::string& directory) {
   const Json wanted = reading(settings, has_radius);
   for (const auto& [key, value] : wanted.items()) {
-    if (key == "bad_samples" || (key == "normals" && settings.normals == NormalsChoice::file) ||
-        (key == "frame" && !settings.frame && !settings.volume.wanted()))
-      continue;
-    if (stored.at(key) == value) continue;
+    if (!is_asked_for(key, settings)) continue;
+    // Older stores know nothing of cleaning: nothing has been left out of them.
+    const Json had = stored.value(key, Json(std::string()));
+    if (had == value) continue;
+    if (key == "cleaning") {
+      const auto words = had.get<std::string>();
+      throw Error(ExitCode::usage,
+                  fmt::format("{}: was stored {}, not with {}; give 'lamina sort --store' these "
+                              "options for another store, or leave them away",
+                              directory, words.empty() ? "uncleaned" : "with " + words, value.get<std::string>()));
+    }
     throw Error(ExitCode::usage,
                 fmt::format("{}: was stored with --{} {}, not {}; make another store, or leave the option away",
-                            directory, key, stored.at(key).dump(), value.dump()));
+                            directory, key, had.dump(), value.dump()));
   }
 }
 

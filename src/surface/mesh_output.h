@@ -46,8 +46,11 @@ class MeshFileSlabs : public SlabSink {
 class MeshOutput {
  public:
   /// `chord`: SurfaceSettings::chord. `finest`: the finest level's cell where vertices are to have their level as the
-  /// last attribute, else 0. The sink is the caller's; nobody else may write to it.
-  MeshOutput(const ClusterSettings& settings, float chord, double finest, const Frame& frame, SlabSink& sink);
+  /// last attribute, else 0. `radius_per_cell`: the influence radius (input units) that goes with a cell of one step.
+  /// `curvature`: vertices have it as the last attribute.
+  /// The sink is the caller's; nobody else may write to it.
+  MeshOutput(const ClusterSettings& settings, float chord, double finest, double radius_per_cell, bool curvature,
+             const Frame& frame, SlabSink& sink);
   /// Drops what is not written yet.
   ~MeshOutput();
   MeshOutput(const MeshOutput&) = delete;
@@ -72,7 +75,8 @@ class MeshOutput {
   void work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last);
 
   float chord_;
-  double finest_;
+  double finest_, radius_per_cell_;
+  bool curvature_;
   const Frame& frame_;
   SlabSink& sink_;
   Clusterer clusterer_;

@@ -16,14 +16,24 @@ namespace {
 /// Samples whose support is more than so many of their cells leave gaps of several cells between them.
 constexpr float kSparse = 1.6F;
 
+/// Where corners themselves say how many they need.
+constexpr int kMostSteps = 16;
+
 ProjectSettings project_settings(const SurfaceSettings& s, const SupportChoice& support) {
   ProjectSettings p;
   p.fit = s.fit == FitMode::sphere ? Fit::sphere : Fit::plane;
-  p.steps = s.steps;
+  p.steps = s.steps == 0 ? kMostSteps : s.steps;
+  if (s.steps == 0) p.tolerance = static_cast<float>(s.step_tolerance / support.blend);
   p.centres = s.diffuse;
   p.band = support.band;
   p.good_reach = support.good_reach;
   return p;
+}
+
+/// Cells follow the radii, so most cells tell the median radius and larger ones as much more.
+double radius_per_cell(const Resolved& resolved) {
+  return resolved.support.blend * resolved.plan.radius_median /
+         static_cast<double>(resolved.lattice.cell_size(resolved.main_level));
 }
 
 }  // namespace
@@ -39,7 +49,8 @@ Pipeline::Pipeline(const SurfaceSettings& settings, const Resolved& resolved, co
       window_(resolved.lattice, static_cast<int>(attributes), extent),
       projector_(project_settings(settings, resolved.support), kernel_),
       output_(ClusterSettings{settings.cluster}, static_cast<float>(settings.chord),
-              settings.vertex_levels ? static_cast<double>(resolved.lattice.cell_size(0)) : 0, frame, sink),
+              settings.vertex_levels ? static_cast<double>(resolved.lattice.cell_size(0)) : 0,
+              radius_per_cell(resolved), settings.vertex_curvature, frame, sink),
       all_(all_slabs(resolved.lattice, extent)),
       stages_(stage_spans(span, all_, settings.diffuse)),
       refined_(stages_.refined.begin),
@@ -192,6 +203,7 @@ void Pipeline::report(SurfaceStats& stats) const {
   stats.corners = projector_.counts().corners;
   stats.corners_seen = projector_.counts().seen;
   stats.corners_good = projector_.counts().good;
+  stats.corner_sums = projector_.counts().sums;
   stats.corners_torn = projector_.counts().torn;
   stats.torn_slab = projector_.counts().torn_slab - all_.begin;
   stats.torn_share = projector_.counts().torn_share;

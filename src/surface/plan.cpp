@@ -88,7 +88,7 @@ std::uint64_t expected_disk(const SlabStore& store, std::uint64_t faces) {
 double expected_volume_memory(const SurfaceSettings& s, const Resolved& r, double per_slab, double cells,
                               std::uint64_t samples, std::size_t attributes) {
   if (s.volume.path.empty()) return 0;
-  constexpr double kCellsPerBrick = 25, kPlanes = 24, kBrick = 6.7e3, kRecords = 60, kBuffers = 4e6;
+  constexpr double kCellsPerBrick = 25, kPlanes = 24, kBrick = 9.1e3, kRecords = 60, kBuffers = 4e6;
   const double extra = attributes > 0 ? 3 * 2048.0 * static_cast<double>(s.volume.grids.size()) : 0;
   const double per_plane = per_slab * cells / r.lattice.layers(r.main_level);
   const double bricks = std::min(per_plane * kPlanes, static_cast<double>(samples) * cells) / kCellsPerBrick;
@@ -127,12 +127,16 @@ std::uint64_t expected_memory(const SurfaceSettings& s, const Resolved& r, const
 void check_settings(const SurfaceSettings& s) {
   require(!s.blend || (*s.blend > 0 && *s.blend <= 64), "--blend", "auto or in (0, 64]");
   require(!s.refit || (*s.refit >= 0 && *s.refit <= 8), "--refit", "auto or in 0..8");
-  require(s.steps >= 1 && s.steps <= 16, "--steps", "in 1..16");
+  require(s.steps >= 0 && s.steps <= 16, "--steps", "in 1..16, or auto");
+  require(s.step_tolerance > 0 && s.step_tolerance <= 1, "--step-tolerance", "in (0, 1], in radii");
+  require(!s.vertex_curvature || s.fit == FitMode::sphere, "--curvature",
+          "left out with --fit plane, which knows none");
   require(s.levels >= 0 && s.levels <= kMaxLevels, "--levels", "in 1..12, or 0 to choose by the radii");
   require(s.density >= 2 && s.density <= 4096, "--density", "in 2..4096");
   require(s.radius_scale > 0 && s.radius_scale <= 1000, "--particlescale", "in (0, 1000]");
   require(!s.cell || s.cell->value > 0, "--cell", "positive");
   require(s.boundary >= 0, "--boundary", "0 (no limit) or positive, in influence radii");
+  require(s.close_holes >= 0, "--close-holes", "0 (none) or positive, in influence radii");
   require(s.chord >= 0 && s.chord <= 1, "--chord", "in 0..1");
   require(s.window >= 1 && s.window <= 1024, "--window", "in 1..1024");
   require_sane(s.clean);
@@ -279,7 +283,9 @@ double expected_cpu_seconds(const SurfaceSettings& s, const Resolved& r, std::si
                                                            r.plan.radius_median);
   const double reach = std::max(1.0, influence / main_cell / kSupport);
   const double cells = 0.25 * r.plan.radius_median * r.plan.radius_median / (main_cell * main_cell);
-  const double sums = kSums * reach * reach * (1 + kStep * (s.steps - 1)) * (s.diffuse ? 2 : 1);
+  constexpr double kUsualSteps = 1.2;  // more than the first, where corners say how many
+  const double sums =
+      kSums * reach * reach * (1 + kStep * (s.steps == 0 ? kUsualSteps : s.steps - 1)) * (s.diffuse ? 2 : 1);
   const double volume = s.volume.path.empty() ? 0 : kVoxels * (2 + s.volume.band);
   const double per_sample = kSample + kAttribute * static_cast<double>(attributes) + sums + (kCell + volume) * cells;
   return static_cast<double>(r.plan.samples) * per_sample;

@@ -10,6 +10,7 @@
 
 #include "edit/record_sorter.h"
 #include "files/descriptor.h"
+#include "ground/memory_limit.h"
 #include "lamina/error.h"
 #include "meshes/with_threads.h"
 #include "surface/ingest.h"
@@ -20,7 +21,6 @@
 namespace lamina {
 namespace {
 
-constexpr std::size_t kMemory = std::size_t{256} << 20;
 constexpr std::size_t kPiece = std::size_t{1} << 15;  ///< rows written at a time
 
 /// Counts of radii by size, a hundredth of an octave wide.
@@ -163,6 +163,13 @@ class RadiusWriter {
 PointRadiiReport write_radii(PointSource& source, PointsWriter& writer, const PointRadiiSettings& settings,
                              const RunContext& run) {
   const std::string directory = run.tmp_dir.empty() ? system_tmp_dir() : run.tmp_dir;
+  const std::size_t memory = run.max_memory > 0 ? std::min(settings.memory, run.max_memory / 4) : settings.memory;
+  constexpr std::uint64_t kProgram = std::uint64_t{80} << 20;  // measured: the store's buffers, the window, the program
+  constexpr std::uint64_t kRecord = sizeof(float) + 12;
+  const std::uint64_t records = std::min<std::uint64_t>(memory, source.info().count * kRecord);
+  constexpr std::uint64_t kRow = 7;
+  require_memory(run, kProgram + records + records / 2 + kRow * source.info().count, source.info().path,
+                 "finding radii");
   RunContext silent = run;  // what is left out is told by whoever writes the rows
   silent.log = nullptr;
   NumberedRows positions(source);
@@ -174,8 +181,7 @@ PointRadiiReport write_radii(PointSource& source, PointsWriter& writer, const Po
   plan.density = settings.density;
   const Resolved resolved = resolve_plan(plan, frame, in.store, in.extent, false, NumberedRows::kDigits);
 
-  const std::size_t memory = run.max_memory > 0 ? std::min(kMemory, run.max_memory / 4) : kMemory;
-  const std::uint64_t whole = in.store.total() * (sizeof(float) + 12);
+  const std::uint64_t whole = in.store.total() * kRecord;
   edit::RecordSorter by_row(sizeof(float), static_cast<std::size_t>(std::min<std::uint64_t>(memory, whole)), directory);
   estimate(in.store, resolved.radii, by_row, run);
 

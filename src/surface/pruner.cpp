@@ -23,6 +23,7 @@ void for_arrays(Vertices& v, Triangles& t, const Visit& visit) {
   all(v.x), all(v.y), all(v.z);
   all(v.nx), all(v.ny), all(v.nz);
   for (auto& values : v.attributes) all(values);
+  all(v.radius);
   all(t);
 }
 
@@ -30,11 +31,12 @@ void resize(VertexBatch& v, std::size_t n) {
   for (auto* values : {&v.x, &v.y, &v.z}) values->resize(n);
   for (auto* values : {&v.nx, &v.ny, &v.nz}) values->resize(n);
   for (auto& values : v.attributes) values.resize(n);
+  if (!v.radius.empty()) v.radius.resize(n);
 }
 
 }  // namespace
 
-Pruner::Pruner(const PruneRule& rule, std::string tmp_dir, MeshSink& sink, std::uint64_t memory_bytes)
+Pruner::Pruner(const PruneRule& rule, std::string tmp_dir, SlabSink& sink, std::uint64_t memory_bytes)
     : rule_(rule), tmp_dir_(std::move(tmp_dir)), sink_(sink), memory_(memory_bytes) {}
 
 std::uint64_t Pruner::root(std::uint64_t id) {
@@ -199,6 +201,7 @@ void Pruner::spill(Slab& slab) {
   // Only the sizes of the arrays are still wanted.
   const std::size_t triangles = slab.triangles.size();
   const std::size_t attributes = slab.vertices.attributes.size();
+  slab.radii = !slab.vertices.radius.empty();
   slab.vertices = {};
   slab.vertices.attributes.resize(attributes);
   slab.triangles = {};
@@ -207,6 +210,7 @@ void Pruner::spill(Slab& slab) {
 
 void Pruner::fetch(Slab& slab) {
   resize(slab.vertices, slab.part.size());
+  if (slab.radii) slab.vertices.radius.resize(slab.part.size());
   slab.triangles.resize(slab.spilled_triangles);
   const std::uint64_t begin = file_begin_;
   for_arrays(slab.vertices, slab.triangles, [&](void* data, std::size_t bytes) {
@@ -258,6 +262,7 @@ void Pruner::pass_on(Slab& slab) {
     for (auto* values : {&v.x, &v.y, &v.z}) (*values)[kept] = (*values)[i];
     for (auto* values : {&v.nx, &v.ny, &v.nz}) (*values)[kept] = (*values)[i];
     for (auto& values : v.attributes) values[kept] = values[i];
+    if (!v.radius.empty()) v.radius[kept] = v.radius[i];
     ++kept;
   }
   resize(v, kept);
@@ -269,8 +274,9 @@ void Pruner::pass_on(Slab& slab) {
     if (renumbered[0] != kGone) slab.triangles[triangles++] = renumbered;
   }
   slab.triangles.resize(triangles);
-  sink_.append_vertices(v);
-  sink_.append_triangles(slab.triangles);
+  FinalSlab out;
+  out.triangles = std::move(slab.triangles);
+  sink_.write(out, v);
   written_ += kept;
   passed_first_ = slab.first;
   passed_number_ = std::move(number);

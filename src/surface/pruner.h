@@ -9,6 +9,7 @@
 #include "files/descriptor.h"
 #include "lamina/mesh_sink.h"
 #include "lamina/surface.h"
+#include "surface/mesh_output.h"
 
 namespace lamina {
 
@@ -30,7 +31,7 @@ class Pruner {
  public:
   using Triangles = std::vector<std::array<std::uint32_t, 3>>;
 
-  Pruner(const PruneRule& rule, std::string tmp_dir, MeshSink& sink, std::uint64_t memory_bytes = 32U << 20);
+  Pruner(const PruneRule& rule, std::string tmp_dir, SlabSink& sink, std::uint64_t memory_bytes = 32U << 20);
 
   /// The next slab. Triangles index vertices of this slab and of the one before, over all vertices added so far (else
   /// Error(internal)). Throws Error(budget) when the temporary file cannot grow, and what the sink throws.
@@ -61,6 +62,7 @@ class Pruner {
     std::uint64_t bytes = 0;  ///< of the arrays
     bool spilled = false;
     std::size_t spilled_triangles = 0;
+    bool radii = false;  ///< vertices have them
   };
 
   [[nodiscard]] Part& part(std::uint64_t id) { return parts_[id - first_id_]; }
@@ -79,7 +81,7 @@ class Pruner {
 
   PruneRule rule_;
   std::string tmp_dir_;
-  MeshSink& sink_;
+  SlabSink& sink_;
   std::uint64_t memory_;
   PruneCounts counts_;
 

@@ -20,6 +20,7 @@
 #include "project/refit_normals.h"
 #include "surface/choose_normals.h"
 #include "surface/clean_ingested.h"
+#include "surface/closing_slabs.h"
 #include "surface/ingest.h"
 #include "surface/kept_input.h"
 #include "surface/local_shift.h"
@@ -197,11 +198,12 @@ void expect_time(const SurfaceSettings& settings, const PointSourceInfo& source,
   plan.seconds = elapsed + slowness * (whole - reading) / (1 + kEfficiency * (plan.threads - 1));
 }
 
-void refuse_two_levels(const SurfaceSettings& settings, const PointSourceInfo& info) {
-  const auto taken = [](const AttributeSpec& a) { return a.name == "level"; };
-  if (settings.vertex_levels && std::any_of(info.attributes.begin(), info.attributes.end(), taken)) {
-    throw Error(ExitCode::usage, fmt::format("{}: the points have an attribute called level already; leave out --level",
-                                             input_name(settings)));
+void refuse_two_alike(const SurfaceSettings& settings, const PointSourceInfo& info) {
+  for (const AttributeSpec& a : info.attributes) {
+    if ((settings.vertex_levels && a.name == "level") || (settings.vertex_curvature && a.name == "curvature")) {
+      throw Error(ExitCode::usage, fmt::format("{}: the points have an attribute called {} already; leave out --{}",
+                                               input_name(settings), a.name, a.name));
+    }
   }
 }
 
@@ -216,14 +218,6 @@ void clean(Ingested& in, const SurfaceSettings& settings, double step, const std
   }
   if (const std::string said = describe(stats.cleaned); !said.empty())
     run.info(fmt::format("{} of {} samples left: {}", in.store.total(), rows, said));
-}
-
-/// What is left out is not written down with samples that are kept for several runs.
-void require_uncleaned(const SurfaceSettings& settings) {
-  if (settings.clean.looks_around() || !settings.clean.pick.takes_all())
-    throw Error(ExitCode::usage,
-                "samples that are kept for several runs cannot be cleaned as they are read; clean the "
-                "points before, with lamina clean");
 }
 
 }  // namespace
@@ -290,7 +284,6 @@ FrameMode chosen_frame(const SurfaceSettings& settings) {
 SweepInput read_surface_input(const SurfaceSettings& settings, const std::string& directory, bool keep,
                               const RunContext& run, Stopwatch& watch, SurfaceStats& stats) {
   const bool kept = settings.more_inputs.empty() && is_kept_input(settings.input);
-  if (keep || kept) require_uncleaned(settings);
   if (kept && !keep) return open_kept_input(settings.input, settings);
   const std::string scratch = keep ? temporary_directory(settings, run) : directory;
   std::unique_ptr<PointSource> source = open_inputs(settings, scratch, run);
@@ -327,7 +320,7 @@ Resolved plan_surface(const SurfaceSettings& settings, const SweepInput& input, 
       stats.rejected.push_back({describe(static_cast<Defect>(k)), census.rejected[k], census.first_row[k]});
     }
   }
-  refuse_two_levels(settings, info);
+  refuse_two_alike(settings, info);
   run.info(describe(resolved.plan));
   if (const std::string choice = describe_choice(settings, resolved.plan); !choice.empty()) run.info(choice);
   constexpr std::uint64_t kLargestTables = std::uint64_t{1} << 30;  // a scan of 380 million samples needs a few MB
@@ -356,6 +349,7 @@ MeshSinkSettings mesh_layout(const SurfaceSettings& settings, const SweepInput& 
   MeshSinkSettings out;
   out.attributes = input.info.attributes;
   if (settings.vertex_levels) out.attributes.push_back({"level", ScalarType::uint8});
+  if (settings.vertex_curvature) out.attributes.push_back({"curvature", ScalarType::float32});
   out.double_positions = needs_double(input.ingested.census, resolved.plan.finest_cell);
   return out;
 }
@@ -467,15 +461,17 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
     const PruneRule rule{settings.prune_triangles,
                          resolve(settings.prune_size, resolved.plan.radius_median, resolved.support.blend)};
     const bool prunes = rule.triangles > 0 || rule.size > 0;
-    Pruner pruner(rule, tmp, sink);
     MeshFileSlabs whole(sink);
+    ClosingSlabs closing(longest_closed(settings), out.attributes.size(), whole);
+    Pruner pruner(rule, tmp, closing);
     PrunedSlabs pruned(pruner);
     sweep(settings, input, resolved, all_slabs(resolved.lattice, input.ingested.extent),
-          prunes ? static_cast<SlabSink&>(pruned) : whole, volume ? &*volume : nullptr, run, watch, stats);
+          prunes ? static_cast<SlabSink&>(pruned) : closing, volume ? &*volume : nullptr, run, watch, stats);
     if (prunes) {
       watch.time("cluster and write", [&] { pruner.finish(); });
       report_pruning(pruner.counts(), input_name(settings), stats, run);
     }
+    watch.time("holes", [&] { stats.holes = close_holes(closing, sink); });
     if (sink.triangles() == 0) no_surface(input_name(settings), resolved.plan.samples);
     if (volume) {
       watch.time("volume", [&] { volume->finish(/*open=*/stats.rejected_loops > 0); });

@@ -29,6 +29,8 @@ class Band {
   std::vector<std::unique_ptr<Brick>> pop(bool end);
   /// Bricks that were popped and are done with.
   void give_back(std::vector<std::unique_ptr<Brick>> bricks) { bricks_.give_back(std::move(bricks)); }
+  /// After pop(true): the memory of those given back.
+  void free_spare() { bricks_.free_spare(); }
   [[nodiscard]] const BandSettings& settings() const { return settings_; }
   /// The mask of the whole band.
   [[nodiscard]] const BlockMask& all(const Brick& brick) const { return brick.known[settings_.rounds]; }

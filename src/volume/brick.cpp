@@ -5,17 +5,31 @@
 #include <utility>
 
 namespace lamina::volume {
-namespace {
 
-std::uint64_t key_of(std::int32_t y, std::int32_t x) {
-  return std::uint64_t{static_cast<std::uint32_t>(y)} << 32 | static_cast<std::uint32_t>(x);
+std::size_t BrickMap::Layer::slot_of(std::int32_t y, std::int32_t x) const {
+  // Neighbours along x lie side by side; rows are thrown far apart.
+  constexpr std::uint32_t kFar = 0x9E3779B1;
+  const std::size_t mask = slots.size() - 1;
+  std::size_t at = (static_cast<std::uint32_t>(x) + static_cast<std::uint32_t>(y) * kFar) & mask;
+  while (slots[at] != nullptr && (slots[at]->block.x != x || slots[at]->block.y != y)) at = (at + 1) & mask;
+  return at;
 }
 
-}  // namespace
+void BrickMap::Layer::add(std::unique_ptr<Brick> brick) {
+  bricks.push_back(std::move(brick));
+  const auto put = [this](Brick& b) { slots[slot_of(b.block.y, b.block.x)] = &b; };
+  if (2 * bricks.size() <= slots.size()) {
+    put(*bricks.back());
+    return;
+  }
+  slots.assign(2 * slots.size(), nullptr);
+  for (const auto& b : bricks) put(*b);
+}
 
 Brick& BrickMap::touch(const Block& b) {
-  std::unique_ptr<Brick>& place = layers_[b.z][key_of(b.y, b.x)];
-  if (place != nullptr) return *place;
+  Layer& own = layers_[b.z];
+  if (Brick* const there = own.find(b.y, b.x)) return *there;
+  std::unique_ptr<Brick> place;
   if (spare_.empty()) {
     place = std::make_unique_for_overwrite<Brick>();
     place->extra.resize(512 * channels_);
@@ -26,20 +40,22 @@ Brick& BrickMap::touch(const Block& b) {
   Brick& brick = *place;
   brick.block = b;
   brick.around.fill(nullptr);
-  std::fill_n(brick.known.begin(), rounds_ + 1, BlockMask{});
-  std::fill_n(brick.source.begin(), std::min(rounds_ + 1, kMaxRounds), BlockMask{});
+  const auto rounds = static_cast<std::size_t>(rounds_);
+  brick.known.assign(rounds + 1, {});
+  brick.source.assign(rounds + 1, {});
   brick.contested = {};
   brick.repaired = {};
+  own.add(std::move(place));
   for (std::int32_t dz = -1; dz <= 1; ++dz) {
     const auto layer = layers_.find(b.z + dz);
     if (layer == layers_.end()) continue;
     for (std::int32_t dy = -1; dy <= 1; ++dy) {
       for (std::int32_t dx = -1; dx <= 1; ++dx) {
-        const auto other = layer->second.find(key_of(b.y + dy, b.x + dx));
-        if (other == layer->second.end()) continue;
+        Brick* const other = layer->second.find(b.y + dy, b.x + dx);
+        if (other == nullptr) continue;
         const auto i = static_cast<std::size_t>(dx + 1 + 3 * (dy + 1) + 9 * (dz + 1));
-        brick.around[i] = other->second.get();
-        other->second->around[26 - i] = &brick;
+        brick.around[i] = other;
+        other->around[26 - i] = &brick;
       }
     }
   }
@@ -47,12 +63,10 @@ Brick& BrickMap::touch(const Block& b) {
 }
 
 std::vector<std::unique_ptr<Brick>> BrickMap::take_lowest() {
-  std::vector<std::unique_ptr<Brick>> out;
-  for (auto& [key, brick] : layers_.begin()->second) {
+  std::vector<std::unique_ptr<Brick>> out = std::move(layers_.begin()->second.bricks);
+  for (const auto& brick : out)
     for (std::size_t i = 18; i < 27; ++i)
       if (brick->around[i] != nullptr) brick->around[i]->around[26 - i] = nullptr;
-    out.push_back(std::move(brick));
-  }
   layers_.erase(layers_.begin());
   std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) {
     return std::pair(a->block.y, a->block.x) < std::pair(b->block.y, b->block.x);

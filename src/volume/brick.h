@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <unordered_map>
 #include <vector>
 
 #include "window/corner_block.h"
@@ -25,9 +24,9 @@ struct Brick {
   /// The bricks around, x fastest, itself in the middle; null where there is none.
   std::array<Brick*, 27> around;
   /// By round: the projected voxels first, the whole band last.
-  std::array<BlockMask, kMaxRounds + 1> known;
+  std::vector<BlockMask> known;
   /// By round: the voxels new in it that the band grows from.
-  std::array<BlockMask, kMaxRounds> source;
+  std::vector<BlockMask> source;
   /// Voxels that the planes around disagree on.
   BlockMask contested;
   /// Corners that extraction gives a value from their trusted neighbours.
@@ -53,15 +52,25 @@ class BrickMap {
   void for_each(std::int32_t block_z, const Visit& visit) {
     const auto layer = layers_.find(block_z);
     if (layer == layers_.end()) return;
-    for (auto& [key, brick] : layer->second) visit(*brick);
+    for (const auto& brick : layer->second.bricks) visit(*brick);
   }
   /// Takes the lowest layer out, in canonical order (y, x).
   std::vector<std::unique_ptr<Brick>> take_lowest();
   /// Bricks taken out, to be used again: fresh memory costs more than growing the band in it.
   void give_back(std::vector<std::unique_ptr<Brick>> bricks);
+  void free_spare() { spare_ = std::vector<std::unique_ptr<Brick>>(); }
 
  private:
-  using Layer = std::unordered_map<std::uint64_t, std::unique_ptr<Brick>>;  // by y, x
+  /// Bricks of one z in order of arrival, and a table of them by y, x with open addressing.
+  struct Layer {
+    std::vector<std::unique_ptr<Brick>> bricks;
+    std::vector<Brick*> slots = std::vector<Brick*>(64, nullptr);  ///< a power of two, half of it empty
+
+    /// The place of the brick, or the empty one where it would be.
+    std::size_t slot_of(std::int32_t y, std::int32_t x) const;
+    [[nodiscard]] Brick* find(std::int32_t y, std::int32_t x) const { return slots[slot_of(y, x)]; }
+    void add(std::unique_ptr<Brick> brick);
+  };
 
   int rounds_;
   std::size_t channels_;

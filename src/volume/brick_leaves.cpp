@@ -10,6 +10,7 @@
 #include "lamina/error.h"
 #include "lamina/volume_export.h"
 #include "volume/full_range.h"
+#include "volume/mask_axes.h"
 #include "volume/pack_leaf.h"
 #include "window/bits.h"
 
@@ -98,12 +99,12 @@ std::vector<ExtraGrid> resolve_grids(const std::vector<std::string>& names, cons
 LeafMaker::LeafMaker(const Band& b, const GridFrame& g, const std::vector<ExtraGrid>& e, const Eigen::Matrix3d& r,
                      bool h)
     : band(b), grid(g), extras(e), rotation(r), half(h) {
-  const std::array<int, 3> stride{64, 8, 1};
-  std::array<int, 3> of{};  // in the leaf, of each lattice axis
-  for (std::size_t k = 0; k < 3; ++k) of[k] = stride[static_cast<std::size_t>(grid.axis_of[k])];
-  for (int at = 0; at < 512; ++at)
-    place[static_cast<std::size_t>(at)] =
-        static_cast<std::uint16_t>((at & 7) * of[0] + (at >> 3 & 7) * of[1] + (at >> 6) * of[2]);
+  // OpenVDB's z is the fastest.
+  for (std::size_t k = 0; k < 3; ++k) axes[k] = 2 - grid.axis_of[k];
+  for (int at = 0; at < 512; ++at) {
+    const int there = (at & 7) << (3 * axes[0]) | (at >> 3 & 7) << (3 * axes[1]) | (at >> 6) << (3 * axes[2]);
+    voxel_at[static_cast<std::size_t>(there)] = static_cast<std::uint16_t>(at);
+  }
 }
 
 BrickLeaves LeafMaker::operator()(const Brick& brick) const {
@@ -124,25 +125,13 @@ BrickLeaves LeafMaker::operator()(const Brick& brick) const {
   }
   if (!active.any()) return out;
   out.any = true;
-  const auto in_leaf = [&](const BlockMask& of) {
-    BlockMask there;
-    for (int z = 0; z < 8; ++z)
-      for (std::uint64_t w = of.words[z]; w != 0; w &= w - 1) there.set(place[z * 64 + std::countr_zero(w)]);
-    return there;
-  };
-  LeafMasks masks{in_leaf(active), in_leaf(inside_of(negative, known))};
+  LeafMasks masks{with_axes(active, axes), with_axes(inside_of(negative, known), axes)};
   // The active voxels of the brick in the leaf's order.
-  std::array<std::uint16_t, 512> at_place, order;
-  for (int z = 0; z < 8; ++z) {
-    for (std::uint64_t w = active.words[z]; w != 0; w &= w - 1) {
-      const int at = z * 64 + std::countr_zero(w);
-      at_place[place[at]] = static_cast<std::uint16_t>(at);
-    }
-  }
+  std::array<std::uint16_t, 512> order;
   std::size_t count = 0;
   for (int x = 0; x < 8; ++x) {
     for (std::uint64_t w = masks.active.words[x]; w != 0; w &= w - 1)
-      order[count++] = at_place[x * 64 + std::countr_zero(w)];
+      order[count++] = voxel_at[x * 64 + std::countr_zero(w)];
   }
 
   const openvdb::Coord origin = grid.index({brick.block.x * 8, brick.block.y * 8, brick.block.z * 8});

@@ -42,7 +42,8 @@ struct LeafMaker {
   const std::vector<ExtraGrid>& extras;
   const Eigen::Matrix3d& rotation;
   bool half = true;
-  std::array<std::uint16_t, 512> place;  ///< of each voxel of a brick in its leaf
+  std::array<int, 3> axes{};                ///< where the brick's axes go in its leaf (mask_axes.h)
+  std::array<std::uint16_t, 512> voxel_at;  ///< of the brick, for each place of the leaf
 
   [[nodiscard]] BrickLeaves operator()(const Brick& brick) const;
 };

@@ -191,7 +191,10 @@ void SurfaceVolume::add(const Window& window, const IsoSlab& slab, std::int32_t 
 
 void SurfaceVolume::finish(bool open) {
   impl_->tasks.wait();
-  for (LevelGrid& level : impl_->levels) impl_->emit(level, true);
+  for (LevelGrid& level : impl_->levels) {
+    impl_->emit(level, true);
+    level.band.free_spare();  // the tiles' signs want the room
+  }
   VolumeExportStats& stats = impl_->stats;
   if (!impl_->files.empty()) {
     impl_->set_open(open || impl_->files.size() > 1);

@@ -65,7 +65,7 @@ TileSigns::TileSigns(const std::vector<LeafVotes>& leaves) {
     std::int32_t& at = node_at_[cell];
     if (at < 0) {
       at = static_cast<std::int32_t>(nodes_.size());
-      nodes_.push_back({std::vector<std::uint8_t>(kSlots, kUnknown), {}, std::vector<std::int8_t>(kSlots, 0)});
+      nodes_.push_back({std::vector<std::uint8_t>(kSlots, kUnknown), std::vector<std::int8_t>(kSlots, 0)});
     }
     nodes_[static_cast<std::size_t>(at)].state[slot_of(l.leaf[0] & 15, l.leaf[1] & 15, l.leaf[2] & 15)] = kLeaf;
   }
@@ -82,10 +82,8 @@ TileSigns::TileSigns(const std::vector<LeafVotes>& leaves) {
   }
   spread_local();
   for (Node& n : nodes_) {
-    n.tiles.resize(kSlots);
-    for (std::size_t i = 0; i < kSlots; ++i) n.tiles[i] = n.state[i] == kInside;
-    n.votes = {};
-    n.state = {};
+    for (std::uint8_t& state : n.state) state = state == kInside;
+    n.votes = std::vector<std::int8_t>();  // = {} would keep the memory
   }
 }
 
@@ -198,7 +196,7 @@ void TileSigns::spread_local() {
 const std::uint8_t* TileSigns::inside_tiles(const Place& node) const {
   const std::uint32_t cell = cell_of(node);
   if (cell >= node_at_.size() || node_at_[cell] < 0) return nullptr;
-  return nodes_[static_cast<std::size_t>(node_at_[cell])].tiles.data();
+  return nodes_[static_cast<std::size_t>(node_at_[cell])].state.data();
 }
 
 bool TileSigns::inside(const Place& node) const {

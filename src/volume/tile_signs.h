@@ -30,7 +30,7 @@ class TileSigns {
  private:
   enum State : std::uint8_t { kUnknown, kLeaf, kOutside, kInside };
   struct Node {
-    std::vector<std::uint8_t> state, tiles;
+    std::vector<std::uint8_t> state;  ///< in the end 1 where the tile lies inside, 0 elsewhere
     std::vector<std::int8_t> votes;
   };
   struct Slot {

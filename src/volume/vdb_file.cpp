@@ -14,18 +14,21 @@
 #include "lamina/version.h"
 #include "meshes/output_file.h"
 #include "volume/vdb_bytes.h"
+#include "volume/vdb_check.h"
 
 namespace lamina::volume {
 namespace {
 
 [[noreturn]] void refuse(const std::string& path, const std::string& what) {
-  throw Error(ExitCode::unreadable, fmt::format("{}: {}", path, what));
+  std::string line = what;  // it may quote the file
+  std::replace_if(line.begin(), line.end(), [](char c) { return c >= 0 && c < ' '; }, '?');
+  throw Error(ExitCode::unreadable, fmt::format("{}: {}", path, line));
 }
 
 /// The file's magic number and what comes behind it: lengths in a file that is none would be taken for real.
 std::string check_header(std::ifstream& file, const std::string& path) {
   constexpr std::uint32_t kMagic = 0x56444220;
-  constexpr std::uint32_t kOldest = 214, kUnknown = 1000;
+  constexpr std::uint32_t kOldest = 222, kUnknown = 1000;
   std::uint64_t magic = 0;
   std::uint32_t version = 0, major = 0, minor = 0;
   for (auto [to, size] : {std::pair<void*, std::streamsize>{&magic, 8}, {&version, 4}, {&major, 4}, {&minor, 4}})
@@ -52,6 +55,7 @@ VdbFile read_vdb(const std::string& path) {
   // OpenVDB does not look whether its reads succeed.
   file.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
   try {
+    check_vdb(file);
     openvdb::io::Stream stream(file, /*delayLoad=*/false);
     const openvdb::GridPtrVecPtr grids = stream.getGrids();
     if (grids != nullptr) out.grids = *grids;

@@ -1,10 +1,13 @@
 // The folder that chunks are made from.
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 
 #include <filesystem>
 
 #include "chunk/chunked.h"
+#include "files/descriptor.h"
 
 namespace lamina {
 namespace {
@@ -57,6 +60,18 @@ TEST_F(KeptStore, AppearsWhenCompleteOnly) {
   EXPECT_EQ(folder_.entries(), before);
 }
 
+TEST_F(KeptStore, ThoseOfKilledRunsAreRemoved) {
+  fs::create_directory(folder_ / ".other.partial-1");
+  test::write_file(folder_ / ".other.partial-1/samples.00", "what a killed run has left");
+  const std::string live = folder_ / ".other.partial-2";
+  fs::create_directory(live);
+  const Descriptor held(::open(live.c_str(), O_RDONLY | O_DIRECTORY));
+  ASSERT_EQ(::flock(held.get(), LOCK_EX), 0);
+  write_store(settings_, folder_ / "other", {});
+  EXPECT_FALSE(fs::exists(folder_ / ".other.partial-1"));
+  EXPECT_TRUE(fs::exists(live));
+}
+
 TEST_F(KeptStore, RefusesOtherWaysOfReading) {
   from_store_.frame = FrameMode::axis;
   EXPECT_THAT(refusal(ExitCode::usage), AllOf(HasSubstr("--frame"), HasSubstr("pca")));
@@ -100,6 +115,64 @@ TEST_F(KeptStore, ChunksOfSomethingElseAreRefused) {
   s.input = settings_.input;
   EXPECT_THROW(reconstruct_chunk(s, {1, 3}, {}), Error);
   EXPECT_FALSE(fs::exists(s.output));
+}
+
+/// A torus, every hundredth of whose samples is there twice, with a few strays beside it.
+test::Cloud dirty_cloud() {
+  test::Cloud cloud = test::torus_cloud(4000);
+  const std::size_t clean = cloud.size();
+  for (std::size_t i = 0; i < clean; i += 100) {
+    const test::Point3 p = cloud.positions[i];
+    const test::Point3 n = cloud.normals[i];
+    cloud.add(p, n);
+  }
+  for (int i = 0; i < 5; ++i) cloud.add({2.4 + 0.3 * i, 0, 0}, {1, 0, 0});
+  return cloud;
+}
+
+class CleanedStore : public ::testing::Test {
+ protected:
+  CleanedStore() {
+    settings_.input = test::write_cloud(dirty_cloud(), folder_ / "in.ply");
+    settings_.clean.merge = 0;
+    settings_.clean.sigma = 4;
+    settings_.clean.pick.every = 2;
+    whole_ = test::whole_bytes(settings_, folder_);
+    const SurfaceStats stats = write_store(settings_, store_, {});
+    EXPECT_GT(stats.cleaned.outliers, 0u);
+    EXPECT_GT(stats.cleaned.merged, 0u);
+    EXPECT_GT(stats.cleaned.skipped, 0u);
+  }
+  test::TemporaryFolder folder_;
+  SurfaceSettings settings_;
+  const std::string store_ = folder_ / "store";
+  std::string whole_;
+};
+
+TEST_F(CleanedStore, ChunksAreThoseOfTheCleanedCloud) {
+  SurfaceSettings chunks;
+  EXPECT_TRUE(test::merged_bytes(test::make_parts(chunks, store_, 3, folder_), folder_) == whole_);
+}
+
+TEST_F(CleanedStore, TakesTheOptionsItWasMadeWithAndNoOthers) {
+  settings_.input = store_;
+  settings_.output = folder_ / "again.ply";
+  reconstruct_surface(settings_, {});
+  EXPECT_TRUE(test::read_file(settings_.output) == whole_);
+  settings_.clean.sigma = 2;
+  try {
+    reconstruct_surface(settings_, {});
+    ADD_FAILURE() << "ran";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::usage);
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("outliers 4"), HasSubstr("outliers 2"), HasSubstr("lamina sort")));
+  }
+}
+
+TEST_F(CleanedStore, ACheckpointCleansToo) {
+  settings_.output = folder_ / "resumable.ply";
+  reconstruct_resumable(settings_, {folder_ / "checkpoint", false}, {});
+  EXPECT_TRUE(test::read_file(settings_.output) == whole_);
 }
 
 }  // namespace

@@ -225,8 +225,8 @@ TEST(ReadMesh, CutArchivesAreNamed) {
 TEST(ReadMesh, ObjFacesThatNameNothingAreRefused) {
   const ScratchFolder folder;
   const std::string corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
-  for (const char* face :
-       {"f /1 2 3", "f 1 2 //3", "f 1 2 x", "f 1/'1 2 3", "f 1//1 2//1 3//1", "f 1//0 2 3", "f\v/1 2 3"}) {
+  for (const char* face : {"f /1 2 3", "f 1 2 //3", "f 1 2 x", "f 1/'1 2 3", "f 1//1 2//1 3//1", "f 1//0 2 3",
+                           "f\v/1 2 3", "f # 1 2 3", "f #2 /1/11"}) {
     const auto path = folder.write("face.obj", corners + face + "\n");
     SCOPED_TRACE(face);
     expect_error(ExitCode::unreadable, [&] { read_mesh(path); }, {path, "line 4"});

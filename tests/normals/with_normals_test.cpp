@@ -184,6 +184,38 @@ TEST(WithNormals, CheckTellsOfAFlippedPatch) {
   EXPECT_EQ(compare(cloud, found.normals).right_side, 1);  // nothing changed
 }
 
+std::string warning_of(const NormalsReport& report) {
+  std::string said;
+  RunContext run;
+  run.log = [&](LogLevel level, std::string_view text) {
+    if (level == LogLevel::warning) said += text;
+  };
+  warn_of_conflicts(report, "cloud", run);
+  return said;
+}
+
+TEST(WithNormals, FlippedPatchesAreWarnedOf) {
+  Oriented cloud;
+  test::add_sphere(cloud, 12000, 1);
+  EXPECT_EQ(warning_of(find_normals(cloud, in_mode(NormalsMode::check), true).report), "");
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const bool turned = static_cast<int>(std::floor(4 * cloud.positions[i][2])) % 2 == 0;
+    for (double& v : cloud.normals[i]) v = turned ? -v : v;
+  }
+  const NormalsReport report = find_normals(cloud, in_mode(NormalsMode::check), true).report;
+  EXPECT_GT(report.conflicts.share(), 0.02);
+  EXPECT_THAT(warning_of(report), ::testing::HasSubstr("cloud"));
+}
+
+TEST(WithNormals, AWarningNamesTheWorstSlab) {
+  NormalsReport report;
+  report.conflicts = {30000, 100};
+  report.slabs = {{10000, 0}, {10000, 90}, {10000, 10}};
+  EXPECT_EQ(warning_of(report), "");
+  report.slabs[1].conflicts = 900;
+  EXPECT_THAT(warning_of(report), ::testing::HasSubstr("slab 2 of 3"));
+}
+
 TEST(WithNormals, ReorientingChangesSignsOnly) {
   std::size_t turned = 0;
   Oriented cloud = flipped_patch(0.8, turned);

@@ -75,6 +75,16 @@ TEST_F(RankIdentity, SeveralFilesAndStoredSamples) {
   expect_same({folder_ / "store"}, {2});
 }
 
+TEST_F(RankIdentity, HolesAcrossTheBordersOfRanks) {
+  Cloud cloud = pipe(12000);
+  Cloud pierced;
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const Point3& p = cloud.positions[i];
+    if (std::hypot(std::fmod(p[0] + 8, 0.6) - 0.3, p[1]) > 0.12) pierced.add(p, cloud.normals[i]);
+  }
+  expect_same({test::write_cloud(pierced, folder_ / "in.ply"), "--close-holes", "40", "--curvature"}, {2, 5});
+}
+
 TEST_F(RankIdentity, MoreRanksThanSlabs) {
   expect_same({test::write_cloud(test::sphere_cloud(1500), folder_ / "in.ply"), "--threads", "1"}, {9});
 }

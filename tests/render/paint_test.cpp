@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -63,6 +64,41 @@ TEST(Paint, ReplacesColoursAndKeepsTheRest) {
     for (std::size_t v = 0; v < 4; ++v)
       EXPECT_EQ(mesh.attributes[1 + c][v], paint_colour(static_cast<double>(v), range)[c]);
   }
+}
+
+TEST(Paint, PointsGetDistancesAndTheColoursOfTheirValues) {
+  SampleBatch points;
+  points.x = {0, 0, 3}, points.y = {0, 2, 0}, points.z = {1.5, 0, 0};
+  points.radius = {1, 2, 3};
+  points.attributes = {{4, 5, 6}};
+  AttributeLayout layout{{"warmth", ScalarType::float32}};
+  const DistanceField field(test::sphere(1, 200));
+  const std::vector<double> distances = field.of(points);
+  const std::vector<double> truth{0.5, 1, 2};
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_NEAR(distances[i], truth[i], 1e-3);
+  EXPECT_EQ(point_values(points, layout, "pscale"), (std::vector<double>{1, 2, 3}));
+  EXPECT_EQ(point_values(points, layout, "warmth"), (std::vector<double>{4, 5, 6}));
+  EXPECT_TRUE(point_values(points, layout, "quality").empty());
+  const PaintRange range{0, 2};
+  paint(points, layout, truth, range);
+  ASSERT_EQ(layout.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t c = 0; c < 3; ++c) EXPECT_EQ(points.attributes[c][i], paint_colour(truth[i], range)[c]);
+}
+
+TEST(Paint, AScaleOfManyValuesIsNearlyThatOfAll) {
+  std::vector<double> values(3'000'000);
+  for (std::size_t i = 0; i < values.size(); ++i)
+    values[i] = static_cast<double>(i * 2'654'435'761U % values.size()) / static_cast<double>(values.size());
+  PaintScale scale, whole;
+  whole.add(values);
+  for (std::size_t i = 0; i < values.size(); i += 700'001)
+    scale.add({values.begin() + static_cast<std::ptrdiff_t>(i),
+               values.begin() + static_cast<std::ptrdiff_t>(std::min(i + 700'001, values.size()))});
+  EXPECT_EQ(scale.range().high, whole.range().high);
+  EXPECT_NEAR(scale.range().high, 0.99, 1e-3);
+  EXPECT_EQ(scale.least(), *std::min_element(values.begin(), values.end()));
+  EXPECT_EQ(scale.most(), *std::max_element(values.begin(), values.end()));
 }
 
 }  // namespace

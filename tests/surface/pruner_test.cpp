@@ -122,7 +122,8 @@ std::string prune_streamed(const std::vector<SlabMesh>& slabs, const PruneRule& 
   settings.attributes = {{"value", ScalarType::float32}};
   settings.double_positions = true;
   MeshSink sink(settings);
-  Pruner pruner(rule, folder, sink, memory);
+  MeshFileSlabs next(sink);
+  Pruner pruner(rule, folder, next, memory);
   for (const SlabMesh& s : slabs) pruner.add(s.vertices, s.triangles);
   pruner.finish();
   EXPECT_EQ(pruner.disk_bytes(), 0U);
@@ -178,7 +179,8 @@ TEST(Pruner, AFullDiskIsSaid) {
   settings.path = folder / "mesh.ply";
   settings.attributes = {{"value", ScalarType::float32}};
   MeshSink sink(settings);
-  Pruner pruner({5, 0}, folder / "none", sink, 0);
+  MeshFileSlabs next(sink);
+  Pruner pruner({5, 0}, folder / "none", next, 0);
   try {
     const auto slabs = random_slabs(random, 2, 9, 0.5);
     for (const SlabMesh& s : slabs) pruner.add(s.vertices, s.triangles);

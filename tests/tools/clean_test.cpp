@@ -51,6 +51,12 @@ TEST_F(CleanTool, MergesEqualPositionsAndKeepsEverythingElseToTheBit) {
   EXPECT_EQ(row_texts(read_points(out_)), row_texts(rows_)) << "the first of each stays, rows in order";
 }
 
+TEST_F(CleanTool, RefusesWhatNeedsMoreMemory) {
+  const auto outcome = clean(rows_, {"--outliers", "3", "--max-memory", "50M"});
+  EXPECT_EQ(outcome.code, 4);
+  EXPECT_THAT(outcome.err, HasSubstr("--max-memory"));
+}
+
 TEST_F(CleanTool, NearDuplicatesAreThoseThatFaceTheSameWay) {
   // Both sides of a sheet thinner than the tolerance.
   SampleBatch rows = rows_;

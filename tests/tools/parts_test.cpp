@@ -65,6 +65,24 @@ TEST_F(PartsTool, OptionsThatCannotBeMeant) {
   EXPECT_EQ(run_lamina({"sort", cloud_, cloud_, "-o", mesh_}).code, 2);
 }
 
+TEST_F(PartsTool, AStoreIsCleanedAndGetsItsNormalsWhileItIsMade) {
+  const std::string bare = folder_ / "bare.xyz", store = folder_ / "ready";
+  PointColumns columns = sphere_columns();
+  columns.normals = false;
+  write_points(bare, sphere_rows(3000, 5), columns);
+  const std::vector<std::string> reading{"--merge", "0", "--outliers", "5", "--normals", "auto", "--k", "8"};
+  const auto with = [&](std::vector<std::string> words) {
+    words.insert(words.end(), reading.begin(), reading.end());
+    return run_lamina(words);
+  };
+  ASSERT_EQ(with({"surface", bare, "-o", whole_}).code, 0);
+  const Outcome sorted = with({"sort", bare, "--store", store});
+  ASSERT_EQ(sorted.code, 0) << sorted.err;
+  ASSERT_EQ(run_lamina({"surface", store, "-o", mesh_}).code, 0);
+  EXPECT_TRUE(read_text(mesh_) == read_text(whole_));
+  EXPECT_EQ(run_lamina({"sort", bare, "--outliers", "5", "-o", mesh_}).code, 2);
+}
+
 TEST_F(PartsTool, Checkpoint) {
   const std::string folder = folder_ / "checkpoint";
   const Outcome outcome = run_lamina({"surface", cloud_, "-o", mesh_, "--steps", "2", "--checkpoint", folder});

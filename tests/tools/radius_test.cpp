@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <numbers>
 
 #include "lamina/surface.h"
@@ -68,10 +69,24 @@ TEST_F(RadiusTool, ScaleAndLimitsActOnEveryRadius) {
 TEST_F(RadiusTool, ThreadsMemoryAndPipesDoNotMatter) {
   ASSERT_EQ(run_lamina({"radius", cloud_, "-o", out_, "--threads", "1"}).code, 0);
   const std::string few = folder_ / "few.ply";
-  ASSERT_EQ(run_lamina({"radius", cloud_, "-o", few, "--threads", "3", "--max-memory", "64K"}).code, 0);
+  PointRadiiSettings settings;
+  settings.memory = 16000;
+  RunContext run;
+  run.threads = 3;
+  const auto source = open_points(cloud_);
+  PointColumns columns = columns_of(source->info());
+  columns.radius = "radius";
+  const auto writer = open_points_writer(few, columns);
+  write_point_radii(*source, *writer, settings, run);
+  writer->commit();
   EXPECT_TRUE(read_text(out_) == read_text(few));
   const auto piped = run_shell("cat " + test::quoted(cloud_) + " | lamina radius - -o - --quiet");
   EXPECT_TRUE(piped.out == read_text(out_)) << piped.err;
+}
+
+TEST_F(RadiusTool, RefusesWhatNeedsMoreMemory) {
+  EXPECT_EQ(run_lamina({"radius", cloud_, "-o", out_, "--max-memory", "30M"}).code, 4);
+  EXPECT_FALSE(std::filesystem::exists(out_));
 }
 
 TEST_F(RadiusTool, WantsNoNormalsAndLeavesBadRowsOut) {

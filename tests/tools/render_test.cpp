@@ -125,7 +125,26 @@ TEST_F(RenderTool, PaintsDistancesAndAttributes) {
     words.insert(words.end(), wrong.begin(), wrong.end());
     EXPECT_EQ(run_lamina(words).code, 2) << wrong[0];
   }
-  EXPECT_EQ(run_lamina({"render", cloud_, "-o", picture_, "--paint", "quality"}).code, 2);
+}
+
+TEST_F(RenderTool, PaintsPoints) {
+  const std::string truth = folder_ / "truth.ply", cloud = folder_ / "painted.xyz";
+  TriangleMesh square;  // z = 0
+  square.positions = {{-9, -9, 0}, {9, -9, 0}, {9, 9, 0}, {-9, 9, 0}};
+  square.triangles = {{0, 1, 2}, {0, 2, 3}};
+  write_mesh(square, truth);
+  std::ofstream(cloud) << "x y z nx ny nz radius warmth\n0 0 1 0 0 1 0.5 7\n1 0 3 0 0 1 0.25 9\n0 1 2 0 0 1 0.75 8\n";
+  const auto painted = [&](const std::vector<std::string>& what) {
+    std::vector<std::string> words{"render", cloud, "-o", picture_, "--size", "32x32", "--paint"};
+    words.insert(words.end(), what.begin(), what.end());
+    return run_lamina(words);
+  };
+  EXPECT_THAT(painted({"distance", "--reference", truth}).err, HasSubstr("values lie between 1 and 3"));
+  EXPECT_THAT(painted({"radius"}).err, HasSubstr("values lie between 0.25 and 0.75"));
+  EXPECT_THAT(painted({"warmth", "--paint-range", "7,9"}).err, HasSubstr("dark blue 7, turquoise 7.5"));
+  const auto unknown = painted({"mauve"});
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("radius, warmth"));
 }
 
 TEST_F(RenderTool, NamesInputThatCannotBeRead) {

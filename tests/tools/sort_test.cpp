@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <numeric>
 
 #include "support/program.h"
@@ -85,11 +86,23 @@ TEST_F(SortTool, SweepFollowsTheDominantAxis) {
   EXPECT_LT(worst, 0.5) << "but for the sphere's own asymmetry the axis is (1, 2, 0)";
 }
 
+TEST_F(SortTool, RefusesWhatNeedsMoreMemory) {
+  const auto outcome = run_lamina({"sort", cloud_, "-o", out_, "--max-memory", "20M"});
+  EXPECT_EQ(outcome.code, 4);
+  EXPECT_THAT(outcome.err, ::testing::AllOf(::testing::HasSubstr(cloud_), ::testing::HasSubstr("--max-memory")));
+  EXPECT_FALSE(std::filesystem::exists(out_));
+}
+
 /// Rows with an infinite coordinate never leave; the sorter's runs are a few rows long.
 TEST_F(SortTool, SortsInRunsWithLittleMemoryTheSameBytes) {
   ASSERT_EQ(run_lamina({"sort", cloud_, "-o", out_}).code, 0);
   const std::string few = folder_ / "few.ply";
-  ASSERT_EQ(run_lamina({"sort", cloud_, "-o", few, "--max-memory", "20K"}).code, 0);
+  SortSettings settings;
+  settings.memory = 5000;
+  const auto source = open_points(cloud_);
+  const auto writer = open_points_writer(few, columns_of(source->info()));
+  sort_points(*source, *writer, settings, {});
+  writer->commit();
   EXPECT_TRUE(read_text(out_) == read_text(few));
   EXPECT_EQ(folder_.entries(), 3) << "temporary files have no names";
 }

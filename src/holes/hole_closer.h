@@ -1,0 +1,52 @@
+// Closes the holes of a mesh that streams by, behind its end.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+#include "holes/fill.h"
+#include "holes/rim_paths.h"
+#include "lamina/holes.h"
+#include "lamina/mesh_sink.h"
+
+namespace lamina::holes {
+
+/// What comes behind a mesh: its triangles name the mesh's vertices, and the new ones behind them.
+struct Addition {
+  VertexBatch vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+/// Takes the rims as they are found. Memory: rims that are not closed yet, and closed loops of at most `longest` radii.
+/// What comes out depends on the mesh alone, not on the order of the pieces.
+class HoleCloser {
+ public:
+  /// `longest`: loops of more influence radii stay open, all at 0. `attributes`: of a vertex.
+  HoleCloser(double longest, std::size_t attributes);
+  HoleCloser(const HoleCloser&) = delete;
+  HoleCloser& operator=(const HoleCloser&) = delete;
+
+  /// `first`: the vertex that the piece's numbers count from.
+  void add(const RimPiece& piece, std::uint64_t first = 0);
+  /// The next part of a mesh, its first vertex `first`: its loose edges meet those of the part before.
+  void add_part(const RimPiece& piece, std::uint64_t first);
+  /// The mesh, of so many vertices, is complete.
+  Addition finish(std::uint64_t vertices);
+  [[nodiscard]] const HoleStats& stats() const { return stats_; }
+
+ private:
+  void leave(const RimExtent& extent, Verdict why);
+  void fill_all(std::vector<Filling>& fillings) const;
+  void refuse_occupied(std::vector<Filling>& fillings) const;
+  void append(const Loop& loop, const Filling& filling, std::uint64_t vertices, Addition& out) const;
+
+  double longest_;
+  std::size_t attributes_;
+  HoleStats stats_;
+  std::vector<std::pair<Loop, RimExtent>> loops_;
+  RimPaths paths_;
+  std::vector<RimEdge> loose_;  ///< of the last part, numbers of the mesh
+};
+
+}  // namespace lamina::holes

@@ -1,0 +1,30 @@
+// Triangles of a polygon in a plane.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include <Eigen/Core>
+
+namespace lamina::holes {
+
+using PlaneTriangle = std::array<std::uint32_t, 3>;
+
+/// Polygon, anticlockwise, whose corners also have a height. Chords (i, j), i < j, may be used where `allowed`.
+/// The triangulation whose sharpest fold (between two triangles, or with `facing`, the normal beside each edge) is
+/// least, and among those the one of least area (dynamic programming, n^3 / 6 steps: Klincsek 1980, Barequet and
+/// Sharir 1995, Liepa 2003). Nothing where every one has a triangle that is no proper one of the plane.
+std::optional<std::vector<PlaneTriangle>> triangulate_polygon(
+    const std::vector<Eigen::Vector3d>& corners, const std::vector<Eigen::Vector3d>& facing,
+    const std::function<bool(std::uint32_t, std::uint32_t)>& allowed);
+
+/// Adds points inside until triangles are about as large as the edges of the polygon around them (Liepa 2003), and
+/// flips edges to Delaunay's in the plane. `points`: the polygon's corners, then what is added; `scale`: the length of
+/// edges wanted at each.
+void refine_triangles(std::vector<Eigen::Vector2d>& points, std::vector<double>& scale,
+                      std::vector<PlaneTriangle>& triangles,
+                      const std::function<bool(std::uint32_t, std::uint32_t)>& allowed);
+
+}  // namespace lamina::holes
