@@ -303,8 +303,13 @@ void add_surface(CLI::App& app) {
              "first replace normals by those fitted to the samples within so many radii; 0: keep them; auto: keep "
              "them but for noise that --blend auto finds")
       ->group(fit);
-  tool->add_option("--steps", s.steps, "N: projection steps; auto: as many as each corner needs")
-      ->transform(CLI::Transformer(std::map<std::string, std::string>{{"auto", "0"}}))
+  const auto take_steps = [&s](const std::string& text) {
+    s.steps = 0;
+    if (text != "auto" && (!CLI::detail::lexical_cast(text, s.steps) || s.steps < 1))
+      throw CLI::ValidationError("--steps", text + ": is neither a number in 1..16 nor auto");
+  };
+  tool->add_option_function<std::string>("--steps", take_steps,
+                                         "N: projection steps; auto: as many as each corner needs")
       ->option_text("N|auto [1]")
       ->group(fit);
   tool->add_option("--step-tolerance", s.step_tolerance,

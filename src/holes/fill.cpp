@@ -259,7 +259,8 @@ Filling fill_smooth(const Loop& loop) {
   }
   if (!is_simple(rim.points)) return refused(Verdict::bent);
   const auto allowed = [&](std::uint32_t i, std::uint32_t j) { return rim.allows(i, j); };
-  auto triangles = triangulate_polygon(rim.points, rim.facing, allowed);
+  // Triangles along a rim may be slivers that face anywhere: vertices' normals say more.
+  auto triangles = triangulate_polygon(rim.points, rim.normals, allowed);
   if (!triangles) return refused(Verdict::bent);
   Filling filling;
   filling.triangles = std::move(*triangles);
@@ -273,7 +274,7 @@ Filling fill_smooth(const Loop& loop) {
   refine_triangles(plane, scale, filling.triangles, allowed);
   std::vector<Vec3> points = rim.points;
   if (!place_inner(loop, base, sphere, rim.points, plane, points, filling) ||
-      folds_too_far(points, rim.facing, kMostFold, filling.triangles))
+      folds_too_far(points, rim.normals, kMostFold, filling.triangles))
     return refused(Verdict::bent);
   filling.verdict = Verdict::filled;
   return filling;

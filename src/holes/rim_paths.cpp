@@ -4,8 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "lamina/error.h"
-
 namespace lamina::holes {
 namespace {
 
@@ -69,8 +67,13 @@ void RimPaths::add(const RimPiece& piece, Number first) {
 void RimPaths::join(const RimEdge& edge) {
   const auto from = nodes_.find(edge.from);
   const auto to = nodes_.find(edge.to);
-  if (from == nodes_.end() || to == nodes_.end())
-    throw Error(ExitCode::internal, "rims: an edge names a vertex that is not known");
+  // Where a mesh is not manifold, a vertex may be of a rim that has been dealt with: such edges stay by themselves,
+  // too.
+  if (from == nodes_.end() || to == nodes_.end()) {
+    const auto known = from == nodes_.end() ? to : from;
+    if (known != nodes_.end()) left_(extent_of(known->second.vertex, known->second.vertex));
+    return;
+  }
   const RimExtent extent = extent_of(from->second.vertex, to->second.vertex);
   // Several rims meet in a vertex only where a mesh is not manifold: these edges stay by themselves.
   if (from->second.next != kNone || to->second.entered) {

@@ -87,7 +87,7 @@ TEST_F(MergeParts, NamesTheTruncatedAndTheDamaged) {
   test::write_file(bad, bytes);
   EXPECT_THAT(refusal(with(2, bad)), AllOf(HasSubstr(bad), HasSubstr("is damaged")));
   bytes = test::read_file(parts()[2]);
-  bytes[12] = '2';
+  bytes[12] = '9';
   test::write_file(bad, bytes);
   EXPECT_THAT(refusal(with(2, bad)), AllOf(HasSubstr(bad), HasSubstr("version")));
 }
