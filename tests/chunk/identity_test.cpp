@@ -66,13 +66,15 @@ class ChunkIdentity : public ::testing::Test {
     const std::string whole = test::whole_bytes(settings, folder_);
     ASSERT_GT(whole.size(), 1000u) << whole;
     const std::string store = folder_ / fmt::format("store{}", stores_++);
-    slabs_ = write_store(settings, store, {}).plan.slabs;
+    plan_ = write_store(settings, store, {}).plan;
+    slabs_ = plan_.slabs;
     for (const int count : counts) {
       const auto parts = test::make_parts(settings, store, count, folder_);
       EXPECT_TRUE(test::merged_bytes(parts, folder_) == whole) << count << " chunks of " << slabs_ << " slabs";
     }
   }
   test::TemporaryFolder folder_;
+  SurfacePlan plan_;
   std::int64_t slabs_ = 0;
   int stores_ = 0;
 };
@@ -145,6 +147,19 @@ TEST_F(ChunkIdentity, SamplesOnNoSurface) {
     s.cluster = mode;
     expect_same(dust(1500), s, {7});
   }
+}
+
+TEST_F(ChunkIdentity, ChosenByTheNoise) {
+  Cloud cloud = long_cloud(6000, 3);
+  std::mt19937 random(19);
+  std::uniform_real_distribution<> uniform(-0.04, 0.04);
+  for (Point3& p : cloud.positions) {
+    for (double& c : p) c += uniform(random);
+  }
+  SurfaceSettings s;
+  s.blend.reset();
+  expect_same(cloud, s, {3});
+  EXPECT_EQ(plan_.refit, 4);
 }
 
 TEST_F(ChunkIdentity, RadiiThatTheInputGives) {

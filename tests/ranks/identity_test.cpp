@@ -85,6 +85,19 @@ TEST_F(RankIdentity, HolesAcrossTheBordersOfRanks) {
   expect_same({test::write_cloud(pierced, folder_ / "in.ply"), "--close-holes", "40", "--curvature"}, {2, 5});
 }
 
+TEST_F(RankIdentity, ChosenByTheNoise) {
+  Cloud cloud = pipe(8000);
+  std::mt19937 random(19);
+  std::uniform_real_distribution<> uniform(-0.03, 0.03);
+  for (Point3& p : cloud.positions) {
+    for (double& c : p) c += uniform(random);
+  }
+  expect_same({test::write_cloud(cloud, folder_ / "in.ply"), "--blend", "auto", "--threads", "1", "--stats",
+               folder_ / "s.json"},
+              {2});
+  EXPECT_EQ(nlohmann::json::parse(test::read_file(folder_ / "s.json")).at("refit"), 4);
+}
+
 TEST_F(RankIdentity, MoreRanksThanSlabs) {
   expect_same({test::write_cloud(test::sphere_cloud(1500), folder_ / "in.ply"), "--threads", "1"}, {9});
 }
