@@ -293,6 +293,14 @@ Filling fill_small(const Loop& loop) {
   return filling;
 }
 
+/// The rim of a lone triangle, whose filling would be its back.
+bool is_triangle(const Loop& loop) {
+  return loop.vertices.size() == 3 && loop.facing[0] == loop.facing[1] && loop.facing[1] == loop.facing[2] &&
+         (to_vec(loop.vertices[1].position) - to_vec(loop.vertices[0].position))
+                 .cross(to_vec(loop.vertices[2].position) - to_vec(loop.vertices[0].position))
+                 .dot(to_vec(loop.facing[0])) <= 0;
+}
+
 }  // namespace
 
 const char* describe(Verdict verdict) {
@@ -313,6 +321,7 @@ const char* describe(Verdict verdict) {
 
 Filling fill_loop(const Loop& loop, double longest) {
   if (loop.vertices.size() < 3) return refused(Verdict::bent);
+  if (is_triangle(loop)) return refused(Verdict::outer_rim);
   const double length = length_in_radii(loop);
   Filling filling = fill_smooth(loop);
   // What an outer rim is does not depend on its length.

@@ -94,6 +94,13 @@ TEST(Fill, NotTheEndOfATube) {
   EXPECT_NE(fill_loop(loop, 100).verdict, Verdict::filled);
 }
 
+TEST(Fill, NotTheBackOfALoneTriangle) {
+  Loop loop = sphere_rim(3, 0.2, 0.3);
+  ASSERT_EQ(fill_loop(loop, 100).verdict, Verdict::filled);
+  loop.facing.assign(3, {0, 0, -1});
+  EXPECT_EQ(fill_loop(loop, 100).verdict, Verdict::outer_rim);
+}
+
 TEST(Fill, UsesNoEdgeOfTheMesh) {
   Loop loop = sphere_rim(4, 0.2, 0.3);
   loop.taken = {{0, 2}};

@@ -85,7 +85,7 @@ TEST(Holes, OfTwoNearSheetsAreNotJoined) {
   }
   const Reconstruction open = test::reconstruct(cloud, closing(0));
   ASSERT_EQ(open.facts.euler, (std::vector<long>{0, 0}));
-  const Reconstruction closed = test::reconstruct(cloud, closing(14));
+  const Reconstruction closed = test::reconstruct(cloud, closing(20));
   EXPECT_EQ(closed.stats.holes.closed, 2U);
   EXPECT_EQ(closed.facts.euler, (std::vector<long>{1, 1}));
   EXPECT_TRUE(closed.facts.is_manifold());
