@@ -73,8 +73,12 @@ double residual(const std::vector<Eigen::Vector3d>& points) {
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& p : points) scatter += (p - mean) * (p - mean).transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(scatter);
-  // A line or a ball of samples has no plane.
-  if (!(axes.eigenvalues()(1) > 4 * axes.eigenvalues()(0))) return -1;
+  // A line of samples has no plane. Nor has a ball, but that is what much noise looks like: half of a normal
+  // distribution lies within two thirds of its deviation.
+  if (!(axes.eigenvalues()(1) > 4 * axes.eigenvalues()(0))) {
+    if (axes.eigenvalues()(2) > 4 * axes.eigenvalues()(1)) return -1;
+    return 0.67 * std::sqrt(std::max(0.0, axes.eigenvalues()(0)) / static_cast<double>(points.size()));
+  }
   using Row = Eigen::Matrix<double, 6, 1>;
   Eigen::Matrix<double, 6, 6> a = Eigen::Matrix<double, 6, 6>::Zero();
   Row b = Row::Zero();

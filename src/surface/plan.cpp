@@ -95,6 +95,16 @@ double expected_volume_memory(const SurfaceSettings& s, const Resolved& r, doubl
   return bricks * (kBrick + extra) + static_cast<double>(samples) * cells / kCellsPerBrick * kRecords + kBuffers;
 }
 
+/// Of fitting normals again, measured with supports of 2 to 8 r: samples within reach of the slab's whose normals are
+/// found, in the order they came and in clumps; the normals until the sweep has passed; bins and rows of tiles.
+double expected_refit_memory(const SurfaceSettings& s, const Resolved& r, double per_step, std::uint64_t samples) {
+  if (r.refit.support <= 0) return 0;
+  constexpr double kHeld = 80, kNormal = 12, kBins = 12e6;
+  const double slab = r.lattice.slab_height();
+  const auto within = [&](double height) { return std::min(per_step * height, static_cast<double>(samples)); };
+  return kBins + kHeld * within(2 * filter_reach(r) + slab) + kNormal * within((5.0 + s.window) * slab);
+}
+
 std::uint64_t expected_memory(const SurfaceSettings& s, const Resolved& r, const SlabStore& store,
                               std::size_t attributes) {
   // The densest slab, from the store's own counts.
@@ -119,7 +129,8 @@ std::uint64_t expected_memory(const SurfaceSettings& s, const Resolved& r, const
   // What the model leaves out goes with the window, too: counting cells, clustering, bins, and the allocator's gaps.
   constexpr double kRest = 2.0;
   const double volume = expected_volume_memory(s, r, per_slab, cells, store.total(), attributes);
-  return static_cast<std::uint64_t>(kProgram + cached + kRest * window + volume);
+  return static_cast<std::uint64_t>(kProgram + cached + kRest * window + volume +
+                                    expected_refit_memory(s, r, per_step, store.total()));
 }
 
 }  // namespace
@@ -272,9 +283,10 @@ double expected_cpu_seconds(const SurfaceSettings& s, const Resolved& r, std::si
   constexpr double kAttribute = 45e-9;
   constexpr double kSums = 300e-9;
   constexpr double kCell = 1190e-9;
-  constexpr double kVoxels = 150e-9;     // --vdb: for each voxel of the band's half width and two more
-  constexpr double kStep = 0.75;         // a further projection step against the first
-  constexpr double kSupport = 1 / 0.63;  // influence radius of a main cell, cells
+  constexpr double kRefit = 550e-9, kRefitSums = 30e-9;  // --refit: each sample, and by the square of the support
+  constexpr double kVoxels = 150e-9;                     // --vdb: for each voxel of the band's half width and two more
+  constexpr double kStep = 0.75;                         // a further projection step against the first
+  constexpr double kSupport = 1 / 0.63;                  // influence radius of a main cell, cells
   const double influence = r.support.blend * r.plan.radius_median;
   const double main_cell =
       r.feed.fixed_cell ? r.plan.finest_cell
@@ -287,7 +299,10 @@ double expected_cpu_seconds(const SurfaceSettings& s, const Resolved& r, std::si
   const double sums =
       kSums * reach * reach * (1 + kStep * (s.steps == 0 ? kUsualSteps : s.steps - 1)) * (s.diffuse ? 2 : 1);
   const double volume = s.volume.path.empty() ? 0 : kVoxels * (2 + s.volume.band);
-  const double per_sample = kSample + kAttribute * static_cast<double>(attributes) + sums + (kCell + volume) * cells;
+  const auto support = static_cast<double>(r.refit.support);
+  const double refit = support > 0 ? kRefit + kRefitSums * support * support : 0;
+  const double per_sample =
+      kSample + kAttribute * static_cast<double>(attributes) + refit + sums + (kCell + volume) * cells;
   return static_cast<double>(r.plan.samples) * per_sample;
 }
 

@@ -159,7 +159,7 @@ TEST_F(ChunkIdentity, ChosenByTheNoise) {
   SurfaceSettings s;
   s.blend.reset();
   expect_same(cloud, s, {3});
-  EXPECT_EQ(plan_.refit, 4);
+  EXPECT_EQ(plan_.refit, 4) << plan_.noise;
 }
 
 TEST_F(ChunkIdentity, RadiiThatTheInputGives) {

@@ -77,8 +77,14 @@ TEST(SurveyNoise, OfAPlane) {
 TEST(SurveyNoise, OfASphereIsNotItsCurvature) {
   EXPECT_LT(noise_of(noisy_sphere(20'000, 0), 50), 0.002);
   EXPECT_LT(noise_of(noisy_sphere(1000, 0), 50), 0.02);
-  for (const double k : {0.5, 1.0})
-    EXPECT_NEAR(noise_of(noisy_sphere(20'000, k), 50), expected(k), 0.15 * expected(k)) << k;
+  EXPECT_NEAR(noise_of(noisy_sphere(20'000, 0.5), 50), expected(0.5), 0.15 * expected(0.5));
+  // Of a spacing either way, the neighbours are those of a place beside the surface.
+  EXPECT_NEAR(noise_of(noisy_sphere(20'000, 1), 50), expected(1), 0.3 * expected(1));
+}
+
+/// So thick a layer has no plane, and is not mistaken for a clean one.
+TEST(SurveyNoise, OfALayerAsThickAsItsNeighbourhoods) {
+  for (const double k : {2.0, 4.0}) EXPECT_GT(noise_of(noisy_plane(20'000, k), 50), 0.3) << k;
 }
 
 TEST(SurveyNoise, LargeCloudsAreSeenInParts) {

@@ -169,6 +169,18 @@ TEST(SurfacePlan, TimeGrowsWithSamplesStepsAndCells) {
   EXPECT_LT(std::abs(coarse - seconds(1'000'000, [](auto& s) { s.blend = 8; })), 0.1 * coarse);
 }
 
+TEST(SurfacePlan, CountsNormalsFittedAgain) {
+  const Cloud cloud = test::sphere_cloud(20000);
+  const SurfacePlan kept = plan_of(cloud);
+  const SurfacePlan near = plan_of(cloud, [](auto& s) { s.refit = 1; });
+  const SurfacePlan far = plan_of(cloud, [](auto& s) { s.refit = 8; });
+  EXPECT_GT(near.memory_bytes, kept.memory_bytes);
+  EXPECT_GT(far.memory_bytes, near.memory_bytes);
+  EXPECT_GT(near.seconds, kept.seconds);
+  EXPECT_GT(far.seconds, 2 * kept.seconds);
+  EXPECT_EQ(far.finest_cell, kept.finest_cell);
+}
+
 TEST(SurfacePlan, IsDescribedInWords) {
   SurfacePlan plan;
   plan.samples = 1234;
@@ -178,8 +190,7 @@ TEST(SurfacePlan, IsDescribedInWords) {
   plan.slab_height = 8;
   plan.memory_bytes = 123'000'000;
   plan.disk_bytes = 45'000'000;
-  SurfaceSettings settings;
-  settings.blend = 1.5;
+  plan.blend = 1.5;
   const std::string text = describe(plan);
   for (const char* words :
        {"samples 1234", "levels 5", "cells 0.5 to 8", "slabs 77 of 8", "R = 1.5 r", "memory 123 MB", "disk 45 MB"}) {
