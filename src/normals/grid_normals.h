@@ -18,8 +18,8 @@ struct GridNormals {
 
 /// A sample's normal is the sum of the faces around it (and of the next ring's where these are near its plane), so it
 /// lies on the side the scanner saw. Faces that the scanner would have seen at more than 80 degrees join a thing to
-/// what stands behind it and do not count; a sample with fewer than three of its four faces gets no normal. `seen` says where the scanners stood, row by row (ascending); grids that it
-/// does not know the scanner of get no normals either.
+/// what stands behind it and do not count; a sample with fewer than three of its four faces gets no normal. `seen` says
+/// where the scanners stood, row by row (ascending); grids that it does not know the scanner of get no normals either.
 ///
 /// Reads the source once; memory: a few lines of a grid, and a bit for each of its places. Normals rest in an unnamed
 /// file in `directory`, 12 bytes a row. Throws Error(budget) when it cannot be written, and what the source throws.

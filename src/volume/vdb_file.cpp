@@ -21,7 +21,8 @@ namespace {
 
 [[noreturn]] void refuse(const std::string& path, const std::string& what) {
   std::string line = what;  // it may quote the file
-  std::replace_if(line.begin(), line.end(), [](char c) { return c >= 0 && c < ' '; }, '?');
+  std::replace_if(
+      line.begin(), line.end(), [](char c) { return c >= 0 && c < ' '; }, '?');
   throw Error(ExitCode::unreadable, fmt::format("{}: {}", path, line));
 }
 
