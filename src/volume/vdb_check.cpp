@@ -84,15 +84,29 @@ std::uint64_t check_blosc(Walker& w, std::uint64_t bytes) {
   return unpacked;
 }
 
-/// Where a grid's leaves lie, for readers that load them later. What it says first is what memory is asked for.
+/// One of the table's two arrays, compressed where its size is not 0.
+void check_leaf_array(Walker& w, std::uint32_t packed, std::uint64_t bytes) {
+  if (packed == 0) return w.skip(bytes);
+  constexpr std::uint64_t kPadded = 128;  // shorter ones are filled up before they are compressed
+  const std::uint64_t unpacked = check_blosc(w, packed);
+  if (unpacked != bytes && (bytes > kPadded || unpacked != kPadded)) wrong("a table of leaves is damaged");
+}
+
+/// What each leaf is like, for readers that load it later: one byte of each, and where told eight more. OpenVDB goes by
+/// what is inside, not by the length before it, and asks for memory by the number of leaves, each of which takes a byte
+/// of the file at least.
 void check_leaf_table(Walker& w, std::uint64_t bytes) {
-  if (bytes < 8) {
-    w.skip(bytes);
-    return;
-  }
-  const auto leaves = w.number<std::uint32_t>(), packed = w.number<std::uint32_t>();
-  if (packed > bytes || leaves > w.left()) wrong("a table of leaves does not fit into it");
-  w.skip(bytes - 8);
+  if (bytes == 0) return;
+  constexpr std::uint32_t kNone = 0xffffffff;
+  const std::uint64_t before = w.left();
+  const auto leaves = w.number<std::uint32_t>();
+  if (leaves > w.left()) wrong("a table of leaves does not fit into it");
+  check_leaf_array(w, w.number<std::uint32_t>(), leaves);
+  const auto packed = w.number<std::uint32_t>();
+  if (packed != kNone) check_leaf_array(w, packed, 8 * std::uint64_t{leaves});
+  const std::uint64_t walked = before - w.left();
+  if (walked > bytes) wrong("a table of leaves is longer than it says");
+  w.skip(bytes - walked);
 }
 
 /// OpenVDB reads metadata by its type, whatever length stands before it. Returns whether it says that values are saved
@@ -248,7 +262,7 @@ class TreeWalk {
     }
     const auto size = w_.number<std::int64_t>();
     if (size <= 0) {
-      if (static_cast<std::uint64_t>(-size) != expected) wrong("a node has more or fewer values than its masks say");
+      if (0 - static_cast<std::uint64_t>(size) != expected) wrong("a node has more or fewer values than its masks say");
       w_.skip(expected);
       return;
     }
