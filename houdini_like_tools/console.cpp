@@ -133,19 +133,19 @@ std::string pipe_name(const std::string& name) {
   return name == "stdin.ply" || name == "stdout.ply" ? "-" : name;
 }
 
+Length length_of(const std::string& option, const std::string& text) {
+  try {
+    return parse_length(text);
+  } catch (const Error& e) {
+    throw CLI::ValidationError(option, e.what());
+  }
+}
+
 CLI::Option* add_length(CLI::App& app, const std::string& names, Length& value, const std::string& description) {
   const std::string shown = names.substr(names.find_last_of(',') + 1);
   return app
       .add_option_function<std::string>(
-          names,
-          [&value, shown](const std::string& text) {
-            try {
-              value = parse_length(text);
-            } catch (const Error& e) {
-              throw CLI::ValidationError(shown, e.what());
-            }
-          },
-          description)
+          names, [&value, shown](const std::string& text) { value = length_of(shown, text); }, description)
       ->type_name("LENGTH")
       ->default_str(to_string(value));
 }

@@ -41,6 +41,8 @@ void cancel_on_signals();
 /// stdout.ply. A file of that name is ./stdin.ply.
 std::string pipe_name(const std::string& name);
 
+/// The value of an option that takes a length (length.h); what cannot be read is a usage error naming the option.
+Length length_of(const std::string& option, const std::string& text);
 /// Adds an option that takes a length (length.h); what cannot be read is a usage error naming the option.
 CLI::Option* add_length(CLI::App& app, const std::string& names, Length& value, const std::string& description);
 

@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <map>
 #include <nlohmann/json.hpp>
 #include <vector>
 
 #include "lamina/error.h"
 #include "numbers.h"
+#include "words.h"
 
 namespace lamina::tools {
 namespace {
@@ -27,11 +27,10 @@ void take_viewpoint(NormalsSettings& settings, const std::string& text) {
 }  // namespace
 
 void add_normals_choice(CLI::App& tool, NormalsChoice& normals, const std::string& group) {
-  const std::map<std::string, NormalsChoice> words{
-      {"file", NormalsChoice::file}, {"auto", NormalsChoice::automatic}, {"estimate", NormalsChoice::estimate}};
   tool.add_option("--normals", normals,
                   "whose normals: the file's; auto: found where the file has none; estimate: all found")
-      ->transform(CLI::CheckedTransformer(words, CLI::ignore_case))
+      ->transform(words<NormalsChoice>(
+          {{"file", NormalsChoice::file}, {"auto", NormalsChoice::automatic}, {"estimate", NormalsChoice::estimate}}))
       ->option_text("file|auto|estimate [file]")
       ->group(group);
 }

@@ -55,4 +55,16 @@ CLI::Option* add_repeated_numbers(CLI::App& app, const std::string& name, std::s
       ->allow_extra_args(false);
 }
 
+CLI::Option* add_number_or_auto(CLI::App& app, const std::string& name, const std::string& usual,
+                                const std::string& description,
+                                const std::function<void(const std::optional<double>&)>& take) {
+  const auto read = [=](const std::string& text) {
+    if (text == "auto") return take(std::nullopt);
+    const auto number = read_numbers(text, ',', 1);
+    if (!number) throw CLI::ValidationError(name, text + ": is neither a number nor auto");
+    take(number->front());
+  };
+  return app.add_option_function<std::string>(name, read, description)->option_text("FLOAT|auto [" + usual + "]");
+}
+
 }  // namespace lamina::tools

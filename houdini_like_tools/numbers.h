@@ -23,4 +23,10 @@ CLI::Option* add_repeated_numbers(CLI::App& app, const std::string& name, std::s
                                   const std::string& description,
                                   const std::function<void(const std::vector<double>&)>& take);
 
+/// An option that takes a number, or `auto` where the program chooses: `take` then gets nothing. `usual`: shown as the
+/// default.
+CLI::Option* add_number_or_auto(CLI::App& app, const std::string& name, const std::string& usual,
+                                const std::string& description,
+                                const std::function<void(const std::optional<double>&)>& take);
+
 }  // namespace lamina::tools

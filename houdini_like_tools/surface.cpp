@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -16,11 +15,15 @@
 #include "model.h"
 #include "normal_options.h"
 #include "result_file.h"
+#include "surface_fit.h"
 #include "surface_holes.h"
 #include "surface_parts.h"
 #include "surface_ranks.h"
+#include "surface_stats.h"
+#include "surface_volume.h"
 #include "text.h"
 #include "tool.h"
+#include "words.h"
 
 namespace lamina::tools {
 namespace {
@@ -32,107 +35,6 @@ struct SurfaceOptions {
   PartsOptions parts;
   std::string stats, preview;
 };
-
-void add_cleaning(nlohmann::ordered_json& j, const SurfaceStats& s, const SurfaceSettings& settings) {
-  const CleanCounts& c = s.cleaned;
-  j["cleaned"] = {{"clipped", c.clipped},
-                  {"skipped", c.skipped},
-                  {"merged", c.merged},
-                  {"outliers", c.outliers},
-                  {"outlier_distance", c.outlier_distance},
-                  {"thinned", c.thinned}};
-  if (settings.prune_triangles > 0 || settings.prune_size.value > 0) {
-    j["pruned"] = {{"kept_parts", s.pruned.kept},
-                   {"removed_parts", s.pruned.removed},
-                   {"removed_triangles", s.pruned.removed_triangles}};
-  }
-  if (settings.local) j["shift"] = s.shift;
-}
-
-nlohmann::ordered_json to_json(const SurfaceStats& s, const SurfaceSettings& settings) {
-  nlohmann::ordered_json j;
-  j["input"] = settings.input;
-  if (!settings.more_inputs.empty()) j["more_inputs"] = settings.more_inputs;
-  j["output"] = settings.output;
-  j["dry_run"] = settings.dry_run;
-  j["samples"] = s.samples_read;
-  j["samples_used"] = s.plan.samples;
-  j["vertices"] = s.vertices;
-  j["triangles"] = s.triangles;
-  j["levels"] = s.plan.levels;
-  j["leaf_cells_by_level"] = s.leaf_cells;
-  j["noise"] = s.plan.noise;
-  j["blend"] = s.plan.blend;
-  j["refit"] = s.plan.refit;
-  j["cell"] = to_string(s.plan.cell);
-  j["finest_cell"] = s.plan.finest_cell;
-  j["slab_height"] = s.plan.slab_height;
-  j["slabs"] = s.plan.slabs;
-  j["radius"] = {{"p01", s.plan.radius_low}, {"median", s.plan.radius_median}, {"p99", s.plan.radius_high}};
-  j["wall_seconds"] = s.wall;
-  j["cpu_seconds"] = s.cpu;
-  j["peak_memory_bytes"] = s.peak_memory;
-  j["expected_memory_bytes"] = s.plan.memory_bytes;
-  j["temporary_disk_bytes"] = s.disk_bytes;
-  j["expected_disk_bytes"] = s.plan.disk_bytes;
-  j["expected_seconds"] = s.plan.seconds;
-  j["stages"] = nlohmann::ordered_json::array();
-  for (const StageTime& t : s.stages) j["stages"].push_back({{"stage", t.stage}, {"wall", t.wall}, {"cpu", t.cpu}});
-  j["rejected"] = nlohmann::ordered_json::array();
-  for (const Rejected& r : s.rejected) {
-    nlohmann::ordered_json entry{{"reason", r.reason}, {"count", r.count}};
-    if (r.first_row) entry["first_row"] = *r.first_row;
-    j["rejected"].push_back(entry);
-  }
-  add_cleaning(j, s, settings);
-  j["replaced_attribute_values"] = s.replaced_attributes;
-  j["corners"] = {
-      {"projected", s.corners}, {"seen", s.corners_seen}, {"trusted", s.corners_good}, {"sums", s.corner_sums}};
-  j["contradicting_normals"] = {
-      {"corners", s.corners_torn}, {"worst_slab", s.torn_slab}, {"worst_share", s.torn_share}};
-  j["isosurface"] = {{"vertices", s.isovertices},
-                     {"triangles", s.isotriangles},
-                     {"crossing_cells", s.crossing_cells},
-                     {"general_cells", s.general_cells},
-                     {"rejected_loops", s.rejected_loops}};
-  if (s.normals) j["normals"] = normals_json(*s.normals);
-  if (settings.volume.wanted()) {
-    j["volume"] = {{"files", s.volume.files},
-                   {"voxelsize", s.volume.voxel},
-                   {"voxels", s.volume.voxels},
-                   {"points", s.volume.points},
-                   {"bytes", s.volume.bytes}};
-  }
-  j["clusters"] = {{"seen", s.clusters.corners},
-                   {"collapsed", s.clusters.collapsed},
-                   {"patches", s.clusters.patches},
-                   {"kept_isovertices", s.clusters.kept_isovertices},
-                   {"hard", s.clusters.hard}};
-  j["holes"] = holes_json(s.holes);
-  return j;
-}
-
-Length length_of(const char* option, const std::string& text) {
-  try {
-    return parse_length(text);
-  } catch (const Error& e) {
-    throw CLI::ValidationError(option, e.what());
-  }
-}
-
-/// A number, or `auto` where the program chooses.
-CLI::Option* add_choice(CLI::App& app, const std::string& name, std::optional<double>& value, const std::string& usual,
-                        const std::string& description) {
-  const auto take = [&value, name](const std::string& text) {
-    double number = 0;
-    value.reset();
-    if (text == "auto") return;
-    if (!CLI::detail::lexical_cast(text, number))
-      throw CLI::ValidationError(name, text + ": is neither a number nor auto");
-    value = number;
-  };
-  return app.add_option_function<std::string>(name, take, description)->option_text("FLOAT|auto [" + usual + "]");
-}
 
 /// A picture of the mesh file: of its triangles where they can be held, of its vertices where they cannot.
 void draw_preview(const SurfaceOptions& o, const std::string& mesh, const RunContext& context) {
@@ -202,7 +104,7 @@ void run_surface(const SurfaceOptions& o) {
   }
   if (!o.preview.empty() && !settings.dry_run) draw_preview(o, settings.output, context);
   if (!stats_file) return;
-  nlohmann::ordered_json json = to_json(stats, settings);
+  nlohmann::ordered_json json = stats_json(stats, settings);
   if (parts.chunk) {
     json.erase("holes");  // are known to the merge
     json["chunk"] = {{"number", o.parts.chunk.number},
@@ -214,43 +116,6 @@ void run_surface(const SurfaceOptions& o) {
   }
   if (ranked) json["ranks"] = ranks_json(ranks.ranks);
   stats_file->write(json.dump(2) + "\n");
-}
-
-template <typename T>
-CLI::CheckedTransformer words(const std::map<std::string, T>& map) {
-  return CLI::CheckedTransformer(map, CLI::ignore_case);
-}
-
-void add_volume_options(CLI::App& tool, VolumeExport& v) {
-  const std::string volume = "Volume";
-  tool.add_option("--vdb", v.path, "write the signed distance as an OpenVDB level set, grid surface, too")
-      ->type_name("OUT.vdb")
-      ->group(volume);
-  tool.add_option("--vdb-grids", v.grids,
-                  "further grids: N, Cd, weight, curvature, any attribute; auto: Cd with colours")
-      ->delimiter(',')
-      ->expected(1, -1)
-      ->option_text("NAME,... [auto]")
-      ->group(volume);
-  tool.add_option("--vdb-precision", v.half, "numbers of 16 or 32 bits")
-      ->transform(words<bool>({{"half", true}, {"float", false}}))
-      ->option_text("half|float [half]")
-      ->group(volume);
-  tool.add_option("--vdb-band", v.band, "half width of the band, voxels")->capture_default_str()->group(volume);
-  tool.add_option("--vdb-voxelsize", v.voxel,
-                  "edge of a voxel: the octree's nearest cell size is taken; 0: most cells'")
-      ->capture_default_str()
-      ->group(volume);
-  tool.add_flag("--vdb-levels", v.levels, "one grid per level of the octree, surface_L0 the finest, for inspection")
-      ->group(volume);
-  tool.add_option_function<std::string>(
-          "--vdb-split", [&v](const std::string& text) { v.split = parse_bytes(text); },
-          "begin a new file, OUT.0001.vdb ..., after so many bytes of voxels in memory")
-      ->type_name("SIZE")
-      ->group(volume);
-  tool.add_option("--vdb-points", v.points, "write the projected corners as an OpenVDB points grid (P, N, Cd, pscale)")
-      ->type_name("OUT.vdb")
-      ->group(volume);
 }
 
 }  // namespace
@@ -294,43 +159,7 @@ void add_surface(CLI::App& app) {
   add_normals_choice(*tool, s.normals, "Normals");
   add_normals_options(*tool, s.normal_search, "Normals");
 
-  const std::string fit = "Fit";
-  add_choice(*tool, "--blend", s.blend, fmt::format("{:g}", *s.blend),
-             "H: the influence radius R is H times a sample's radius r; auto: H, and --cell and --refit where these "
-             "are not given, by the cloud's noise and the evenness of its sampling")
-      ->group(fit);
-  add_choice(*tool, "--refit", s.refit, "0, with --blend auto: auto",
-             "first replace normals by those fitted to the samples within so many radii; 0: keep them; auto: keep "
-             "them but for noise that --blend auto finds")
-      ->group(fit);
-  const auto take_steps = [&s](const std::string& text) {
-    s.steps = 0;
-    if (text != "auto" && (!CLI::detail::lexical_cast(text, s.steps) || s.steps < 1))
-      throw CLI::ValidationError("--steps", text + ": is neither a number in 1..16 nor auto");
-  };
-  tool->add_option_function<std::string>("--steps", take_steps,
-                                         "N: projection steps; auto: as many as each corner needs")
-      ->option_text("N|auto [1]")
-      ->group(fit);
-  tool->add_option("--step-tolerance", s.step_tolerance,
-                   "with --steps auto: a corner is done when a step moves it no more than so many radii r")
-      ->capture_default_str()
-      ->group(fit);
-  tool->add_option("--fit", s.fit, "surface fitted to the samples around a corner")
-      ->transform(words<FitMode>({{"plane", FitMode::plane}, {"sphere", FitMode::sphere}}))
-      ->option_text("plane|sphere [sphere]")
-      ->group(fit);
-  tool->add_flag("--diffuse", s.diffuse, "project cell centres and average them at the corners: smoother")->group(fit);
-
-  const std::string lattice = "Octree";
-  tool->add_option_function<std::string>(
-          "--cell", [&s](const std::string& text) { s.cell = length_of("--cell", text); },
-          "largest leaf cell: a length, or times the smallest r or R around")
-      ->option_text("LENGTH [0.9R, with --blend auto: chosen]")
-      ->group(lattice);
-  tool->add_option("--levels", s.levels, "octree levels; 0: as the radii ask, at least 4")
-      ->capture_default_str()
-      ->group(lattice);
+  add_fit_options(*tool, s);
 
   const std::string mesh = "Mesh";
   tool->add_option(

@@ -1,5 +1,7 @@
 // Scalar attributes a sample or vertex carries besides position and normal: colours and anything else in the file.
 #pragma once
+#include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -40,5 +42,12 @@ struct AttributeSpec {
 };
 
 using AttributeLayout = std::vector<AttributeSpec>;
+
+/// Where the attribute of that name is; nothing when there is none.
+inline std::optional<std::size_t> find_attribute(const AttributeLayout& layout, const std::string& name) {
+  for (std::size_t i = 0; i < layout.size(); ++i)
+    if (layout[i].name == name) return i;
+  return std::nullopt;
+}
 
 }  // namespace lamina

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void refuse(const std::string& name, const std::string& why) {
+[[noreturn]] void cannot_use(const std::string& name, const std::string& why) {
   throw Error(ExitCode::budget, fmt::format("{}: {}", name, why));
 }
 
@@ -45,14 +45,14 @@ void remove_abandoned(const fs::path& name) {
 NewFolder::NewFolder(const std::string& name) : name_(name) {
   while (name_.size() > 1 && name_.back() == '/') name_.pop_back();
   std::error_code error;
-  if (name_.empty()) refuse("the folder", "its name is empty");
+  if (name_.empty()) cannot_use("the folder", "its name is empty");
   if (fs::exists(name_, error) && !(fs::is_directory(name_, error) && fs::is_empty(name_, error)))
-    refuse(name_, "is there already; remove it or choose another name");
+    cannot_use(name_, "is there already; remove it or choose another name");
   const fs::path path(name_);
   path_ = (path.parent_path() / fmt::format(".{}.partial-{}", path.filename().string(), ::getpid())).string();
   remove_abandoned(path);
   if (!fs::create_directory(path_, error))
-    refuse(name_, fmt::format("cannot be made: {}", error ? error.message() : "it is there already"));
+    cannot_use(name_, fmt::format("cannot be made: {}", error ? error.message() : "it is there already"));
   lock_ = locked(path_);
 }
 
@@ -63,7 +63,7 @@ NewFolder::~NewFolder() {
 
 void NewFolder::publish() {
   if (std::rename(path_.c_str(), name_.c_str()) != 0)
-    refuse(name_, fmt::format("cannot be made: {}", system_message(errno)));
+    cannot_use(name_, fmt::format("cannot be made: {}", system_message(errno)));
   path_.clear();
 }
 

@@ -5,9 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <span>
 
 #include "clean/neighbour_grid.h"
-#include "files/descriptor.h"
+#include "files/scratch_file.h"
 #include "lamina/error.h"
 
 namespace lamina::clean {
@@ -46,32 +47,6 @@ void append(Positions& to, const Positions& from) {
   to.y.insert(to.y.end(), from.y.begin(), from.y.end());
   to.z.insert(to.z.end(), from.z.begin(), from.z.end());
 }
-
-/// Numbers on their way through an unnamed file.
-class FloatFile {
- public:
-  explicit FloatFile(const std::string& directory) : directory_(directory), file_(open_unlinked(directory)) {}
-  void write(const std::vector<float>& values) {
-    check(write_all(file_.get(), values.data(), values.size() * sizeof(float)));
-  }
-  void read(std::vector<float>& values) {
-    const std::size_t bytes = values.size() * sizeof(float);
-    const ReadResult got = pread_all(file_.get(), values.data(), bytes, at_);
-    check(got.error != 0 || got.bytes == bytes ? got.error : EIO);
-    at_ += bytes;
-  }
-
- private:
-  void check(int error) const {
-    if (error == 0) return;
-    throw Error(ExitCode::budget, fmt::format("the temporary file in '{}' cannot be used: {}; free space there or "
-                                              "choose another with --tmp-dir",
-                                              directory_, system_message(error)));
-  }
-  std::string directory_;
-  Descriptor file_;
-  std::uint64_t at_ = 0;
-};
 
 /// Cells that hold about a third of the neighbours, so that the cells around a sample hold all of them; by runs of
 /// buckets from all over the cloud.
@@ -112,7 +87,7 @@ Outliers drop_outliers(const SlabStore& store, const OutlierRule& rule, const st
   const std::int32_t cell = choose_cell(store, buckets, rule.neighbours);
   buckets.forget_before(store.buckets());
   const std::int64_t reach = std::int64_t{kFarthestCells} * cell;
-  FloatFile distances(directory);
+  ScratchFile distances(directory);
   Moments moments;
   for (std::size_t first = 0; first < store.buckets();) {
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
@@ -139,16 +114,19 @@ Outliers drop_outliers(const SlabStore& store, const OutlierRule& rule, const st
     }
     const std::vector<float> means = mean_distances(positions, wanted, rule.neighbours, cell);
     moments.add(means);
-    distances.write(means);
+    distances.write(std::as_bytes(std::span(means)));
     first = end;
   }
   Outliers out;
   if (!(moments.count > 0)) return out;
   out.limit = moments.limit(rule.sigma);
   std::vector<float> means;
+  std::uint64_t at = 0;
   for (auto& mask : masks) {
     means.resize(static_cast<std::size_t>(std::count(mask.begin(), mask.end(), true)));
-    distances.read(means);
+    const auto bytes = std::as_writable_bytes(std::span(means));
+    distances.read(at, bytes);
+    at += bytes.size();
     std::size_t n = 0;
     for (auto&& stays : mask) {
       if (!stays || !(double{means[n++]} > out.limit)) continue;

@@ -7,7 +7,7 @@ namespace lamina::cluster {
 namespace {
 
 constexpr std::uint32_t kNext = SlabIndex::kNextSlab;
-constexpr std::size_t kLeastTriangles = 1 << 14;
+constexpr std::size_t kLeastTallied = 1 << 14;
 constexpr double kPositive = 4294967296.0;  // makes positions positive, so that truncation rounds down
 
 /// Two corners of one cell differ by at most one lattice step per axis, so their slots differ on a lattice of one
@@ -177,7 +177,7 @@ void tally_as(Window& window, std::int64_t slab) {
                       {here.corners.data(), next.corners.data()},
                       {slab_tag(slab), slab_tag(slab + 1)}};
   const std::span<const IsoTriangle> triangles(here.iso->triangles);
-  const std::size_t chunks = chunk_count(triangles.size(), kLeastTriangles);
+  const std::size_t chunks = chunk_count(triangles.size(), kLeastTallied);
   const std::vector<Share> shares = make_shares(here, chunks);
   std::vector<ChunkResult> results(chunks);
   for_chunks(triangles.size(), chunks, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
@@ -212,7 +212,7 @@ void lay_out(SlabRecord& record, std::shared_ptr<const IsoSlab> iso) {
   record.vetoes.assign(corners.size(), 0);
   record.seats.assign(corners.size(), kNone);
   resize_anew(record.vertices, vertices.size());
-  for_chunks(corners.size(), chunk_count(corners.size(), kLeastTriangles),
+  for_chunks(corners.size(), chunk_count(corners.size(), kLeastTallied),
              [&](std::size_t, std::size_t begin, std::size_t end) {
                for (std::size_t c = begin; c < end; ++c) {
                  CornerNote note;

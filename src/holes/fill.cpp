@@ -131,10 +131,6 @@ class Sphere {
   Vec3 linear_ = Vec3::Zero();
 };
 
-double cross(const Vec2& a, const Vec2& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
-
 double signed_area(const std::vector<Vec3>& polygon) {
   double sum = 0;
   for (std::size_t i = 0; i < polygon.size(); ++i)

@@ -16,10 +16,6 @@ using Vec3 = Eigen::Vector3d;
 /// A triangle of the plane counts as one when it is this high for its longest side.
 constexpr double kLeastHeight = 1e-3;
 
-double cross(const Vec2& a, const Vec2& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
-
 double twice_area(const Vec2& a, const Vec2& b, const Vec2& c) {
   return cross(b - a, c - a);
 }

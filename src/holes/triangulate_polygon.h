@@ -12,6 +12,11 @@ namespace lamina::holes {
 
 using PlaneTriangle = std::array<std::uint32_t, 3>;
 
+/// Twice the area between two vectors of the plane, positive when `b` lies anticlockwise of `a`.
+inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
 /// Polygon, anticlockwise, whose corners also have a height. Chords (i, j), i < j, may be used where `allowed`.
 /// The triangulation whose sharpest fold (between two triangles, or with `facing`, the normal beside each edge) is
 /// least, and among those the one of least area (dynamic programming, n^3 / 6 steps: Klincsek 1980, Barequet and

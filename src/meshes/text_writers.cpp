@@ -13,7 +13,7 @@
 namespace lamina::meshes {
 namespace {
 
-constexpr std::size_t kFlushBytes = 1u << 20;
+constexpr std::size_t kTextBytes = 1u << 20;
 
 /// Collects text and hands it on in large pieces.
 class Text {
@@ -23,7 +23,7 @@ class Text {
   template <class... Args>
   void add(fmt::format_string<Args...> format, Args&&... args) {
     fmt::format_to(std::back_inserter(bytes), format, std::forward<Args>(args)...);
-    if (bytes.size() >= kFlushBytes) flush();
+    if (bytes.size() >= kTextBytes) flush();
   }
   void flush() {
     out_.write(bytes);
@@ -88,7 +88,7 @@ void write_stl(const TriangleMesh& mesh, OutputFile& out) {
     for (const Vec3& row : {unit(cross(b - a, c - a)), a, b, c})
       for (const double x : row) put_little(bytes, static_cast<float>(x));
     put_little(bytes, std::uint16_t{0});
-    if (bytes.size() >= kFlushBytes) {
+    if (bytes.size() >= kTextBytes) {
       out.write(bytes);
       bytes.clear();
     }

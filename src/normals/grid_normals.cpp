@@ -6,9 +6,10 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <utility>
 
-#include "files/descriptor.h"
+#include "files/scratch_file.h"
 #include "lamina/error.h"
 #include "normals/grid_faces.h"
 
@@ -18,34 +19,10 @@ namespace {
 using Normal = std::array<float, 3>;
 constexpr std::size_t kPiece = std::size_t{1} << 15;  ///< rows
 
-/// Normals of all rows, one after the other.
-class NormalFile {
- public:
-  explicit NormalFile(const std::string& directory) : directory_(directory), file_(open_unlinked(directory)) {}
-  void write(const std::vector<Normal>& normals) {
-    check(write_all(file_.get(), normals.data(), normals.size() * sizeof(Normal)));
-  }
-  void read(std::uint64_t first, std::vector<Normal>& normals) const {
-    const std::size_t bytes = normals.size() * sizeof(Normal);
-    const ReadResult got = pread_all(file_.get(), normals.data(), bytes, first * sizeof(Normal));
-    check(got.error != 0 || got.bytes == bytes ? got.error : EIO);
-  }
-
- private:
-  void check(int error) const {
-    if (error == 0) return;
-    throw Error(ExitCode::budget, fmt::format("the temporary file in '{}' cannot be used: {}; free space there or "
-                                              "choose another with --tmp-dir",
-                                              directory_, system_message(error)));
-  }
-  std::string directory_;
-  Descriptor file_;
-};
-
-/// The source's rows with the file's normals.
+/// The source's rows with the normals of a file that holds one for each.
 class WithGridNormals final : public PointSource {
  public:
-  WithGridNormals(std::unique_ptr<PointSource> source, NormalFile file)
+  WithGridNormals(std::unique_ptr<PointSource> source, ScratchFile file)
       : source_(std::move(source)), file_(std::move(file)) {
     info_ = source_->info();
     info_.has_normals = true;
@@ -53,7 +30,7 @@ class WithGridNormals final : public PointSource {
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
     source_->read(first, count, out);
     std::vector<Normal> normals(out.size());
-    file_.read(out.first, normals);
+    file_.read(out.first * sizeof(Normal), std::as_writable_bytes(std::span(normals)));
     for (auto* axis : {&out.nx, &out.ny, &out.nz}) axis->resize(out.size());
     for (std::size_t i = 0; i < normals.size(); ++i) {
       out.nx[i] = normals[i][0];
@@ -64,7 +41,7 @@ class WithGridNormals final : public PointSource {
 
  private:
   std::unique_ptr<PointSource> source_;
-  NormalFile file_;
+  ScratchFile file_;
 };
 
 /// The source's rows one by one, in order.
@@ -93,9 +70,9 @@ class Rows {
   std::uint64_t row_ = 0;
 };
 
-class Job {
+class GridJob {
  public:
-  Job(PointSource& source, const std::string& directory, const RunContext& run)
+  GridJob(PointSource& source, const std::string& directory, const RunContext& run)
       : rows_(source, run), file_(directory) {}
 
   void skip_to(std::uint64_t row) {
@@ -121,8 +98,8 @@ class Job {
     }
   }
 
-  NormalFile finish(std::uint64_t& found) {
-    file_.write(waiting_);
+  ScratchFile finish(std::uint64_t& found) {
+    file_.write(std::as_bytes(std::span(waiting_)));
     found = found_;
     return std::move(file_);
   }
@@ -132,12 +109,12 @@ class Job {
     waiting_.push_back(n);
     if (n != Normal{}) ++found_;
     if (waiting_.size() < kPiece) return;
-    file_.write(waiting_);
+    file_.write(std::as_bytes(std::span(waiting_)));
     waiting_.clear();
   }
 
   Rows rows_;
-  NormalFile file_;
+  ScratchFile file_;
   std::vector<Normal> waiting_;
   std::uint64_t found_ = 0;
 };
@@ -152,7 +129,7 @@ const SeenFrom* scanner_of(const std::vector<SeenFrom>& seen, std::uint64_t row)
 
 GridNormals grid_normals(std::unique_ptr<PointSource> source, const std::vector<PlacedGrid>& grids,
                          const std::vector<SeenFrom>& seen, const std::string& directory, const RunContext& run) {
-  Job job(*source, directory, run);
+  GridJob job(*source, directory, run);
   for (const PlacedGrid& placed : grids) {
     const SeenFrom* const from = scanner_of(seen, placed.first);
     if (from == nullptr) continue;
@@ -161,7 +138,7 @@ GridNormals grid_normals(std::unique_ptr<PointSource> source, const std::vector<
   }
   job.skip_to(source->info().count);
   GridNormals out;
-  NormalFile file = job.finish(out.found);
+  ScratchFile file = job.finish(out.found);
   out.source = std::make_unique<WithGridNormals>(std::move(source), std::move(file));
   return out;
 }

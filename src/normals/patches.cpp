@@ -16,22 +16,22 @@
 namespace lamina::normals {
 namespace {
 
-using Vector = std::array<float, 3>;
+using Vector3f = std::array<float, 3>;
 
 /// Strong links join first; weak ones are left to the graph of patches, which has more to go by.
 constexpr int kStrengths = 32;
 constexpr float kWeakest = 0.5F;
 
-Vector normal_of(const WindowSamples& s, std::uint32_t i) {
+Vector3f normal_of(const WindowSamples& s, std::uint32_t i) {
   return {s.nx[i], s.ny[i], s.nz[i]};
 }
-float dot(const Vector& a, const Vector& b) {
+float dot(const Vector3f& a, const Vector3f& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
 /// Whether two neighbours lie beside each other on one surface, so that opposite normals contradict each other: across
 /// a thin wall and around an edge they do not.
-bool lie_along(const Vector& offset, const Vector& a, const Vector& b) {
+bool lie_along(const Vector3f& offset, const Vector3f& a, const Vector3f& b) {
   const float squared = dot(offset, offset);
   constexpr float kSine2 = 0.25F;
   const float along_a = dot(offset, a);
@@ -112,7 +112,7 @@ class PatchGrower {
     bool opposite;
   };
 
-  [[nodiscard]] float agreement_of(std::size_t i, std::uint32_t place, std::uint32_t other, const Vector& n) const {
+  [[nodiscard]] float agreement_of(std::size_t i, std::uint32_t place, std::uint32_t other, const Vector3f& n) const {
     return agreement(tree_.offset(place, other), n, normal_of(samples_, other), links_.scale[i]);
   }
 
@@ -123,7 +123,7 @@ class PatchGrower {
       const std::uint32_t i = order_[s];
       const std::uint32_t place = links_.core[i];
       if (is_fixed(place) || !samples_.has_normal(place)) continue;
-      const Vector n = normal_of(samples_, place);
+      const Vector3f n = normal_of(samples_, place);
       for (const std::uint32_t other : links_.neighbours[i]) {
         if (other == place || cell_of_[other] != cell_of_[place] || is_fixed(other) || !samples_.has_normal(other))
           continue;
@@ -180,8 +180,8 @@ class PatchGrower {
       const std::uint32_t place = links_.core[order_[s]];
       if (samples_.node[place] == kNoNode || samples_.node[place] == kFixed) continue;
       Sums& sum = all[samples_.node[place] - cell.first];
-      const Vector n = normal_of(samples_, place);
-      const Vector at = tree_.offset(pivot, place);
+      const Vector3f n = normal_of(samples_, place);
+      const Vector3f at = tree_.offset(pivot, place);
       // A sample stands for the area its neighbourhood has for each of its samples.
       const double area = std::max(double{links_.scale[order_[s]]}, 1.0) / (PatchNode::kUnit * PatchNode::kUnit);
       sum.area += area;
@@ -219,10 +219,10 @@ class PatchGrower {
       const std::uint32_t place = links_.core[i];
       const std::uint32_t node = samples_.node[place];
       if (node == kNoNode) continue;
-      const Vector n = normal_of(samples_, place);
+      const Vector3f n = normal_of(samples_, place);
       for (const std::uint32_t other : links_.neighbours[i]) {
         if (other == place || samples_.node[other] == kNoNode) continue;
-        const Vector m = normal_of(samples_, other);
+        const Vector3f m = normal_of(samples_, other);
         const bool along = lie_along(tree_.offset(place, other), n, m);
         const bool same = dot(n, m) > 0;
         if (samples_.node[other] == node) {

@@ -13,7 +13,7 @@
 namespace lamina::normals {
 namespace {
 
-constexpr std::size_t kPiece = std::size_t{1} << 15;
+constexpr std::size_t kRowsAtOnce = std::size_t{1} << 15;
 
 std::array<float, 3> normal_of(const NormalCode& code) {
   std::array<float, 3> n{};
@@ -76,16 +76,16 @@ RowNormals::RowNormals(edit::RecordSorter& records, const PatchSigns& signs, std
   const auto skip_to = [&](std::uint64_t row) {
     while (next + codes.size() < row) {
       codes.push_back(kKeep);
-      if (codes.size() == kPiece) write();
+      if (codes.size() == kRowsAtOnce) write();
     }
   };
-  records.drain(kPiece, [&](std::span<const std::uint64_t> keys, const std::byte* bytes) {
+  records.drain(kRowsAtOnce, [&](std::span<const std::uint64_t> keys, const std::byte* bytes) {
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
     for (std::size_t i = 0; i < keys.size(); ++i) {
       skip_to(keys[i]);
       const RowRecord r = record_at(bytes + i * kRecordBytes);
       codes.push_back(r.node != kNoNode && signs.sign[r.node] < 0 ? turned(r.code) : r.code);
-      if (codes.size() == kPiece) write();
+      if (codes.size() == kRowsAtOnce) write();
     }
     if (run.progress) run.progress({"signs", next, rows, 0, 0});
   });

@@ -105,7 +105,7 @@ void Spool::write(const void* data, std::size_t bytes) {
   file_.bytes += bytes;
 }
 
-std::string quoted(std::string_view word) {
+std::string quoted_word(std::string_view word) {
   constexpr std::size_t kLongest = 40;
   std::string text = "'";
   for (const char c : word.substr(0, kLongest)) text += c >= ' ' && c <= '~' ? c : '?';

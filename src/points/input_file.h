@@ -50,6 +50,6 @@ class Spool {
 };
 
 /// A file name or a word of a file made fit for a one-line message: unprintable characters replaced, long ones cut.
-std::string quoted(std::string_view word);
+std::string quoted_word(std::string_view word);
 
 }  // namespace lamina

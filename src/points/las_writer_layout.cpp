@@ -16,8 +16,8 @@ namespace lamina {
 namespace {
 
 constexpr std::size_t kHeaderBytes = 375;
-constexpr std::size_t kRecordHeader = 54;
-constexpr std::size_t kDescriptor = 192;
+constexpr std::size_t kRecordHeaderBytes = 54;
+constexpr std::size_t kDescriptorBytes = 192;
 constexpr std::size_t kName = 32;
 constexpr double kMostSteps = 2147483647;
 
@@ -142,7 +142,7 @@ LasLayout::LasLayout(const PointColumns& columns) : columns_(columns) {
 }
 
 std::string LasLayout::header(const std::array<LasAxis, 3>& axes, std::uint64_t count) const {
-  const std::size_t records = extras_.empty() ? 0 : kRecordHeader + kDescriptor * extras_.size();
+  const std::size_t records = extras_.empty() ? 0 : kRecordHeaderBytes + kDescriptorBytes * extras_.size();
   std::string b(kHeaderBytes + records, '\0');
   b.replace(0, 4, "LASF");
   constexpr std::uint16_t kTextProjection = 16;  // these point formats name coordinate systems by text, if at all
@@ -169,12 +169,12 @@ std::string LasLayout::header(const std::array<LasAxis, 3>& axes, std::uint64_t 
   std::size_t at = kHeaderBytes;
   b.replace(at + 2, 9, "LASF_Spec");
   put_at(b, at + 18, std::uint16_t{4});
-  put_at(b, at + 20, static_cast<std::uint16_t>(kDescriptor * extras_.size()));
-  at += kRecordHeader;
+  put_at(b, at + 20, static_cast<std::uint16_t>(kDescriptorBytes * extras_.size()));
+  at += kRecordHeaderBytes;
   for (const LasExtraColumn& extra : extras_) {
     b[at + 2] = static_cast<char>(extra_type(extra.type));
     b.replace(at + 4, extra.name.size(), extra.name);
-    at += kDescriptor;
+    at += kDescriptorBytes;
   }
   return b;
 }

@@ -15,9 +15,9 @@ namespace {
 constexpr std::size_t kMostFields = 256;
 constexpr std::size_t kMostValues = 1 << 16;
 
-class HeaderParser {
+class PcdHeaderParser {
  public:
-  HeaderParser(std::string_view text, const std::string& name) : text_(text), name_(name) {}
+  PcdHeaderParser(std::string_view text, const std::string& name) : text_(text), name_(name) {}
 
   PcdHeader parse() {
     while (next_line()) {
@@ -58,7 +58,7 @@ class HeaderParser {
     std::uint64_t value = 0;
     const char* end = word.data() + word.size();
     const auto [stop, error] = std::from_chars(word.data(), end, value);
-    if (error != std::errc{} || stop != end) fail(fmt::format("{} is no whole number", quoted(word)));
+    if (error != std::errc{} || stop != end) fail(fmt::format("{} is no whole number", quoted_word(word)));
     return value;
   }
 
@@ -89,7 +89,7 @@ class HeaderParser {
       const std::vector<std::string_view> none{"0", "0", "0", "1", "0", "0", "0"};
       header_.has_viewpoint = words_ != none;
     } else if (keyword != "VERSION") {
-      fail(fmt::format("{} is no keyword of a PCD header", quoted(keyword)));
+      fail(fmt::format("{} is no keyword of a PCD header", quoted_word(keyword)));
     }
   }
 
@@ -102,7 +102,7 @@ class HeaderParser {
     } else if (kind == "binary_compressed") {
       header_.data = PcdData::binary_compressed;
     } else {
-      fail(fmt::format("data {} are not known; ascii, binary and binary_compressed are", quoted(kind)));
+      fail(fmt::format("data {} are not known; ascii, binary and binary_compressed are", quoted_word(kind)));
     }
   }
 
@@ -120,8 +120,8 @@ class HeaderParser {
                  : is("F8") ? std::optional(ScalarType::float64)
                             : std::nullopt;
     if (!field.type && !is("I8") && !is("U8")) {
-      fail_header(fmt::format("field {} has TYPE {} and SIZE {}, which is no type of a PCD file", quoted(field.name),
-                              quoted(type), quoted(size)));
+      fail_header(fmt::format("field {} has TYPE {} and SIZE {}, which is no type of a PCD file",
+                              quoted_word(field.name), quoted_word(type), quoted_word(size)));
     }
   }
 
@@ -174,7 +174,7 @@ std::size_t pcd_channels(const PcdField& field) {
 }
 
 PcdHeader parse_pcd_header(std::string_view text, const std::string& name) {
-  return HeaderParser(text, name).parse();
+  return PcdHeaderParser(text, name).parse();
 }
 
 }  // namespace lamina

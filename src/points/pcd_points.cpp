@@ -47,7 +47,7 @@ void remark(const PcdHeader& header, const std::string& name, PointSourceInfo& i
   std::string left_out;
   for (const PcdField& field : header.fields) {
     if (field.name != "_" && (field.count != 1 || !field.type))
-      left_out += (left_out.empty() ? "" : ", ") + quoted(field.name);
+      left_out += (left_out.empty() ? "" : ", ") + quoted_word(field.name);
   }
   if (!left_out.empty())
     info.remarks.push_back(fmt::format("{}: fields left out: {} (several values, or 64-bit integers)", name, left_out));

@@ -147,7 +147,7 @@ class AsciiPly final : public PointSource {
     }
     while (p != end && is_space(*p)) ++p;
     if (p != end)
-      fail(fmt::format("{} values expected, more stand there, from {} on", targets.size(), quoted(word(p, end))));
+      fail(fmt::format("{} values expected, more stand there, from {} on", targets.size(), quoted_word(word(p, end))));
   }
 
   static std::string_view word(const char* p, const char* end) {
@@ -158,9 +158,9 @@ class AsciiPly final : public PointSource {
     const std::string& name = rows_.columns[column].name;
     if (p == end) {
       fail(fmt::format("{} values expected, only {} stand there ({} is missing)", rows_.columns.size(), column,
-                       quoted(name)));
+                       quoted_word(name)));
     }
-    fail(fmt::format("{} is no number (property {} expected)", quoted(word(p, end)), quoted(name)));
+    fail(fmt::format("{} is no number (property {} expected)", quoted_word(word(p, end)), quoted_word(name)));
   }
 
   /// Floats under an integer type are a wrong header (colours 0-1 called uchar): read on, they would all round to
@@ -169,8 +169,8 @@ class AsciiPly final : public PointSource {
     const Limits limits = limits_of(column.type);
     if (value >= limits.low && value <= limits.high && value == static_cast<double>(static_cast<long long>(value)))
       return;
-    fail(fmt::format("property {} is {}, which is no {} as the header says", quoted(column.name), quoted(word(p, stop)),
-                     ply_name(column.type)));
+    fail(fmt::format("property {} is {}, which is no {} as the header says", quoted_word(column.name),
+                     quoted_word(word(p, stop)), ply_name(column.type)));
   }
 
   InputFile file_;

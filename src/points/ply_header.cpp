@@ -14,9 +14,9 @@ namespace {
 constexpr std::size_t kLongestHeader = 1 << 20;
 
 /// Walks the lines of a header; its errors name the line.
-class HeaderParser {
+class PlyHeaderParser {
  public:
-  HeaderParser(std::string_view text, const std::string& name) : text_(text), name_(name) {
+  PlyHeaderParser(std::string_view text, const std::string& name) : text_(text), name_(name) {
     // Old Macintosh files end lines in a lone CR; the first line tells.
     const std::size_t end = text_.find_first_of("\r\n");
     const bool lone_cr =
@@ -39,7 +39,7 @@ class HeaderParser {
         if (!has_format_) fail("the header ends without a format line");
         return std::move(header_);
       } else if (!keyword.empty() && keyword != "comment" && keyword != "obj_info") {
-        fail(fmt::format("{} is no keyword of a PLY header", quoted(keyword)));
+        fail(fmt::format("{} is no keyword of a PLY header", quoted_word(keyword)));
       }
     }
     throw Error(ExitCode::unreadable, fmt::format("{}: no end_header in the first {} bytes: the header is cut short or "
@@ -79,7 +79,8 @@ class HeaderParser {
   }
 
   void end_of_line() {
-    if (const std::string_view more = word(); !more.empty()) fail(fmt::format("{} is too much here", quoted(more)));
+    if (const std::string_view more = word(); !more.empty())
+      fail(fmt::format("{} is too much here", quoted_word(more)));
   }
 
   void format() {
@@ -92,10 +93,10 @@ class HeaderParser {
       header_.format = PlyFormat::big_endian;
     } else {
       fail(fmt::format("format {} is not supported; ascii, binary_little_endian and binary_big_endian are",
-                       quoted(encoding)));
+                       quoted_word(encoding)));
     }
     const std::string_view version = needed_word("a version");
-    if (version != "1.0") fail(fmt::format("PLY version {} is not supported; 1.0 is", quoted(version)));
+    if (version != "1.0") fail(fmt::format("PLY version {} is not supported; 1.0 is", quoted_word(version)));
     end_of_line();
     has_format_ = true;
   }
@@ -106,7 +107,8 @@ class HeaderParser {
     const std::string_view count = needed_word("a count");
     const auto [end, error] = std::from_chars(count.data(), count.data() + count.size(), element.count);
     if (error != std::errc{} || end != count.data() + count.size()) {
-      fail(fmt::format("the count of element {} is {}; a whole number expected", quoted(element.name), quoted(count)));
+      fail(fmt::format("the count of element {} is {}; a whole number expected", quoted_word(element.name),
+                       quoted_word(count)));
     }
     end_of_line();
     header_.elements.push_back(std::move(element));
@@ -115,7 +117,7 @@ class HeaderParser {
   ScalarType type() {
     const std::string_view name = needed_word("a type");
     const std::optional<ScalarType> found = ply_type(name);
-    if (!found) fail(fmt::format("{} is no PLY type", quoted(name)));
+    if (!found) fail(fmt::format("{} is no PLY type", quoted_word(name)));
     return *found;
   }
 
@@ -158,7 +160,7 @@ std::size_t PlyElement::row_bytes() const {
 }
 
 PlyHeader parse_ply_header(std::string_view text, const std::string& name) {
-  return HeaderParser(text, name).parse();
+  return PlyHeaderParser(text, name).parse();
 }
 
 PlyHeader read_ply_header(const InputFile& file) {

@@ -9,7 +9,7 @@
 namespace lamina {
 namespace {
 
-[[noreturn]] void refuse(const std::string& name, const std::string& what) {
+[[noreturn]] void unreadable(const std::string& name, const std::string& what) {
   throw Error(ExitCode::unreadable, fmt::format("{}: {}", name, what));
 }
 
@@ -18,15 +18,15 @@ std::size_t vertex_element(const PlyHeader& header, const std::string& name) {
   std::string others;
   for (std::size_t i = 0; i < header.elements.size(); ++i) {
     if (header.elements[i].name == "vertex") {
-      if (found != header.elements.size()) refuse(name, "the header has two elements 'vertex'");
+      if (found != header.elements.size()) unreadable(name, "the header has two elements 'vertex'");
       found = i;
     } else if (i < 8) {
-      others += (others.empty() ? "" : ", ") + quoted(header.elements[i].name);
+      others += (others.empty() ? "" : ", ") + quoted_word(header.elements[i].name);
     }
   }
   if (found == header.elements.size()) {
-    refuse(name,
-           fmt::format("the header has no element 'vertex'; its elements are: {}", others.empty() ? "none" : others));
+    unreadable(name, fmt::format("the header has no element 'vertex'; its elements are: {}",
+                                 others.empty() ? "none" : others));
   }
   return found;
 }
@@ -34,8 +34,8 @@ std::size_t vertex_element(const PlyHeader& header, const std::string& name) {
 void require_scalars(const PlyElement& vertices, const std::string& name) {
   for (const PlyProperty& property : vertices.properties) {
     if (property.list_count) {
-      refuse(name, fmt::format("property {} of the vertices is a list; points with lists are not read: remove it",
-                               quoted(property.name)));
+      unreadable(name, fmt::format("property {} of the vertices is a list; points with lists are not read: remove it",
+                                   quoted_word(property.name)));
     }
   }
 }
@@ -66,7 +66,7 @@ void report_short_file(const std::string& name, const std::string& element, std:
   throw Error(ExitCode::unreadable,
               fmt::format("{}: the header promises {} rows of element {}, the file holds {}: it was cut short or the "
                           "header's count is wrong",
-                          name, promised, quoted(element), held));
+                          name, promised, quoted_word(element), held));
 }
 
 }  // namespace lamina

@@ -35,7 +35,7 @@ std::uint64_t end_of_lists(const InputFile& file, const PlyElement& element, boo
         if (entries < 0) {
           throw Error(ExitCode::unreadable,
                       fmt::format("{}: element {}, row {}: list {} has the length {}: the file is damaged", file.name,
-                                  quoted(element.name), row, quoted(property.name), entries));
+                                  quoted_word(element.name), row, quoted_word(property.name), entries));
         }
       }
       // A length has at most 32 bits, so the product fits.

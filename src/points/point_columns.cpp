@@ -62,7 +62,7 @@ void give_roles(std::vector<PointColumn>& columns, PointSourceInfo& info, const 
   std::set<std::string_view> names;
   for (const PointColumn& column : columns) {
     if (column.role != Role::skipped && !names.insert(column.name).second) {
-      refuse(fmt::format("{} {} of the points is there twice", noun, quoted(column.name)));
+      refuse(fmt::format("{} {} of the points is there twice", noun, quoted_word(column.name)));
     }
   }
   const auto has = [&](std::string_view wanted) { return names.contains(wanted); };

@@ -78,14 +78,16 @@ void RowParser::parse(const InputFile& file, std::string_view line, std::uint64_
   const auto fail = [&](const std::string& what) {
     throw Error(ExitCode::unreadable, fmt::format("{}, line {}: {}", file.name, line_number, what));
   };
-  const auto word = [&](const char* p, const char* stop) { return quoted({p, static_cast<std::size_t>(stop - p)}); };
+  const auto word = [&](const char* p, const char* stop) {
+    return quoted_word({p, static_cast<std::size_t>(stop - p)});
+  };
   const char* p = line.data();
   const char* const end = p + line.size();
   for (std::size_t c = 0; c < targets.size(); ++c) {
     p = skip_blanks(p, end);
     if (p == end) {
       fail(fmt::format("{} values expected, only {} stand there ({} is missing)", targets.size(), c,
-                       quoted(columns_[c].name)));
+                       quoted_word(columns_[c].name)));
     }
     if (targets[c].wide == nullptr && targets[c].narrow == nullptr) {
       p = end_of_word(p, end, separator_);
@@ -94,11 +96,11 @@ void RowParser::parse(const InputFile& file, std::string_view line, std::uint64_
       const char* stop = parse_number(p, end, value);
       if (stop == nullptr || (stop != end && !is_space(*stop) && *stop != separator_)) {
         fail(fmt::format("{} is no number ({} expected)", word(p, end_of_word(p, end, separator_)),
-                         quoted(columns_[c].name)));
+                         quoted_word(columns_[c].name)));
       }
       const ValueRange& range = ranges_[c];
       if (value < range.low || value > range.high || (range.whole && std::isnan(value))) {
-        fail(fmt::format("{} is {}, outside {:g} to {:g}{}", quoted(columns_[c].name), word(p, stop), range.low,
+        fail(fmt::format("{} is {}, outside {:g} to {:g}{}", quoted_word(columns_[c].name), word(p, stop), range.low,
                          range.high, remedy_));
       }
       if (targets[c].wide != nullptr) {

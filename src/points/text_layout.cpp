@@ -29,7 +29,7 @@ struct Told {
 std::vector<Told> parse_told(const std::string& told) {
   const auto refuse = [&](const std::string& what) {
     throw Error(ExitCode::usage,
-                fmt::format("--columns {}: {}; write names such as x,y,z,red,green,blue,-", quoted(told), what));
+                fmt::format("--columns {}: {}; write names such as x,y,z,red,green,blue,-", quoted_word(told), what));
   };
   std::vector<Told> columns;
   std::vector<std::string_view> words;
@@ -42,7 +42,7 @@ std::vector<Told> parse_told(const std::string& told) {
       column.type = ply_type(word.substr(colon + 1));
       if (!column.type)
         refuse(fmt::format("{} is no type; char uchar short ushort int uint float double are",
-                           quoted(word.substr(colon + 1))));
+                           quoted_word(word.substr(colon + 1))));
     }
     columns.push_back(std::move(column));
   }

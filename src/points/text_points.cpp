@@ -68,7 +68,7 @@ class TextPoints final : public PointSource {
           ExitCode::unreadable,
           fmt::format("{}, line {}: the number of rows of the next scan expected, {} stands there; put it right "
                       "or delete all such numbers",
-                      file_.name, number, quoted(line)));
+                      file_.name, number, quoted_word(line)));
     }
     return count;
   }

@@ -121,7 +121,7 @@ void require_numbers(const InputFile& file, const Row& row) {
   split_line(line, kBlanks, words);
   double ignored = 0;
   if (std::count_if(words.begin(), words.end(), [&](std::string_view w) { return is_number(w, ignored); }) >= 3) return;
-  fail(file, row.line, fmt::format("{} is no row of numbers; points need x y z", quoted(row.text)));
+  fail(file, row.line, fmt::format("{} is no row of numbers; points need x y z", quoted_word(row.text)));
 }
 
 bool has_many_digits(std::string_view word) {

@@ -41,7 +41,7 @@ class VdbPoints final : public PointSource {
       }
     }
     std::string skipped;
-    for (const std::string& name : volume.skipped) skipped += (skipped.empty() ? "" : ", ") + quoted(name);
+    for (const std::string& name : volume.skipped) skipped += (skipped.empty() ? "" : ", ") + quoted_word(name);
     if (!skipped.empty())
       info_.remarks.push_back(fmt::format("{}: attributes left out, as they are no numbers: {}", path, skipped));
   }

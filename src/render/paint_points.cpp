@@ -37,8 +37,7 @@ std::vector<double> DistanceField::of(const SampleBatch& points, const RunContex
 
 std::vector<double> point_values(const SampleBatch& points, const AttributeLayout& layout, const std::string& name) {
   const auto doubles = [](const std::vector<float>& v) { return std::vector<double>(v.begin(), v.end()); };
-  for (std::size_t a = 0; a < layout.size(); ++a)
-    if (layout[a].name == name) return doubles(points.attributes[a]);
+  if (const auto a = find_attribute(layout, name)) return doubles(points.attributes[*a]);
   if (name == "radius" || name == "pscale") return doubles(points.radius);
   if (name == "quality" || name == "confidence") return doubles(points.quality);
   return {};

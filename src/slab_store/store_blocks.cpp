@@ -11,9 +11,9 @@
 namespace lamina {
 namespace {
 
-constexpr std::size_t kBuffersInFlight = 16;
+constexpr std::size_t kBuffersMoved = 16;
 /// A store of several sources holds a part of the buckets: it has more files, so that their disk is given back as soon.
-constexpr std::size_t kFilesPerSource = 16, kMostFiles = 128, kBucketsPerFile = 8;
+constexpr std::size_t kFilesPerSource = 16, kMostFiles = 128, kBucketsPerPart = 8;
 
 [[noreturn]] void defect(const std::string& what) {
   throw Error(ExitCode::internal, "slab store: " + what);
@@ -68,9 +68,9 @@ StoreGatherer::StoreGatherer(const StoreLayout& layout, const std::string& direc
           SampleColumns(layout), layout, {}, std::vector<BucketIndex>(all.size()), 0, 0, std::string()}),
       blocks_(all.size()),
       sources_(sources),
-      disk_(TempFile::kBufferBytes, kBuffersInFlight) {
+      disk_(TempFile::kBufferBytes, kBuffersMoved) {
   const std::size_t files =
-      std::clamp<std::size_t>(all.size() / kBucketsPerFile, 1, std::min(kMostFiles, kFilesPerSource * sources));
+      std::clamp<std::size_t>(all.size() / kBucketsPerPart, 1, std::min(kMostFiles, kFilesPerSource * sources));
   while (store_->files.size() < files) store_->files.emplace_back(directory);
   for (std::size_t b = 0; b < all.size(); ++b) {
     store_->buckets[b].count = all[b].count;

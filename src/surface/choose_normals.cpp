@@ -11,7 +11,7 @@
 namespace lamina {
 namespace {
 
-constexpr std::size_t kPiece = std::size_t{1} << 15;
+constexpr std::size_t kRowsAtOnce = std::size_t{1} << 15;
 
 /// Normals that say nothing: what a plan comes to does not depend on them.
 class PlannedNormals final : public PointSource {
@@ -39,9 +39,9 @@ struct Usable {
 Usable look_for_normals(PointSource& source, const RunContext& run) {
   Usable usable;
   SampleBatch batch;
-  for (std::uint64_t first = 0; first < source.info().count; first += kPiece) {
+  for (std::uint64_t first = 0; first < source.info().count; first += kRowsAtOnce) {
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
-    source.read(first, kPiece, batch);
+    source.read(first, kRowsAtOnce, batch);
     for (std::size_t i = 0; i < batch.size(); ++i) {
       const bool missing = defect_of(batch, i) == Defect::normal;
       usable.any = usable.any || !missing;

@@ -17,12 +17,12 @@ namespace {
 constexpr float kSparse = 1.6F;
 
 /// Where corners themselves say how many they need.
-constexpr int kMostSteps = 16;
+constexpr int kMostProjections = 16;
 
 ProjectSettings project_settings(const SurfaceSettings& s, const SupportChoice& support) {
   ProjectSettings p;
   p.fit = s.fit == FitMode::sphere ? Fit::sphere : Fit::plane;
-  p.steps = s.steps == 0 ? kMostSteps : s.steps;
+  p.steps = s.steps == 0 ? kMostProjections : s.steps;
   if (s.steps == 0) p.tolerance = static_cast<float>(s.step_tolerance / support.blend);
   p.centres = s.diffuse;
   p.band = support.band;

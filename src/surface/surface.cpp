@@ -208,8 +208,8 @@ void refuse_two_alike(const SurfaceSettings& settings, const PointSourceInfo& in
 }
 
 /// What is to be left out before anything is measured.
-void clean(Ingested& in, const SurfaceSettings& settings, double step, const std::string& tmp, const RunContext& run,
-           Stopwatch& watch, std::uint64_t rows, SurfaceStats& stats) {
+void clean_store_of(Ingested& in, const SurfaceSettings& settings, double step, const std::string& tmp,
+                    const RunContext& run, Stopwatch& watch, std::uint64_t rows, SurfaceStats& stats) {
   stats.cleaned.clipped = in.census.clipped;
   stats.cleaned.skipped = in.census.skipped;
   if (settings.clean.looks_around()) {
@@ -291,7 +291,7 @@ SweepInput read_surface_input(const SurfaceSettings& settings, const std::string
     watch.time("normals", [&] { source = choose_normals(std::move(source), settings, stats.normals, scratch, run); });
   Frame frame;
   Ingested ingested = read_input(*source, settings, {directory, keep}, run, watch, frame);
-  clean(ingested, settings, frame.step, scratch, run, watch, source->info().count, stats);
+  clean_store_of(ingested, settings, frame.step, scratch, run, watch, source->info().count, stats);
   return {source->info(), frame, std::move(ingested)};
 }
 

@@ -17,7 +17,7 @@
 namespace lamina {
 namespace {
 
-constexpr std::size_t kChunk = 1u << 16;  ///< rows a piece; fixed, so sums do not depend on the number of threads
+constexpr std::size_t kPieceRows = 1u << 16;  ///< rows a piece; fixed, so sums do not depend on the number of threads
 
 /// A piece's census, and its moments about its own first sample, where they cannot cancel.
 struct Partial {
@@ -82,9 +82,9 @@ Partial look_at_all(PointSource& source, const RunContext& run, const RowPick& p
   if (!source.info().random_access) {
     SampleBatch batch;
     while (done < count) {
-      source.read(done, kChunk, batch);
+      source.read(done, kPieceRows, batch);
       merge(total, look_at(batch, source.info().attributes, pick));
-      done = std::min<std::uint64_t>(count, done + kChunk);
+      done = std::min<std::uint64_t>(count, done + kPieceRows);
       report();
     }
     return total;
@@ -94,15 +94,15 @@ Partial look_at_all(PointSource& source, const RunContext& run, const RowPick& p
   std::array<Partial, kPieces> partials;
   while (done < count) {
     tbb::parallel_for(std::size_t{0}, kPieces, [&](std::size_t i) {
-      const std::uint64_t first = done + i * kChunk;
+      const std::uint64_t first = done + i * kPieceRows;
       partials[i] = {};
       if (first >= count) return;
       SampleBatch& batch = batches.local();
-      source.read(first, kChunk, batch);
+      source.read(first, kPieceRows, batch);
       partials[i] = look_at(batch, source.info().attributes, pick);
     });
     for (const Partial& p : partials) merge(total, p);
-    done = std::min<std::uint64_t>(count, done + kPieces * kChunk);
+    done = std::min<std::uint64_t>(count, done + kPieces * kPieceRows);
     report();
   }
   return total;

@@ -48,17 +48,12 @@ BlockMask inside_of(const BlockMask& negative, const BlockMask& known) {
   return inside;
 }
 
-std::optional<int> find(const AttributeLayout& layout, const std::string& name) {
-  for (std::size_t i = 0; i < layout.size(); ++i)
-    if (layout[i].name == name) return static_cast<int>(i);
-  return std::nullopt;
-}
-
 }  // namespace
 
 std::vector<ExtraGrid> resolve_grids(const std::vector<std::string>& names, const AttributeLayout& layout, double step,
                                      std::vector<int>& channels) {
-  const auto red = find(layout, "red"), green = find(layout, "green"), blue = find(layout, "blue");
+  const auto red = find_attribute(layout, "red"), green = find_attribute(layout, "green"),
+             blue = find_attribute(layout, "blue");
   const bool coloured = red && green && blue;
   const auto channel = [&](int c) {
     const auto at = std::find(channels.begin(), channels.end(), c);
@@ -66,7 +61,7 @@ std::vector<ExtraGrid> resolve_grids(const std::vector<std::string>& names, cons
     channels.push_back(c);
     return static_cast<int>(channels.size()) - 1;
   };
-  const auto attribute = [&](int i) { return channel(kFirstAttribute + i); };
+  const auto attribute = [&](std::size_t i) { return channel(kFirstAttribute + static_cast<int>(i)); };
   std::vector<ExtraGrid> out;
   for (const std::string& word : names) {
     const bool automatic = word == VolumeExport::kColours;
@@ -79,12 +74,12 @@ std::vector<ExtraGrid> resolve_grids(const std::vector<std::string>& names, cons
       out.push_back({name,
                      ExtraGrid::Kind::vector,
                      {attribute(*red), attribute(*green), attribute(*blue)},
-                     1 / full_range(layout[static_cast<std::size_t>(*red)].type)});
+                     1 / full_range(layout[*red].type)});
     } else if (name == "weight") {
       out.push_back({name, ExtraGrid::Kind::weight, {channel(kReach)}, 1});
     } else if (name == "curvature") {
       out.push_back({name, ExtraGrid::Kind::scalar, {channel(kCurvature)}, static_cast<float>(1 / step)});
-    } else if (const auto i = find(layout, name)) {
+    } else if (const auto i = find_attribute(layout, name)) {
       out.push_back({name, ExtraGrid::Kind::scalar, {attribute(*i)}, 1});
     } else {
       std::string known = coloured ? "N, Cd, weight, curvature" : "N, weight, curvature";

@@ -27,12 +27,6 @@ bool is_real(ScalarType type) {
   return type == ScalarType::float32 || type == ScalarType::float64;
 }
 
-std::optional<std::size_t> find(const AttributeLayout& layout, const std::string& name) {
-  for (std::size_t i = 0; i < layout.size(); ++i)
-    if (layout[i].name == name) return i;
-  return std::nullopt;
-}
-
 /// Where a point lies: leaf, place in the leaf, row.
 struct Place {
   Coord leaf;
@@ -98,7 +92,8 @@ std::vector<PointColumn> point_columns(const PointArrays& points) {
   if (!s.quality.empty()) columns.push_back({"quality", Kind::float32, {s.quality.data()}, 1, {}});
   const AttributeLayout& layout = points.layout;
   const auto data = [&](std::size_t i) { return s.attributes[i].data(); };
-  const auto red = find(layout, "red"), green = find(layout, "green"), blue = find(layout, "blue");
+  const auto red = find_attribute(layout, "red"), green = find_attribute(layout, "green"),
+             blue = find_attribute(layout, "blue");
   const bool coloured =
       red && green && blue && layout[*red].type == layout[*green].type && layout[*red].type == layout[*blue].type;
   if (coloured) {

@@ -13,7 +13,7 @@ namespace {
 using openvdb::GridBase;
 
 /// How well a grid serves as a fog; 0: not at all. Whoever names one may take any numbers for densities.
-int fitness(const GridBase& grid, bool named) {
+int fog_fitness(const GridBase& grid, bool named) {
   if (!volume::is_scalar(grid) || grid.getGridClass() == openvdb::GRID_LEVEL_SET) return 0;
   if (grid.getName() == "density") return 3;
   return named || grid.getGridClass() == openvdb::GRID_FOG_VOLUME ? 2 : 0;
@@ -32,7 +32,7 @@ double FogVolume::voxel() const {
 
 FogVolume read_fog(const std::string& path, const std::string& name) {
   const volume::VdbFile file = volume::read_vdb(path);
-  const GridBase::Ptr grid = volume::choose_grid(path, file.grids, name, "fog volume", fitness);
+  const GridBase::Ptr grid = volume::choose_grid(path, file.grids, name, "fog volume", fog_fitness);
   auto data = std::make_shared<FogVolume::Data>();
   data->name = grid->getName();
   data->grid = volume::as_float(grid);

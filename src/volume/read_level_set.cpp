@@ -13,7 +13,7 @@ namespace {
 using openvdb::GridBase;
 
 /// How well a grid serves as the level set nobody named; 0: not at all.
-int fitness(const GridBase& grid, bool /*named*/) {
+int level_set_fitness(const GridBase& grid, bool /*named*/) {
   if (!volume::is_scalar(grid)) return 0;
   const openvdb::GridClass kind = grid.getGridClass();
   if (kind == openvdb::GRID_LEVEL_SET) return grid.getName() == "surface" ? 4 : 3;
@@ -39,7 +39,7 @@ bool LevelSet::open() const {
 
 LevelSet read_level_set(const std::string& path, const std::string& name) {
   const volume::VdbFile file = volume::read_vdb(path);
-  const GridBase::Ptr grid = volume::choose_grid(path, file.grids, name, "level set", fitness);
+  const GridBase::Ptr grid = volume::choose_grid(path, file.grids, name, "level set", level_set_fitness);
   auto data = std::make_shared<LevelSet::Data>();
   data->name = grid->getName();
   data->path = path;

@@ -12,7 +12,7 @@ namespace lamina::volume {
 namespace {
 
 /// io::File opens files by name and does not notice a full disk; the archive behind it writes to any stream.
-struct Archive : openvdb::io::Archive {
+struct WholeArchive : openvdb::io::Archive {
   using openvdb::io::Archive::write;
 };
 
@@ -29,7 +29,7 @@ void tag_by_contents(std::string& bytes) {
 
 std::string vdb_bytes(const openvdb::GridCPtrVec& grids) {
   std::ostringstream stream(std::ios::binary);
-  Archive archive;
+  WholeArchive archive;
   archive.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
   archive.write(stream, grids, /*seekable=*/true);
   std::string bytes = std::move(stream).str();

@@ -19,14 +19,15 @@ namespace {
 
 using namespace meshes;
 
-[[noreturn]] void usage(const std::string& message) {
+[[noreturn]] void wrong_usage(const std::string& message) {
   throw Error(ExitCode::usage, message);
 }
 
 void check_settings(const VolumeSettings& s) {
-  if (!(s.voxel >= 0 && std::isfinite(s.voxel))) usage("--voxel must be a positive length, or 0 for the mean edge");
-  if (!(s.band >= 1 && s.band <= 1000)) usage("--band must be in 1..1000 voxels");
-  if (s.name.empty() || s.name == "Cd") usage("--name must be a word other than Cd, which is the colours' name");
+  if (!(s.voxel >= 0 && std::isfinite(s.voxel)))
+    wrong_usage("--voxel must be a positive length, or 0 for the mean edge");
+  if (!(s.band >= 1 && s.band <= 1000)) wrong_usage("--band must be in 1..1000 voxels");
+  if (s.name.empty() || s.name == "Cd") wrong_usage("--name must be a word other than Cd, which is the colours' name");
 }
 
 struct Edges {
@@ -71,13 +72,13 @@ openvdb::math::Transform::Ptr choose_transform(const TriangleMesh& mesh, double 
     extent = std::max(extent, high[k] - low[k]);
   }
   if (0.5 * extent / voxel + band > kLargest || reach / voxel > kLargest * kFromOrigin)
-    usage(fmt::format("--voxel {:g}: too small for a mesh of this size ({:g}, coordinates up to {:g})", voxel, extent,
-                      reach));
+    wrong_usage(fmt::format("--voxel {:g}: too small for a mesh of this size ({:g}, coordinates up to {:g})", voxel,
+                            extent, reach));
   // OpenVDB takes a smaller voxel for a singular transform.
   constexpr double kSmallest = 1.5e-5;
   if (voxel < kSmallest) {
-    usage(fmt::format("--voxel {:g}: OpenVDB holds none below {:g}; scale the mesh up, or use a larger one", voxel,
-                      kSmallest));
+    wrong_usage(fmt::format("--voxel {:g}: OpenVDB holds none below {:g}; scale the mesh up, or use a larger one",
+                            voxel, kSmallest));
   }
   auto transform = openvdb::math::Transform::createLinearTransform(voxel);
   if (reach / voxel <= kFromOrigin) return transform;
@@ -107,7 +108,7 @@ void check_memory(const TriangleMesh& mesh, const VolumeSettings& s, double voxe
 
 /// What a 16-bit float holds: up to 65504, steps of 2^-24 near zero.
 void check_half(double voxel, double band, const RunContext& run) {
-  if (voxel * band > 65504) usage(fmt::format("--half cannot hold distances up to {:g}", voxel * band));
+  if (voxel * band > 65504) wrong_usage(fmt::format("--half cannot hold distances up to {:g}", voxel * band));
   if (voxel < 100 * 0x1p-24)
     run.warn(fmt::format("16-bit distances are coarse for voxels of {:g}; leave out --half", voxel));
 }
@@ -129,7 +130,7 @@ void check_indices(const TriangleMesh& mesh) {
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     for (const auto v : mesh.triangles[t]) {
       if (static_cast<std::size_t>(v) < mesh.positions.size()) continue;
-      usage(
+      wrong_usage(
           fmt::format("triangle {} names vertex {}, the mesh has {}; repair its indices", t, v, mesh.positions.size()));
     }
   }

@@ -11,20 +11,20 @@
 namespace lamina {
 namespace {
 
-[[noreturn]] void usage(const std::string& message) {
+[[noreturn]] void refuse(const std::string& message) {
   throw Error(ExitCode::usage, message);
 }
 
 void check(const PointArrays& points, const PointVolumeSettings& settings) {
   const SampleBatch& s = points.samples;
-  if (settings.name.empty()) usage("--name must be a word");
-  if (!(settings.voxel >= 0 && std::isfinite(settings.voxel))) usage("--voxelsize must be a positive length, or 0");
+  if (settings.name.empty()) refuse("--name must be a word");
+  if (!(settings.voxel >= 0 && std::isfinite(settings.voxel))) refuse("--voxelsize must be a positive length, or 0");
   if (s.size() == 0) throw Error(ExitCode::empty, "there are no points to write");
   bool equal = s.y.size() == s.size() && s.z.size() == s.size() && s.attributes.size() == points.layout.size() &&
                s.ny.size() == s.nx.size() && s.nz.size() == s.nx.size();
   for (const auto* a : {&s.nx, &s.radius, &s.quality}) equal = equal && (a->empty() || a->size() == s.size());
   for (const auto& a : s.attributes) equal = equal && a.size() == s.size();
-  if (!equal) usage("the points' arrays differ in length");
+  if (!equal) refuse("the points' arrays differ in length");
   for (std::size_t i = 0; i < s.size(); ++i) {
     if (std::isfinite(s.x[i]) && std::isfinite(s.y[i]) && std::isfinite(s.z[i])) continue;
     throw Error(ExitCode::unreadable,

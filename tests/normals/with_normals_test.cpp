@@ -8,6 +8,7 @@
 #include "lamina/error.h"
 #include "lamina/scatter.h"
 #include "normals/clouds.h"
+#include "support/paths.h"
 
 namespace lamina {
 namespace {

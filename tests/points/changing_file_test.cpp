@@ -17,7 +17,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-std::string refusal(const std::function<void()>& work) {
+std::string refused_change(const std::function<void()>& work) {
   try {
     work();
   } catch (const Error& e) {
@@ -49,7 +49,7 @@ TEST_F(ChangingFile, EveryFormatNoticesARowThatIsOverwritten) {
     // The clock that stamps files may not have ticked since the file was made.
     timespec later[2] = {{0, UTIME_OMIT}, {4'000'000'000, 5}};
     ASSERT_EQ(::utimensat(AT_FDCWD, path.c_str(), later, 0), 0);
-    EXPECT_THAT(refusal([&] { read_some(*source); }), HasSubstr("another program wrote to it")) << name;
+    EXPECT_THAT(refused_change([&] { read_some(*source); }), HasSubstr("another program wrote to it")) << name;
   }
 }
 
@@ -61,7 +61,7 @@ TEST_F(ChangingFile, GrowingAndShrinkingFilesAreNoticed) {
     const auto source = open_points(path);
     read_some(*source);
     std::filesystem::resize_file(path, now);
-    EXPECT_THAT(refusal([&] { read_some(*source); }), HasSubstr(path));
+    EXPECT_THAT(refused_change([&] { read_some(*source); }), HasSubstr(path));
   }
 }
 
@@ -77,7 +77,7 @@ TEST_F(ChangingFile, AReadThatFailsIsSaid) {
   // The system reads no folders: what stands for a bad disk.
   const InputFile file{Descriptor(::open(folder_.path().c_str(), O_RDONLY)), 100, "scan.ply"};
   char byte = 0;
-  EXPECT_THAT(refusal([&] { file.read(0, &byte, 1); }), HasSubstr("scan.ply: cannot be read"));
+  EXPECT_THAT(refused_change([&] { file.read(0, &byte, 1); }), HasSubstr("scan.ply: cannot be read"));
 }
 
 }  // namespace

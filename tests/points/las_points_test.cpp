@@ -11,6 +11,7 @@
 
 #include "files/temporary_folder.h"
 #include "points/point_rows.h"
+#include "support/paths.h"
 
 namespace lamina {
 namespace {

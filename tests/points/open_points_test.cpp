@@ -13,6 +13,7 @@
 #include "lamina/error.h"
 #include "lamina/points.h"
 #include "points/ply_files.h"
+#include "support/paths.h"
 
 namespace lamina {
 namespace {

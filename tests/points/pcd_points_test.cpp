@@ -35,7 +35,7 @@ std::string raw(const auto& value) {
   return bytes;
 }
 
-std::vector<Point> random_points(std::size_t n, unsigned seed) {
+std::vector<Point> random_pcd_points(std::size_t n, unsigned seed) {
   std::mt19937 random(seed);
   std::normal_distribution<float> normal;
   std::vector<Point> points(n);
@@ -48,7 +48,7 @@ std::vector<Point> random_points(std::size_t n, unsigned seed) {
   return points;
 }
 
-std::string header(std::size_t n, const std::string& data) {
+std::string pcd_header(std::size_t n, const std::string& data) {
   return fmt::format(
       "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS x y z rgb _ normal_x normal_y normal_z ring "
       "hist time stamp\n"
@@ -63,7 +63,7 @@ std::vector<std::string> columns_of(const Point& p) {
 }
 
 std::string binary(const std::vector<Point>& points) {
-  std::string bytes = header(points.size(), "binary");
+  std::string bytes = pcd_header(points.size(), "binary");
   for (const Point& p : points) {
     for (const std::string& column : columns_of(p)) bytes += column;
   }
@@ -71,7 +71,7 @@ std::string binary(const std::vector<Point>& points) {
 }
 
 std::string ascii(const std::vector<Point>& points) {
-  std::string text = header(points.size(), "ascii");
+  std::string text = pcd_header(points.size(), "ascii");
   for (const Point& p : points) {
     text += fmt::format("{} {} {} {} 0 0 0 {} {} {} {} 7 7 {:.17g} 5\n", p.x, p.y, p.z, std::bit_cast<float>(p.rgb),
                         p.nx, p.ny, p.nz, p.ring, p.time);
@@ -121,7 +121,7 @@ std::string compressed(const std::vector<Point>& points) {
   std::string data;
   for (const std::string& column : columns) data += column;
   const std::string packed = lzf(data);
-  return header(points.size(), "binary_compressed") + raw(static_cast<std::uint32_t>(packed.size())) +
+  return pcd_header(points.size(), "binary_compressed") + raw(static_cast<std::uint32_t>(packed.size())) +
          raw(static_cast<std::uint32_t>(data.size())) + packed;
 }
 
@@ -136,7 +136,7 @@ class PcdPoints : public ::testing::Test {
 };
 
 TEST_F(PcdPoints, AllEncodingsGiveTheSameRows) {
-  const std::vector<Point> points = random_points(700, 1);
+  const std::vector<Point> points = random_pcd_points(700, 1);
   for (const std::string& bytes : {ascii(points), binary(points), compressed(points)}) {
     const auto source = open_points(file(bytes));
     const PointSourceInfo& info = source->info();
@@ -207,7 +207,7 @@ TEST_F(PcdPoints, UnpacksWhateverAnotherPackerMade) {
 }
 
 TEST_F(PcdPoints, HeadersThatLieAndDataThatAreCut) {
-  const std::vector<Point> points = random_points(20, 3);
+  const std::vector<Point> points = random_pcd_points(20, 3);
   const auto with = [&](std::string bytes, const std::string& from, const std::string& to) {
     for (std::size_t at = bytes.find(from); at != bytes.npos; at = bytes.find(from, at + to.size()))
       bytes.replace(at, from.size(), to);

@@ -12,7 +12,7 @@ namespace {
 
 using testing::HasSubstr;
 
-std::string refusal(const std::string& text) {
+std::string refused_header(const std::string& text) {
   try {
     parse_ply_header(text, "a.ply");
   } catch (const Error& e) {
@@ -53,23 +53,24 @@ TEST(PlyHeader, LinesMayEndInCarriageReturnAlone) {
 
 TEST(PlyHeader, ErrorsNameFileAndLine) {
   const std::string start = "ply\nformat ascii 1.0\n";
-  EXPECT_THAT(refusal("ply\nformat utf8 1.0\n"), HasSubstr("a.ply, line 2: format 'utf8' is not supported"));
-  EXPECT_THAT(refusal("ply\nformat ascii 2.0\n"), HasSubstr("a.ply, line 2: PLY version '2.0'"));
-  EXPECT_THAT(refusal("ply\nformat ascii\n"), HasSubstr("a version expected"));
-  EXPECT_THAT(refusal("ply\nelement vertex 0\nend_header\n"),
+  EXPECT_THAT(refused_header("ply\nformat utf8 1.0\n"), HasSubstr("a.ply, line 2: format 'utf8' is not supported"));
+  EXPECT_THAT(refused_header("ply\nformat ascii 2.0\n"), HasSubstr("a.ply, line 2: PLY version '2.0'"));
+  EXPECT_THAT(refused_header("ply\nformat ascii\n"), HasSubstr("a version expected"));
+  EXPECT_THAT(refused_header("ply\nelement vertex 0\nend_header\n"),
               HasSubstr("a.ply, line 3: the header ends without a format"));
-  EXPECT_THAT(refusal(start + "element vertex -1\n"),
+  EXPECT_THAT(refused_header(start + "element vertex -1\n"),
               HasSubstr("a.ply, line 3: the count of element 'vertex' is '-1'"));
-  EXPECT_THAT(refusal(start + "element vertex 99999999999999999999\n"), HasSubstr("a whole number expected"));
-  EXPECT_THAT(refusal(start + "element vertex 10 20\n"), HasSubstr("'20' is too much here"));
-  EXPECT_THAT(refusal(start + "element vertex\n"), HasSubstr("a count expected, the line ends"));
-  EXPECT_THAT(refusal(start + "property float x\n"), HasSubstr("a property before the first element"));
-  EXPECT_THAT(refusal(start + "element v 1\nproperty half x\n"), HasSubstr("a.ply, line 4: 'half' is no PLY type"));
-  EXPECT_THAT(refusal(start + "element v 1\nproperty list float int x\n"), HasSubstr("of an integer type"));
-  EXPECT_THAT(refusal(start + "elements\n"), HasSubstr("'elements' is no keyword"));
-  EXPECT_THAT(refusal(start + std::string(300, '\x01') + "\n"),
+  EXPECT_THAT(refused_header(start + "element vertex 99999999999999999999\n"), HasSubstr("a whole number expected"));
+  EXPECT_THAT(refused_header(start + "element vertex 10 20\n"), HasSubstr("'20' is too much here"));
+  EXPECT_THAT(refused_header(start + "element vertex\n"), HasSubstr("a count expected, the line ends"));
+  EXPECT_THAT(refused_header(start + "property float x\n"), HasSubstr("a property before the first element"));
+  EXPECT_THAT(refused_header(start + "element v 1\nproperty half x\n"),
+              HasSubstr("a.ply, line 4: 'half' is no PLY type"));
+  EXPECT_THAT(refused_header(start + "element v 1\nproperty list float int x\n"), HasSubstr("of an integer type"));
+  EXPECT_THAT(refused_header(start + "elements\n"), HasSubstr("'elements' is no keyword"));
+  EXPECT_THAT(refused_header(start + std::string(300, '\x01') + "\n"),
               HasSubstr("'????????????????????????????????????????...'"));
-  EXPECT_THAT(refusal(start + "element vertex 0\nend_header"), HasSubstr("no end_header"));
+  EXPECT_THAT(refused_header(start + "element vertex 0\nend_header"), HasSubstr("no end_header"));
 }
 
 TEST(PlyHeader, EndIsSoughtInTheFirstMegabyteOnly) {

@@ -19,7 +19,7 @@ PlyHeader header_with(const std::string& vertex_properties) {
 
 const std::string kXyz = "property double x\nproperty double y\nproperty double z\n";
 
-std::string refusal(const PlyHeader& header) {
+std::string refused_rows(const PlyHeader& header) {
   try {
     understand_vertices(header, "a.ply", "a.ply");
   } catch (const Error& e) {
@@ -59,17 +59,17 @@ TEST(PlyRows, AlternativeNamesServeWhenAlone) {
 }
 
 TEST(PlyRows, RefusesWhatMakesNoPoints) {
-  EXPECT_THAT(refusal(header_with("property float x\nproperty float y\n")),
+  EXPECT_THAT(refused_rows(header_with("property float x\nproperty float y\n")),
               HasSubstr("no property 'z'; points need x y z"));
-  EXPECT_THAT(refusal(header_with(kXyz + "property float nx\nproperty float nz\n")),
+  EXPECT_THAT(refused_rows(header_with(kXyz + "property float nx\nproperty float nz\n")),
               HasSubstr("normals are incomplete"));
-  EXPECT_THAT(refusal(header_with(kXyz + "property list uchar int ids\n")),
+  EXPECT_THAT(refused_rows(header_with(kXyz + "property list uchar int ids\n")),
               HasSubstr("property 'ids' of the vertices is a list"));
-  EXPECT_THAT(refusal(header_with(kXyz + "property float y\n")),
+  EXPECT_THAT(refused_rows(header_with(kXyz + "property float y\n")),
               HasSubstr("property 'y' of the points is there twice"));
-  EXPECT_THAT(refusal(header_with(kXyz + "element vertex 3\n")), HasSubstr("two elements 'vertex'"));
+  EXPECT_THAT(refused_rows(header_with(kXyz + "element vertex 3\n")), HasSubstr("two elements 'vertex'"));
   const auto without = parse_ply_header("ply\nformat ascii 1.0\nelement face 1\nelement edge 0\nend_header\n", "a.ply");
-  EXPECT_THAT(refusal(without), HasSubstr("no element 'vertex'; its elements are: 'face', 'edge'"));
+  EXPECT_THAT(refused_rows(without), HasSubstr("no element 'vertex'; its elements are: 'face', 'edge'"));
 }
 
 TEST(PlyRows, BatchKeepsOnlyWhatTheSourceHas) {

@@ -12,7 +12,7 @@ using testing::HasSubstr;
 using testing::StartsWith;
 using namespace std::string_view_literals;
 
-std::string refusal(std::string_view start, const std::string& name = "cloud.bin") {
+std::string refused_format(std::string_view start, const std::string& name = "cloud.bin") {
   try {
     detect_format(start, name);
   } catch (const Error& e) {
@@ -50,27 +50,27 @@ TEST(Sniff, TheEndingDecidesWhereTheContentDoesNot) {
   const std::string comment = "# " + std::string(70'000, '-');
   EXPECT_EQ(detect_format(comment, "a.OBJ"), PointFormat::obj);
   EXPECT_EQ(detect_format(comment, "a.xyz.gz"), PointFormat::text);
-  EXPECT_NE(refusal(comment, "a"), "");
+  EXPECT_NE(refused_format(comment, "a"), "");
   EXPECT_EQ(detect_format("Station1 1 2 3\n", "a.csv"), PointFormat::text);
 }
 
 TEST(Sniff, NamesWhatItLooksLikeAndTheRemedy) {
   std::string laz = "LASF" + std::string(200, '\0');
   laz[104] = '\x83';
-  EXPECT_THAT(refusal(laz), HasSubstr("laszip -i"));
-  EXPECT_THAT(refusal("ASTM-E57\1"), HasSubstr("CloudCompare"));
-  EXPECT_THAT(refusal("version https://git-lfs.github.com/spec/v1"), HasSubstr("git lfs pull"));
-  EXPECT_THAT(refusal("OFF\n3 1 0\n"), HasSubstr("OFF mesh"));
-  EXPECT_THAT(refusal("camera 0 0 0 0 0 0 1\nbmesh a.ply 0 0 0 0 0 0 1\n"), HasSubstr("list of scans"));
+  EXPECT_THAT(refused_format(laz), HasSubstr("laszip -i"));
+  EXPECT_THAT(refused_format("ASTM-E57\1"), HasSubstr("CloudCompare"));
+  EXPECT_THAT(refused_format("version https://git-lfs.github.com/spec/v1"), HasSubstr("git lfs pull"));
+  EXPECT_THAT(refused_format("OFF\n3 1 0\n"), HasSubstr("OFF mesh"));
+  EXPECT_THAT(refused_format("camera 0 0 0 0 0 0 1\nbmesh a.ply 0 0 0 0 0 0 1\n"), HasSubstr("list of scans"));
 }
 
 TEST(Sniff, OtherwiseSaysItIsNoPointFile) {
-  EXPECT_THAT(refusal("plyx\n"), HasSubstr("is no point file known here"));
-  EXPECT_THAT(refusal("\0\0\0\0\0"sv), HasSubstr("is no point file known here"));
-  EXPECT_THAT(refusal("1 2\n3 4\n"), HasSubstr("is no point file known here"));
-  EXPECT_THAT(refusal("1 2 3\n\0"sv), HasSubstr("is no point file known here"));
-  EXPECT_THAT(refusal("#"), HasSubstr("is no point file known here"));
-  EXPECT_THAT(refusal(""), HasSubstr("is empty"));
+  EXPECT_THAT(refused_format("plyx\n"), HasSubstr("is no point file known here"));
+  EXPECT_THAT(refused_format("\0\0\0\0\0"sv), HasSubstr("is no point file known here"));
+  EXPECT_THAT(refused_format("1 2\n3 4\n"), HasSubstr("is no point file known here"));
+  EXPECT_THAT(refused_format("1 2 3\n\0"sv), HasSubstr("is no point file known here"));
+  EXPECT_THAT(refused_format("#"), HasSubstr("is no point file known here"));
+  EXPECT_THAT(refused_format(""), HasSubstr("is empty"));
 }
 
 TEST(Sniff, ScanListsAndEndings) {

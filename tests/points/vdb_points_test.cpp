@@ -9,6 +9,7 @@
 #include "files/temporary_folder.h"
 #include "lamina/volume_points.h"
 #include "points/point_rows.h"
+#include "support/paths.h"
 
 namespace lamina {
 namespace {

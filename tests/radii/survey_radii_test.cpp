@@ -19,7 +19,7 @@ SlabStore make_store(const LocalSamples& samples, std::size_t buckets, std::int3
   return writer.finish();
 }
 
-void add(LocalSamples& samples, double x, double y, double z) {
+void add_sample(LocalSamples& samples, double x, double y, double z) {
   samples.x.push_back(static_cast<std::int32_t>(x));
   samples.y.push_back(static_cast<std::int32_t>(y));
   samples.z.push_back(static_cast<std::int32_t>(z));
@@ -31,7 +31,7 @@ LocalSamples wall(std::size_t n, double width, std::mt19937& random) {
   LocalSamples samples;
   for (std::size_t i = 0; i < n; ++i) {
     const double t = width * u(random);
-    add(samples, 0.8 * t, 0.6 * t, 4 * width * u(random));
+    add_sample(samples, 0.8 * t, 0.6 * t, 4 * width * u(random));
   }
   return samples;
 }
@@ -62,7 +62,7 @@ TEST(SurveyRadii, SeesBothEndsOfVaryingDensity) {
   std::uniform_real_distribution<double> u(0, 1);
   LocalSamples samples;
   for (std::size_t i = 0; i < 130'000; ++i) {  // a step of 64
-    add(samples, 1e8 * u(random), 1e8 * u(random) * 0.3, i % 65 == 0 ? -1e8 * u(random) : 1e8 * u(random));
+    add_sample(samples, 1e8 * u(random), 1e8 * u(random) * 0.3, i % 65 == 0 ? -1e8 * u(random) : 1e8 * u(random));
     samples.y.back() = samples.x.back() / 3;
   }
   const double dense = 2 * std::sqrt(1e16 * std::sqrt(1 + 1.0 / 9) / 128'000);
@@ -76,7 +76,7 @@ TEST(SurveyRadii, SeesBothEndsOfVaryingDensity) {
 TEST(SurveyRadii, ReportsGivenRadii) {
   LocalSamples samples;
   for (int i = 0; i < 1001; ++i) {
-    add(samples, i, i, i);
+    add_sample(samples, i, i, i);
     samples.radius.push_back(static_cast<float>(1000 - i));
   }
   const auto survey = survey_radii(make_store(samples, 10, 0, 101, true), 5000);
@@ -89,7 +89,7 @@ TEST(SurveyRadii, ReportsGivenRadii) {
 TEST(SurveyRadii, IsZeroWithoutExtent) {
   LocalSamples samples;
   EXPECT_EQ(survey_radii(make_store(samples, 3, 0, 10), 100).samples, 0U);
-  for (int i = 0; i < 500; ++i) add(samples, 5, 6, 7);
+  for (int i = 0; i < 500; ++i) add_sample(samples, 5, 6, 7);
   for (const std::uint64_t limit : {1000U, 100U}) {
     const auto survey = survey_radii(make_store(samples, 3, 0, 10), limit);
     EXPECT_EQ(survey.median, 0);
@@ -99,8 +99,8 @@ TEST(SurveyRadii, IsZeroWithoutExtent) {
 
 TEST(SurveyRadii, TakesAFewSamplesAndTheWholeRange) {
   LocalSamples samples;
-  add(samples, -2147483648.0, 2147483647.0, -2147483648.0);
-  add(samples, 2147483647.0, -2147483648.0, 2147483647.0);
+  add_sample(samples, -2147483648.0, 2147483647.0, -2147483648.0);
+  add_sample(samples, 2147483647.0, -2147483648.0, 2147483647.0);
   const auto survey = survey_radii(make_store(samples, 4, -2147483648, 1 << 30), 100);
   EXPECT_EQ(survey.samples, 2U);
   EXPECT_GT(survey.median, 1e9);

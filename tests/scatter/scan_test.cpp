@@ -8,6 +8,7 @@
 #include "lamina/compare.h"
 #include "meshes/mesh_files.h"
 #include "meshes/vec3.h"
+#include "support/paths.h"
 
 namespace lamina {
 namespace {

@@ -43,7 +43,7 @@ SlabStore store_of(const std::vector<const LocalSamples*>& parts, const test::Te
   return writer.finish();
 }
 
-bool same(const LocalSamples& a, const LocalSamples& b) {
+bool same_rows(const LocalSamples& a, const LocalSamples& b) {
   return a.x == b.x && a.y == b.y && a.z == b.z && a.nx == b.nx && a.attributes == b.attributes;
 }
 
@@ -78,7 +78,7 @@ TEST(StoreBlocks, GatheredPartsAreTheWhole) {
       LocalSamples expected, found;
       whole.read(bucket, expected);
       gathered.read(bucket, found);
-      RC_ASSERT(same(found, expected));
+      RC_ASSERT(same_rows(found, expected));
     }
   });
 }
@@ -110,7 +110,7 @@ TEST(StoreBlocks, UnpackedBlocksAreTheBucket) {
   LocalSamples expected, found;
   store.read(7, expected);
   decode_blocks(kLayout, blocks, found);
-  EXPECT_TRUE(same(found, expected));
+  EXPECT_TRUE(same_rows(found, expected));
   bytes[0].pop_back();
   blocks[0].bytes = bytes[0];
   EXPECT_THROW(decode_blocks(kLayout, blocks, found), Error);

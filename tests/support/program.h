@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "files/temporary_folder.h"
+#include "support/paths.h"
 
 namespace lamina::test {
 

@@ -14,9 +14,6 @@ namespace {
 using test::Cloud;
 using test::Point3;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 Survey survey_of(const Cloud& cloud, PlyFormat format = PlyFormat::little_endian, const RunContext& run = {}) {
   const test::TemporaryFolder folder;
   const auto source = open_points(test::write_cloud(cloud, folder / "in.ply", format, ScalarType::float64));
@@ -36,8 +33,8 @@ RC_GTEST_PROP(Survey, MomentsAreThoseOfTheCloud, (unsigned seed)) {
   const Survey survey = survey_of(cloud);
   std::array<long double, 3> mean{};
   for (std::size_t k = 0; k < 3; ++k) {
-    double low = kInfinity;
-    double high = -kInfinity;
+    double low = std::numeric_limits<double>::infinity();
+    double high = -std::numeric_limits<double>::infinity();
     for (const Point3& p : cloud.positions) {
       mean[k] += p[k] / static_cast<long double>(count);
       low = std::min(low, p[k]);
@@ -61,19 +58,19 @@ TEST(Survey, DefectsAreToldApartAndCounted) {
   Cloud cloud = test::sphere_cloud(200);
   cloud.add_property("radius", ScalarType::float32, [](const Point3&) { return 1.0; });
   cloud.add_property("quality", ScalarType::float32, [](const Point3&) { return 2.0; });
-  cloud.positions[5][0] = kNan;
-  cloud.positions[6][1] = kInfinity;
-  cloud.positions[7][2] = -kInfinity;
+  cloud.positions[5][0] = std::numeric_limits<double>::quiet_NaN();
+  cloud.positions[6][1] = std::numeric_limits<double>::infinity();
+  cloud.positions[7][2] = -std::numeric_limits<double>::infinity();
   cloud.normals[20] = {0, 0, 0};
-  cloud.normals[21][1] = kNan;
+  cloud.normals[21][1] = std::numeric_limits<double>::quiet_NaN();
   cloud.normals[22] = {1e-20, 0, 0};
-  cloud.normals[23][2] = kInfinity;
+  cloud.normals[23][2] = std::numeric_limits<double>::infinity();
   cloud.values[0][30] = 0;
   cloud.values[0][31] = -1;
-  cloud.values[0][32] = kNan;
-  cloud.values[0][33] = kInfinity;
+  cloud.values[0][32] = std::numeric_limits<double>::quiet_NaN();
+  cloud.values[0][33] = std::numeric_limits<double>::infinity();
   cloud.values[1][40] = -1;
-  cloud.values[1][41] = kNan;
+  cloud.values[1][41] = std::numeric_limits<double>::quiet_NaN();
   cloud.values[1][42] = 7;
   cloud.normals[50] = {100, 0, 0};  // any length will do
   for (const PlyFormat format : {PlyFormat::ascii, PlyFormat::big_endian}) {
@@ -96,8 +93,8 @@ TEST(Survey, DefectsAreToldApartAndCounted) {
 TEST(Survey, RowsAreCountedAcrossPieces) {
   Cloud cloud = test::sphere_cloud(140000);
   cloud.add_property("t", ScalarType::float32, [](const Point3&) { return 0.0; });
-  cloud.positions[139999][0] = kNan;
-  cloud.values[0][131073] = kInfinity;
+  cloud.positions[139999][0] = std::numeric_limits<double>::quiet_NaN();
+  cloud.values[0][131073] = std::numeric_limits<double>::infinity();
   std::vector<std::uint64_t> steps;
   RunContext run;
   run.progress = [&](const Progress& p) {
@@ -131,7 +128,7 @@ RC_GTEST_PROP(Survey, FramesHoldTheCloud, (unsigned seed)) {
     RC_ASSERT(std::abs(frame.rotation.determinant() - 1) < 1e-12);
     int exponent = 0;
     RC_ASSERT(std::frexp(frame.step, &exponent) == 0.5);
-    Eigen::Vector3d low = Eigen::Vector3d::Constant(kInfinity);
+    Eigen::Vector3d low = Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity());
     Eigen::Vector3d high = -low;
     for (const Point3& p : cloud.positions) {
       const Eigen::Vector3d local = frame.to_local({p[0], p[1], p[2]});
@@ -146,9 +143,9 @@ RC_GTEST_PROP(Survey, FramesHoldTheCloud, (unsigned seed)) {
 }
 
 TEST(Survey, UsableAttributes) {
-  EXPECT_EQ(usable_attribute(static_cast<float>(kNan)), 0);
+  EXPECT_EQ(usable_attribute(static_cast<float>(std::numeric_limits<double>::quiet_NaN())), 0);
   EXPECT_EQ(usable_attribute(-3.5F), -3.5F);
-  EXPECT_EQ(usable_attribute(static_cast<float>(-kInfinity)), -kLargestAttribute);
+  EXPECT_EQ(usable_attribute(static_cast<float>(-std::numeric_limits<double>::infinity())), -kLargestAttribute);
   EXPECT_EQ(usable_attribute(3e38F), kLargestAttribute);
 }
 
