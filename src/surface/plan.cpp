@@ -18,7 +18,7 @@ namespace {
 constexpr double kMainCell = 0.7;
 constexpr int kDefaultLevels = 4;
 /// Expected memory from which on slabs are made half as high where the main cells are the finest.
-constexpr std::uint64_t kRoomy = 256u << 20;
+constexpr std::uint64_t kRoomy = 224u << 20;
 constexpr int kMaxLevels = 12;
 constexpr std::int32_t kMinSteps = 64;  ///< fixed-point steps a finest cell must have for exact enough positions
 constexpr double kMaxCells = 1 << 20;   ///< finest cells from the origin, the limit of the lattice's keys
