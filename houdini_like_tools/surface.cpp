@@ -97,6 +97,7 @@ void run_surface(const SurfaceOptions& o) {
                              static_cast<double>(stats.peak_memory) * 1e-6));
     if (!parts.chunk) context.info(describe(stats.holes));
     const VolumeExportStats& v = stats.volume;
+    if (v.voxel > 0) context.info(fmt::format("{} voxels of {:.4g}", count_text(v.voxels), v.voxel));
     if (v.files.size() == 1) context.info(fmt::format("{}: {}", v.files[0], bytes_text(v.bytes)));
     if (v.files.size() > 1)
       context.info(

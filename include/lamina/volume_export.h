@@ -22,7 +22,7 @@ struct VolumeExport {
   double band = 3;   ///< half width of the band, voxels, 1..8
   bool levels =
       false;         ///< one grid per level of the octree (surface_L0 the finest) with what was projected there alone
-  double voxel = 0;  ///< the nearest cell size of the octree is taken; 0: the size of most cells
+  double voxel = 0;  ///< the nearest cell size of the octree is taken, refused where twice beyond all; 0: of most cells
   std::size_t split = 0;  ///< bytes of voxels in memory at which a new file begins: OUT.0001.vdb ...; 0: one file
   std::string points;     ///< .vdb for the projected corners as points: P, N, Cd, pscale; empty: none
   std::size_t points_per_file = 1 << 20;  ///< beyond, a numbered sequence

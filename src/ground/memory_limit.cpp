@@ -1,6 +1,7 @@
 #include "ground/memory_limit.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <cmath>
 
@@ -14,6 +15,11 @@ void require_memory(const RunContext& run, std::uint64_t needed, const std::stri
   throw Error(ExitCode::budget,
               fmt::format("{}: {} needs about {:.0f}M of memory, --max-memory allows {:.0f}M; give it more", name, what,
                           std::ceil(static_cast<double>(needed) / kMega), static_cast<double>(run.max_memory) / kMega));
+}
+
+std::uint64_t machine_memory() {
+  const long pages = sysconf(_SC_PHYS_PAGES), bytes = sysconf(_SC_PAGESIZE);
+  return pages > 0 && bytes > 0 ? static_cast<std::uint64_t>(pages) * static_cast<std::uint64_t>(bytes) : 0;
 }
 
 }  // namespace lamina

@@ -24,6 +24,13 @@ TriangleMesh read_by_format(meshes::FileBuffer& file, const std::string& path) {
   if (format == ".obj") return meshes::read_with_openmesh(file, path, meshes::TextFormat::obj);
   if (format == ".off") return meshes::read_off(file, path);
   if (format == ".stl") return meshes::read_with_openmesh(file, path, meshes::TextFormat::stl);
+  if (format == ".vdb") {
+    throw Error(
+        ExitCode::unreadable,
+        fmt::format("{0}: is a volume, where a mesh is wanted; 'lamina convert {0} -o mesh.ply' meshes its level "
+                    "set",
+                    path));
+  }
   throw Error(
       ExitCode::unreadable,
       fmt::format("{}: unknown mesh format \"{}\"; known are .ply, .obj, .off, .stl, each also as .gz", path, format));

@@ -54,6 +54,11 @@ std::unique_ptr<PointsWriter> open_points_writer(const std::string& path, const 
     known += (known.empty() ? "" : ", ") + std::string(ending);
   }
   if (path == "-" || is_pipe_or_device(path)) return open_ply_points_writer(path, columns, settings);
+  if (extension == ".vdb") {
+    throw Error(ExitCode::usage, fmt::format("{0}: only 'lamina convert' writes points as .vdb: pipe them to 'lamina "
+                                             "convert - -o {0}'; known here are {1}",
+                                             path, known));
+  }
   throw Error(ExitCode::usage, fmt::format("{}: unknown point format to write; known are {}", path, known));
 }
 

@@ -18,7 +18,7 @@ namespace {
 constexpr double kMainCell = 0.7;
 constexpr int kDefaultLevels = 4;
 /// Expected memory from which on slabs are made half as high where the main cells are the finest.
-constexpr std::uint64_t kRoomy = 256u << 20;
+constexpr std::uint64_t kRoomy = 224u << 20;
 constexpr int kMaxLevels = 12;
 constexpr std::int32_t kMinSteps = 64;  ///< fixed-point steps a finest cell must have for exact enough positions
 constexpr double kMaxCells = 1 << 20;   ///< finest cells from the origin, the limit of the lattice's keys
@@ -219,6 +219,7 @@ Resolved plan_once(const SurfaceSettings& s, const Frame& frame, const SlabStore
     const double above_finest = std::log2(kMainCell * ratio * survey.median / out.lattice.cell);
     out.main_level = static_cast<int>(std::clamp(std::lround(above_finest), 0L, static_cast<long>(levels.count) - 1));
   }
+  if (!s.volume.path.empty() && !s.volume.levels) volume_level(s.volume, frame.step, out.lattice, out.main_level);
   out.refit = {static_cast<float>(support.refit), 1.5F * survey.high, out.main_level};
   out.radii.min_samples = s.density;
   set_counting_cells(s, survey, out);

@@ -15,8 +15,7 @@
 namespace lamina::volume {
 namespace {
 
-constexpr std::int32_t kBatch = 8;  ///< planes worth a round
-constexpr float kBeyond = 1;        ///< voxels outside of the band that tell the side of its neighbours
+constexpr float kBeyond = 1;  ///< voxels outside of the band that tell the side of its neighbours
 
 /// What a corner's value says in a channel of the window; attributes lie behind.
 float channel_of(const CornerValue& v, const std::vector<float>& attributes, int channel) {
@@ -251,10 +250,8 @@ void Band::advance(bool end) {
   done_[0] = end ? known_end_ + settings_.rounds + 1 : known_end_;
   for (int r = 1; r <= settings_.rounds; ++r) {
     const std::int32_t to = done_[0] - r;
-    if (to - done_[r] < kBatch && !end) continue;
-    // Every round waits for the one before. Waiting for whole bricks would cost a tenth less time and hold two layers
-    // of bricks more.
-    const std::int32_t upper = end ? to : std::min(to, done_[r - 1] - (r > 1 ? 1 : 0));
+    // Every round waits for the one before, and for whole bricks: each is then looked at once a round.
+    const std::int32_t upper = end ? to : std::min(to, done_[r - 1] - (r > 1 ? 1 : 0)) & ~7;
     if (upper <= done_[r]) continue;
     grow(r, done_[r], upper);
     done_[r] = upper;

@@ -41,8 +41,8 @@ Brick& BrickMap::touch(const Block& b) {
   brick.block = b;
   brick.around.fill(nullptr);
   const auto rounds = static_cast<std::size_t>(rounds_);
-  brick.known.assign(rounds + 1, {});
-  brick.source.assign(rounds + 1, {});
+  std::fill_n(brick.known.begin(), rounds + 1, BlockMask{});
+  std::fill_n(brick.source.begin(), rounds + 1, BlockMask{});
   brick.contested = {};
   brick.repaired = {};
   own.add(std::move(place));

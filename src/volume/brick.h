@@ -24,9 +24,9 @@ struct Brick {
   /// The bricks around, x fastest, itself in the middle; null where there is none.
   std::array<Brick*, 27> around;
   /// By round: the projected voxels first, the whole band last.
-  std::vector<BlockMask> known;
+  std::array<BlockMask, kMaxRounds + 1> known;
   /// By round: the voxels new in it that the band grows from.
-  std::vector<BlockMask> source;
+  std::array<BlockMask, kMaxRounds + 1> source;
   /// Voxels that the planes around disagree on.
   BlockMask contested;
   /// Corners that extraction gives a value from their trusted neighbours.

@@ -86,19 +86,26 @@ class Step {
 
   void push(int round, const BlockMask& wanted) {
     const Targets targets(wanted, begin_, end_);
+    // Where one of them may be beside, a layer beyond the brick included. Of the bricks around only what touches this
+    // one counts.
+    bits::Neighbourhood only{};
+    only[1][1][1] = &wanted;
+    std::array<std::uint64_t, 10> reached;
+    bits::dilate_layers<-1, 1>(only, -1, 9, reached.data());
+    const auto touching = [&reached](int dx, int dy, int z) {
+      std::uint64_t w = reached[static_cast<std::size_t>(z + 1)];
+      if (dx != 0) w = dx < 0 ? (w & bits::columns_below(1)) << 7 : w >> 7 & bits::columns_below(1);
+      return dy == 0 ? w : dy < 0 ? w << 56 : w >> 56;
+    };
     // Their values are on the way from memory while the next are looked for.
     std::array<Pusher, 32> waiting;
     std::size_t count = 0;
     for (int i = 0; i < 27; ++i) {
       const Brick* const from = brick_.around[i];
       if (from == nullptr) continue;
-      // Of the bricks around only what touches this one.
       const int dx = i % 3 - 1, dy = i / 3 % 3 - 1, dz = i / 9 - 1;
-      std::uint64_t near = ~std::uint64_t{0};
-      if (dx != 0) near &= dx < 0 ? ~bits::columns_below(7) : bits::columns_below(1);
-      if (dy != 0) near &= std::uint64_t{0xFF} << (dy < 0 ? 56 : 0);
       for (int z = std::max(begin_ - 1, dz * 8); z < std::min(end_ + 1, dz * 8 + 8); ++z) {
-        for (std::uint64_t w = from->source[round].words[z & 7] & near; w != 0; w &= w - 1) {
+        for (std::uint64_t w = from->source[round].words[z & 7] & touching(dx, dy, z); w != 0; w &= w - 1) {
           const int bit = std::countr_zero(w), x = (bit & 7) + 8 * dx, y = (bit >> 3) + 8 * dy;
           const PairBits beside = targets.beside(x, y, z);
           if (!beside.any()) continue;

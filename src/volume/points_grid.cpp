@@ -10,6 +10,7 @@
 #include <set>
 
 #include "attributes/ply_type.h"
+#include "ground/memory_limit.h"
 #include "lamina/error.h"
 #include "volume/full_range.h"
 
@@ -52,6 +53,37 @@ std::vector<Place> sorted_places(const PointArrays& points, const math::Transfor
   });
   tbb::parallel_sort(places.begin(), places.end());
   return places;
+}
+
+/// Of a node, `voxels` wide, each place where points lie; leaves come in the order of their places.
+std::size_t count_nodes(const std::vector<Place>& places, std::int32_t voxels) {
+  std::vector<Coord> nodes;
+  for (const Place& p : places) {
+    const Coord node = p.leaf & ~(voxels - 1);
+    if (nodes.empty() || nodes.back() != node) nodes.push_back(node);
+  }
+  std::sort(nodes.begin(), nodes.end());
+  return static_cast<std::size_t>(std::unique(nodes.begin(), nodes.end()) - nodes.begin());
+}
+
+/// Points thinly spread over small voxels have a leaf and its nodes each to themselves.
+void check_memory(const std::vector<Place>& places, std::size_t columns, double voxel, double usual,
+                  std::uint64_t most) {
+  using Leaf = PointDataTree::LeafNodeType;
+  using Lower = PointDataTree::RootNodeType::ChildNodeType::ChildNodeType;
+  using Upper = PointDataTree::RootNodeType::ChildNodeType;
+  constexpr std::size_t kArray = 200;  // an attribute's, beside its values
+  const auto leaves =
+      static_cast<double>(count_nodes(places, Leaf::DIM) * (sizeof(Leaf) + 4 * Leaf::SIZE + kArray * (columns + 2)));
+  const double bytes = leaves + static_cast<double>(count_nodes(places, Lower::DIM) * sizeof(Lower)) +
+                       static_cast<double>(count_nodes(places, Upper::DIM) * sizeof(Upper)) +
+                       12.0 * static_cast<double>(places.size() * (columns + 1));
+  if (most == 0 || bytes <= static_cast<double>(most)) return;
+  throw Error(
+      ExitCode::budget,
+      fmt::format("voxels of {:g} leave the points so far apart that the grid needs about {:.0f} MB, where {:.0f} "
+                  "MB are allowed; a --voxelsize of {:g} holds eight points a voxel",
+                  voxel, bytes / 1e6, static_cast<double>(most) / 1e6, usual));
 }
 
 void fill_column(points::AttributeArray& array, const PointColumn& column, const Place* places, Index count) {
@@ -158,13 +190,15 @@ math::Transform::Ptr point_transform(const PointArrays& points, double voxel) {
 }
 
 PointDataGrid::Ptr point_grid(const PointArrays& points, const std::vector<PointColumn>& columns,
-                              const math::Transform::Ptr& transform) {
+                              const math::Transform::Ptr& transform, std::uint64_t most_bytes) {
   using Leaf = PointDataTree::LeafNodeType;
   AttributeSet::Descriptor::Ptr descriptor =
       AttributeSet::Descriptor::create(TypedAttributeArray<Vec3s>::attributeType());
   for (const PointColumn& c : columns) descriptor = descriptor->duplicateAppend(c.name, type_of(c.kind));
 
   const std::vector<Place> places = sorted_places(points, *transform);
+  check_memory(places, columns.size(), transform->voxelSize()[0], point_voxel(points.samples, 0),
+               most_bytes > 0 ? most_bytes : machine_memory());
   struct Run {
     Leaf* leaf;
     std::size_t begin, end;

@@ -33,9 +33,11 @@ double point_voxel(const SampleBatch& samples, double wanted);
 /// A transform of a power-of-two voxel, offset by whole voxels where the numbers of voxels would not fit.
 openvdb::math::Transform::Ptr point_transform(const PointArrays& points, double voxel);
 
-/// The grid, without name or creator. Points are ordered by leaf, voxel and row.
+/// The grid, without name or creator. Points are ordered by leaf, voxel and row. Throws Error(budget) where its tree
+/// would take more than `most_bytes`; 0: than the machine has.
 openvdb::points::PointDataGrid::Ptr point_grid(const PointArrays& points, const std::vector<PointColumn>& columns,
-                                               const openvdb::math::Transform::Ptr& transform);
+                                               const openvdb::math::Transform::Ptr& transform,
+                                               std::uint64_t most_bytes = 0);
 
 /// Grid metadata: the types of the arrays a column was made of, behind this prefix and its name.
 inline constexpr const char* kTypeMetadata = "type_";

@@ -37,6 +37,11 @@ bool fits_half(double voxel, double band) {
   return voxel * band < 65504 && voxel > 1000 * 0x1p-24;
 }
 
+void require_vdb(const char* option, const std::string& path) {
+  if (path.empty() || std::filesystem::path(path).extension() == ".vdb") return;
+  usage(fmt::format("{} {}: the file's name must end in .vdb, by which other programs know it", option, path));
+}
+
 /// One level's band and the numbers of its grids in the file.
 struct LevelGrid {
   std::string name;
@@ -51,9 +56,24 @@ void check_volume_export(const VolumeExport& s) {
   if (!(s.band >= 1 && s.band <= 8)) usage("--vdb-band must be in 1..8 voxels");
   if (!(s.voxel >= 0 && std::isfinite(s.voxel))) usage("--vdb-voxelsize must be a positive length");
   if (s.path == "-" || s.points == "-") usage("--vdb and --vdb-points name files, not pipes");
+  require_vdb("--vdb", s.path);
+  require_vdb("--vdb-points", s.points);
   if (!s.path.empty() && s.path == s.points) usage("--vdb and --vdb-points name the same file");
   if (s.levels && s.split > 0) usage("--vdb-levels and --vdb-split exclude each other");
   if (s.points_per_file < 1) usage("--vdb-points: a file must hold one point at least");
+}
+
+int volume_level(const VolumeExport& settings, double step, const Lattice& lattice, int main_level) {
+  if (!(settings.voxel > 0)) return main_level;
+  const double finest = step * lattice.cell, coarsest = std::ldexp(finest, lattice.levels - 1);
+  if (settings.voxel < 0.5 * finest || settings.voxel > 2 * coarsest) {
+    usage(
+        fmt::format("--vdb-voxelsize {:g}: the octree's cells are {:.3g} to {:.3g}; name a length between, or choose "
+                    "them by --cell",
+                    settings.voxel, finest, coarsest));
+  }
+  const long above_finest = std::lround(std::log2(settings.voxel / finest));
+  return static_cast<int>(std::clamp(above_finest, 0L, static_cast<long>(lattice.levels) - 1));
 }
 
 struct SurfaceVolume::Impl {
@@ -89,12 +109,7 @@ SurfaceVolume::Impl::Impl(const VolumeExport& s, const Frame& f, const Lattice& 
     for (int level = 0; level < lattice.levels; ++level)
       add_level(lattice, level, fmt::format("surface_L{}", level), channels);
   } else {
-    int level = main_level;
-    if (s.voxel > 0) {
-      const double above_finest = std::log2(s.voxel / (f.step * lattice.cell));
-      level = static_cast<int>(std::clamp(std::lround(above_finest), 0L, static_cast<long>(lattice.levels) - 1));
-    }
-    add_level(lattice, level, "surface", channels);
+    add_level(lattice, volume_level(s, f.step, lattice, main_level), "surface", channels);
   }
   begin_file();
 }

@@ -14,6 +14,10 @@ namespace lamina {
 /// Throws Error(usage) for settings out of range.
 void check_volume_export(const VolumeExport& settings);
 
+/// The level whose corners become voxels: the one with most cells, or whose cells are nearest to the voxel asked for.
+/// `step`: of the frame. Throws Error(usage) where it is more than twice as large or small as all cells.
+int volume_level(const VolumeExport& settings, double step, const Lattice& lattice, int main_level);
+
 class SurfaceVolume {
  public:
   /// `main_level`: the lattice's level with most cells. Throws Error: usage (a grid nobody knows, a voxel too small),

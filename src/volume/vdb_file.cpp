@@ -47,6 +47,7 @@ std::string check_header(std::ifstream& file, const std::string& path) {
 VdbFile read_vdb(const std::string& path) {
   openvdb::initialize();
   std::error_code ec;
+  if (path == "-") refuse("standard input", "a .vdb is read from a file only; write one and name it");
   if (std::filesystem::is_directory(path, ec)) refuse(path, "is a directory, not a .vdb file");
   std::ifstream file(path, std::ios::binary);
   if (!file) refuse(path, fmt::format("cannot be opened: {}", std::strerror(errno)));

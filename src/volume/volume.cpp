@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "ground/memory_limit.h"
 #include "lamina/error.h"
 #include "measure/edge_table.h"
 #include "meshes/output_file.h"
@@ -25,8 +26,8 @@ using namespace meshes;
 
 void check_settings(const VolumeSettings& s) {
   if (!(s.voxel >= 0 && std::isfinite(s.voxel)))
-    wrong_usage("--voxel must be a positive length, or 0 for the mean edge");
-  if (!(s.band >= 1 && s.band <= 1000)) wrong_usage("--band must be in 1..1000 voxels");
+    wrong_usage("--voxelsize must be a positive length, or 0 for the mean edge");
+  if (!(s.band >= 1 && s.band <= 1000)) wrong_usage("--halfbandvoxels must be in 1..1000 voxels");
   if (s.name.empty() || s.name == "Cd") wrong_usage("--name must be a word other than Cd, which is the colours' name");
 }
 
@@ -59,25 +60,37 @@ double area_of(const TriangleMesh& mesh) {
   return area;
 }
 
+struct Bounds {
+  Vec3 low, high;
+  [[nodiscard]] double extent() const { return std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]}); }
+  [[nodiscard]] double diagonal() const { return norm(high - low); }
+};
+
+Bounds bounds_of(const TriangleMesh& mesh) {
+  Bounds b{mesh.positions[0], mesh.positions[0]};
+  for (const Vec3& p : mesh.positions)
+    for (std::size_t k = 0; k < 3; ++k) b.low[k] = std::min(b.low[k], p[k]), b.high[k] = std::max(b.high[k], p[k]);
+  return b;
+}
+
 /// Voxels lie on multiples of their edge. OpenVDB's converter judges sides in floats: voxel numbers are counted from
 /// the origin only as long as these can tell them apart, else from the middle of the mesh.
-openvdb::math::Transform::Ptr choose_transform(const TriangleMesh& mesh, double voxel, double band) {
+openvdb::math::Transform::Ptr choose_transform(const Bounds& bounds, double voxel, double band) {
   constexpr double kFromOrigin = 1 << 20, kLargest = 1 << 30;
-  Vec3 low = mesh.positions[0], high = low;
-  for (const Vec3& p : mesh.positions)
-    for (std::size_t k = 0; k < 3; ++k) low[k] = std::min(low[k], p[k]), high[k] = std::max(high[k], p[k]);
-  double reach = 0, extent = 0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    reach = std::max({reach, -low[k], high[k]});
-    extent = std::max(extent, high[k] - low[k]);
-  }
+  const auto& [low, high] = bounds;
+  const double extent = bounds.extent();
+  double reach = 0;
+  for (std::size_t k = 0; k < 3; ++k) reach = std::max({reach, -low[k], high[k]});
+  if (voxel > bounds.diagonal())
+    wrong_usage(
+        fmt::format("--voxelsize {:g}: larger than the whole mesh, which spans {:g}", voxel, bounds.diagonal()));
   if (0.5 * extent / voxel + band > kLargest || reach / voxel > kLargest * kFromOrigin)
-    wrong_usage(fmt::format("--voxel {:g}: too small for a mesh of this size ({:g}, coordinates up to {:g})", voxel,
+    wrong_usage(fmt::format("--voxelsize {:g}: too small for a mesh of this size ({:g}, coordinates up to {:g})", voxel,
                             extent, reach));
   // OpenVDB takes a smaller voxel for a singular transform.
   constexpr double kSmallest = 1.5e-5;
   if (voxel < kSmallest) {
-    wrong_usage(fmt::format("--voxel {:g}: OpenVDB holds none below {:g}; scale the mesh up, or use a larger one",
+    wrong_usage(fmt::format("--voxelsize {:g}: OpenVDB holds none below {:g}; scale the mesh up, or use a larger one",
                             voxel, kSmallest));
   }
   auto transform = openvdb::math::Transform::createLinearTransform(voxel);
@@ -91,19 +104,41 @@ openvdb::math::Transform::Ptr choose_transform(const TriangleMesh& mesh, double 
   return transform;
 }
 
+/// Voxels of a band around the mesh, half as wide as `width`: as of a convex body, and no more than the box around it.
+double voxels_within(const Bounds& bounds, double area, double width, double voxel) {
+  constexpr double kPi = 3.14159265358979;
+  const double around = 2 * area * width + kPi * bounds.extent() * width * width + 4 * kPi / 3 * width * width * width;
+  double box = 1;
+  for (std::size_t k = 0; k < 3; ++k) box *= bounds.high[k] - bounds.low[k] + 2 * width;
+  return std::min(around, box) / (voxel * voxel * voxel);
+}
+
 /// Bytes in leaves: the band's volume at four bytes a voxel for the distance, four for OpenVDB's nearest triangles and
 /// twelve for the colour; leaves are about half full.
-void check_memory(const TriangleMesh& mesh, const VolumeSettings& s, double voxel, bool colours,
+void check_memory(const TriangleMesh& mesh, const Bounds& bounds, const VolumeSettings& s, double voxel, bool colours,
                   const RunContext& run) {
-  if (run.max_memory == 0) return;
-  const double band = area_of(mesh) / (voxel * voxel) * 2 * (s.band + 1);
-  const double bytes = 2 * band * (colours ? 20 : 8) + 60.0 * static_cast<double>(mesh.triangles.size());
-  if (bytes <= static_cast<double>(run.max_memory)) return;
+  const std::uint64_t most = run.max_memory > 0 ? run.max_memory : machine_memory();
+  if (most == 0) return;
+  const double area = area_of(mesh);
+  const auto needs = [&](double edge, double band) {
+    return 2 * voxels_within(bounds, area, (band + 1) * edge, edge) * (colours ? 20 : 8) +
+           60.0 * static_cast<double>(mesh.triangles.size());
+  };
+  const auto fits = [&](double edge, double band) { return needs(edge, band) <= static_cast<double>(most); };
+  if (fits(voxel, s.band)) return;
+  // The least change in steps of a tenth that would do.
+  double edge = voxel, band = s.band;
+  while (!fits(edge, s.band) && edge < bounds.extent()) edge *= 1.1;
+  while (!fits(voxel, band) && band > 1) band = std::max(1.0, std::floor(0.9 * band));
+  std::string remedy;
+  if (edge < bounds.extent()) remedy = fmt::format("with --voxelsize {:.2g} it would fit", 1.05 * edge);
+  if (fits(voxel, band) && band >= 3)
+    remedy += fmt::format("{}with --halfbandvoxels {:g} it would fit", remedy.empty() ? "" : ", or ", band);
+  if (remedy.empty()) remedy = "simplify the mesh";
   throw Error(ExitCode::budget,
-              fmt::format("a voxel of {:g} needs about {:.0f} MB, --max-memory allows {:.0f} MB; with --voxel {:.2g} "
-                          "it would fit",
-                          voxel, bytes / 1e6, static_cast<double>(run.max_memory) / 1e6,
-                          voxel * std::sqrt(bytes / static_cast<double>(run.max_memory))));
+              fmt::format("a voxel of {:g} and a band of {:g} need about {:.0f} MB, {} {:.0f} MB; {}", voxel, s.band,
+                          needs(voxel, s.band) / 1e6, run.max_memory > 0 ? "--max-memory allows" : "the machine has",
+                          static_cast<double>(most) / 1e6, remedy));
 }
 
 /// What a 16-bit float holds: up to 65504, steps of 2^-24 near zero.
@@ -142,9 +177,10 @@ VolumeStats convert(const TriangleMesh& mesh, const VolumeSettings& s, const std
   VolumeStats stats;
   stats.voxel = s.voxel > 0 ? s.voxel : edges.mean_length;
   stats.boundary_edges = edges.boundary;
-  const auto transform = choose_transform(mesh, stats.voxel, s.band);
+  const Bounds bounds = bounds_of(mesh);
+  const auto transform = choose_transform(bounds, stats.voxel, s.band);
   if (s.half) check_half(stats.voxel, s.band, run);
-  check_memory(mesh, s, stats.voxel, s.colours, run);
+  check_memory(mesh, bounds, s, stats.voxel, s.colours, run);
   meshes::OutputFile out(path);  // an output that cannot be written is refused before the work
   stats.has_sign = decide_sign(s, edges.boundary, run);
 

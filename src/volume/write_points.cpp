@@ -42,7 +42,7 @@ PointVolumeStats write_point_volume(const PointArrays& points, const PointVolume
   meshes::with_threads(run.threads, [&] {
     const auto columns = volume::point_columns(points);
     stats.voxel = volume::point_voxel(points.samples, settings.voxel);
-    const auto grid = volume::point_grid(points, columns, volume::point_transform(points, stats.voxel));
+    const auto grid = volume::point_grid(points, columns, volume::point_transform(points, stats.voxel), run.max_memory);
     volume::label(*grid, settings.name, false);
     stats.points = points.samples.size();
     stats.voxels = grid->activeVoxelCount();

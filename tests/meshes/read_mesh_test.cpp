@@ -171,6 +171,7 @@ TEST(ReadMesh, BadFilesAreNamed) {
   expect_error(ExitCode::unreadable, [&] { read_mesh(folder.file("")); }, {"is a directory"});
   bad("e.ply", "", {"is empty"});
   bad("e.xyz", "1 2 3\n", {"unknown mesh format \".xyz\""});
+  bad("e.vdb", " BDV", {"is a volume", "lamina convert"});
   bad("a.ply", "plx\n", {"not a PLY file"});
   bad("b.ply", "ply\nformat ascii 1.0\nelement vertex -3\n", {"line 3", "\"-3\""});
   bad("b2.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty floot x\n", {"line 4", "\"floot\""});

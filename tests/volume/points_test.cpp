@@ -152,9 +152,10 @@ TEST_F(PointVolumes, AreDescribed) {
 }
 
 TEST_F(PointVolumes, RefuseWhatCannotBeMeant) {
+  RunContext run;
   const auto refusal = [&](const PointArrays& p, const PointVolumeSettings& settings = {}) -> std::string {
     try {
-      write_point_volume(p, settings, path_);
+      write_point_volume(p, settings, path_, run);
     } catch (const Error& e) {
       return e.what();
     }
@@ -165,6 +166,9 @@ TEST_F(PointVolumes, RefuseWhatCannotBeMeant) {
   EXPECT_THAT(refusal(good, {.name = ""}), HasSubstr("--name"));
   EXPECT_THAT(refusal(good, {.voxel = -1}), HasSubstr("--voxelsize"));
   EXPECT_THAT(refusal(random_points(10, 6, 1e6), {.voxel = 1e-12}), HasSubstr("too small"));
+  run.max_memory = 10 << 20;  // a node of the tree for every point takes more
+  EXPECT_THAT(refusal(random_points(200, 6, 1e6), {.voxel = 1}), HasSubstr("eight points a voxel"));
+  run.max_memory = 0;
   PointArrays bad = good;
   bad.samples.y[7] = std::nan("");
   EXPECT_THAT(refusal(bad), HasSubstr("row 7"));

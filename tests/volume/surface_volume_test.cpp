@@ -296,7 +296,14 @@ TEST_F(SurfaceVolumes, LeaveNothingBehindWhenTheyFail) {
   EXPECT_EQ(code(), ExitCode::budget);
   settings_.volume.path = "-";
   EXPECT_EQ(code(), ExitCode::usage);
+  settings_.volume.path = folder_ / "grid";
+  EXPECT_EQ(code(), ExitCode::usage) << "no .vdb to other programs";
   settings_.volume.path = path_;
+  for (const double voxel : {1e-4, 100.0}) {
+    settings_.volume.voxel = voxel;
+    EXPECT_EQ(code(), ExitCode::usage) << voxel << " is far from every cell";
+  }
+  settings_.volume.voxel = 0;
   settings_.cell = {1e-7, Length::Unit::world};
   EXPECT_EQ(code(), ExitCode::usage);
   EXPECT_EQ(folder_.entries(), 0);

@@ -223,7 +223,8 @@ TEST_F(Volume, RefusesWhatCannotBeMeant) {
   std::filesystem::remove(path_);
   EXPECT_EQ(code(mesh, {.band = 0.5}, path_), ExitCode::usage);
   EXPECT_EQ(code(mesh, {.name = "Cd"}, path_), ExitCode::usage);
-  EXPECT_EQ(code(mesh, {.voxel = 1e5, .half = true}, path_), ExitCode::usage);
+  EXPECT_EQ(code(mesh, {.voxel = 1e5}, path_), ExitCode::usage) << "larger than the mesh";
+  EXPECT_EQ(code(test::sphere(1e5, 8), {.voxel = 3e4, .half = true}, path_), ExitCode::usage);
   EXPECT_EQ(code({}, {}, path_), ExitCode::unreadable);
   TriangleMesh point = mesh;
   for (auto& p : point.positions) p = {1, 1, 1};
@@ -232,6 +233,9 @@ TEST_F(Volume, RefusesWhatCannotBeMeant) {
   beyond.triangles.back()[2] = static_cast<std::uint32_t>(mesh.positions.size());
   EXPECT_EQ(code(beyond, {}, path_), ExitCode::usage);
   EXPECT_EQ(code(mesh, {}, folder_ / "no/such/out.vdb"), ExitCode::budget);
+  // More than any machine has, without anybody naming a limit.
+  EXPECT_EQ(code(mesh, {.voxel = 2e-5}, path_), ExitCode::budget);
+  EXPECT_EQ(code(mesh, {.voxel = 1e-3, .band = 1000}, path_), ExitCode::budget);
   run_.max_memory = 1 << 20;
   EXPECT_EQ(code(mesh, {.voxel = 0.005}, path_), ExitCode::budget);
   EXPECT_EQ(code(mesh, {.voxel = 0.3}, path_), ExitCode::ok);
