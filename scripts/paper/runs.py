@@ -54,15 +54,11 @@ def ask(program, *words):
     return json.loads(printed.stdout)
 
 
-def split_error(program, mesh, true_mesh):
-    """Distances over the diagonal of the truth: those of the mesh's vertices are projection's error, those all over its
-    triangles have what flat triangles add, too."""
-    surface = ask(program, "compare", mesh, true_mesh)
-    vertices = ask(program, "compare", mesh, true_mesh, "--vertices")["a_to_b"]["relative"]
-    both = {"to_truth": surface["a_to_b"]["relative"], "from_truth": surface["b_to_a"]["relative"], "vertices": vertices}
-    check = ask(program, "check", mesh)
-    return {name: {"rms": d["rms"], "mean": d["mean"]} for name, d in both.items()} | {
-        "triangles": check["triangles"], "main_boundary_edges": check["largest_component_boundary_edges"]}
+def distances(program, mesh, true_mesh, *words):
+    """Root mean squares and means over the diagonal of the truth."""
+    sides = ask(program, "compare", mesh, true_mesh, *words)
+    return {to: {kind: sides[of]["relative"][kind] for kind in ("rms", "mean")}
+            for to, of in (("to_truth", "a_to_b"), ("from_truth", "b_to_a"))}
 
 
 def judge(program, mesh, true_mesh):
