@@ -13,8 +13,13 @@ def merge(table, old, new, order):
     def key(row):
         return tuple(row[k] for k in KEYS[table])
 
+    def rank(value):  # True would be found as 1, which is a size
+        if isinstance(value, bool):
+            return int(value)
+        return order.index(value) if value in order else len(order)
+
     rows = {key(r): r for r in old} | {key(r): r for r in new}
-    return sorted(rows.values(), key=lambda r: [order.index(v) if v in order else len(order) for v in key(r)])
+    return sorted(rows.values(), key=lambda r: [rank(v) for v in key(r)])
 
 
 def join(first, second, order):

@@ -58,14 +58,15 @@ def blending(results):
 def accuracy(results):
     """Table 3. The paper gives ratios to another method only, so both are shown over their own first row, too."""
     rows = []
-    first = {(c["model"], c["noisy"]): two_sided(c) for c in reversed(results)}
+    first = {(c["model"], c["noisy"]): two_sided(c) for c in results if c["name"] == "N = 1"}
     for c in results:
+        case = c["model"], c["noisy"]
         theirs = published.TABLE3.get(c["name"], {}).get(c["model"])
         base = published.TABLE3["N = 1"].get(c["model"])
         paper = f"{theirs[c['noisy']] / base[c['noisy']]:.2f}" if theirs else "-"
         rows.append([c["model"], "noisy" if c["noisy"] else "clean", c["name"], f"{c['to_truth'] * UNIT:.2f}",
                      f"{c['from_truth'] * UNIT:.2f}", f"{two_sided(c) * UNIT:.2f}", f"{c['triangles'] / 1e3:.0f}",
-                     f"{two_sided(c) / first[c['model'], c['noisy']]:.2f}", paper])
+                     f"{two_sided(c) / first[case]:.2f}" if case in first else "-", paper])
     return table(["model", "samples", "method", "mesh to truth", "truth to mesh", "both", "k triangles", "over N = 1",
                   "paper"], rows)
 
