@@ -54,6 +54,13 @@ def ask(program, *words):
     return json.loads(printed.stdout)
 
 
+def distances(program, mesh, true_mesh, *words):
+    """Root mean squares and means over the diagonal of the truth."""
+    sides = ask(program, "compare", mesh, true_mesh, *words)
+    return {to: {kind: sides[of]["relative"][kind] for kind in ("rms", "mean")}
+            for to, of in (("to_truth", "a_to_b"), ("from_truth", "b_to_a"))}
+
+
 def judge(program, mesh, true_mesh):
     """Distances over the diagonal of the truth, both ways, and what kind of mesh it is."""
     distance = ask(program, "compare", mesh, true_mesh)

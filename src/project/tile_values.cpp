@@ -31,9 +31,14 @@ bool any_seen(const Lanes* sums) {
   return any;
 }
 
+/// A single sample is no surface: what sees no other counts as this far from it (support radii), too far for a corner
+/// to stand on its own. All of one sample's corners lead to the same point, and triangles between them have no area.
+constexpr float kAlone = 1;
+
 /// Makes a corner's projected point the average of its samples, on the side where the fit has it: a fit that reaches
 /// beyond its samples tells no more.
 void keep_to_samples(const Lanes* sums, const FitInput& in, int l, FitOutput& fit) {
+  if (sums[kSeen][l] < 2) fit.reach[l] = std::max(fit.reach[l], kAlone);
   const float inv = 1.0F / sums[kW][l];
   const float x = in.offset.x[l] - sums[kPx][l] * inv;
   const float y = in.offset.y[l] - sums[kPy][l] * inv;

@@ -222,6 +222,20 @@ TEST(SurfaceShapes, GeoreferencedCoordinatesKeepTheirDigits) {
   EXPECT_LT(deviation(mesh, test::distance_to_sphere).largest, 5e-3);
 }
 
+// Corners around a sample with nobody near all lead to that sample: triangles between them would have no area.
+TEST(SurfaceShapes, ALoneSampleMakesNoSurface) {
+  Cloud cloud = test::sphere_cloud(4000);
+  std::mt19937 random(3);
+  for (int i = 0; i < 10; ++i) {
+    const Point3 d = test::random_direction(random);
+    cloud.add({2 * d[0], 2 * d[1], 2 * d[2]}, d);
+  }
+  cloud.add_property("radius", ScalarType::float32, [](const Point3&) { return 0.11; });
+  const TriangleMesh mesh = reconstruct(cloud).mesh;
+  EXPECT_TRUE(test::check_mesh(mesh.triangles).is_closed_manifold());
+  EXPECT_LT(deviation(mesh, test::distance_to_sphere).largest, 5e-3);
+}
+
 // Coordinates no float can hold, at both ends.
 TEST(SurfaceShapes, ExtremeSizes) {
   for (const double size : {1e-60, 1e-42, 1e42, 1e60}) {

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <string>
+#include <tuple>
 
 #include "surface/clouds.h"
 
@@ -27,14 +29,19 @@ Cloud two_sheets(double apart, bool wall) {
   return cloud;
 }
 
-class Sheets : public ::testing::TestWithParam<bool> {};
-INSTANTIATE_TEST_SUITE_P(Surface, Sheets, ::testing::Bool(),
-                         [](const auto& wall) { return wall.param ? "Wall" : "Slit"; });
+/// Whether it is a wall, and whether the support is chosen by the cloud (--blend auto).
+class Sheets : public ::testing::TestWithParam<std::tuple<bool, bool>> {};
+INSTANTIATE_TEST_SUITE_P(Surface, Sheets, ::testing::Combine(::testing::Bool(), ::testing::Bool()), [](const auto& of) {
+  return std::string(std::get<0>(of.param) ? "Wall" : "Slit") + (std::get<1>(of.param) ? "Chosen" : "");
+});
 
 TEST_P(Sheets, OneAndAHalfRadiiApartDoNotMerge) {
   const double r = 2 * std::sqrt(4.0 / kSamples);
   const double apart = 1.5 * r;
-  const TriangleMesh mesh = test::reconstruct(two_sheets(apart, GetParam()), {}).mesh;
+  const auto [wall, chosen] = GetParam();
+  SurfaceSettings settings;
+  if (chosen) settings.blend.reset();
+  const TriangleMesh mesh = test::reconstruct(two_sheets(apart, wall), settings).mesh;
   std::size_t inner = 0;
   for (const Point3& p : mesh.positions) {
     if (std::max(std::abs(p[0]), std::abs(p[1])) > 0.8) continue;  // the rims are another matter
