@@ -197,6 +197,37 @@ bool inherits(const CornerBlock& leaf) {
   return false;
 }
 
+/// Threads share words.
+void set_bits(BlockMask& mask, int layer, std::uint64_t bits) {
+  const std::atomic_ref<std::uint64_t> word(mask.words[static_cast<std::size_t>(layer)]);
+  if ((word.load(std::memory_order_relaxed) & bits) != bits) word.fetch_or(bits, std::memory_order_relaxed);
+}
+
+typedef float Four __attribute__((vector_size(16)));    // NOLINT(modernize-use-using): attributes on typedefs
+typedef int FourBits __attribute__((vector_size(16)));  // NOLINT(modernize-use-using)
+
+/// Of the 4^3 corners around a cell, from one below its low corner on, those less than `reach` from a point in the cell
+/// (all in cells): a layer each, bit x + 8 y.
+FourBits corners_within(const std::array<float, 3>& point, float reach) {
+  const auto squares = [](float at) {
+    const Four d = Four{-1, 0, 1, 2} - Four{at, at, at, at};
+    return d * d;
+  };
+  const Four dx = squares(point[0]);
+  const Four dy = squares(point[1]);
+  const float reach2 = reach * reach;
+  const Four left = Four{reach2, reach2, reach2, reach2} - squares(point[2]);  // a lane a layer
+  FourBits out{};
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 4; ++x) {
+      const float d2 = dx[x] + dy[y];
+      const int bit = 1 << (x + 8 * y);
+      out |= (left > Four{d2, d2, d2, d2}) & FourBits{bit, bit, bit, bit};
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 void close_cells(const CornerBlock& leaf, int begin, int end, std::uint64_t* out) {
@@ -208,39 +239,46 @@ Marker::Marker(Window& window) : window_(window) {
   for (int level = 0; level < window.levels(); ++level) cells_.emplace_back(window.lattice().cell_size(level));
 }
 
-CornerBlock& Marker::block(int level, const Block& b) {
-  if (level != level_ || b != last_) {
-    found_ = &window_.touch_shared(level, b);
-    level_ = level;
-    last_ = b;
-  }
-  return *found_;
+CornerBlock& Marker::block(int dx, int dy, int dz) {
+  CornerBlock*& found = around_[CornerBlock::towards(dx, dy, dz)];
+  if (found == nullptr) found = &window_.touch_shared(level_, {home_.x + dx, home_.y + dy, home_.z + dz});
+  return *found;
 }
 
 void Marker::mark(const Mark& mark) {
   const std::int32_t a = window_.lattice().cell_size(mark.level);
   const FloorDivider& cell_of = cells_[mark.level];
-  const Cell c{cell_of(mark.x), cell_of(mark.y), cell_of(mark.z)};
-  const auto set = [](BlockMask& mask, int offset) {
-    const std::uint64_t bit = std::uint64_t{1} << (offset & 63);
-    const std::atomic_ref<std::uint64_t> word(mask.words[offset >> 6]);
-    if ((word.load(std::memory_order_relaxed) & bit) == 0) word.fetch_or(bit, std::memory_order_relaxed);
-  };
-  const Block home = block_of(c);
-  CornerBlock& here = block(mark.level, home);
-  set(here.home, offset_in_block(c));
-  const auto mark_corner = [&](const Cell& corner) {
-    const Block b = block_of(corner);
-    set((b == home ? here : window_.touch_shared(mark.level, b)).nearest, offset_in_block(corner));
-  };
-  if (mark.sparse) {
-    for (int i = 0; i < 8; ++i) mark_corner(c + Cell{i & 1, (i >> 1) & 1, i >> 2});
-    return;
+  const Cell cell{cell_of(mark.x), cell_of(mark.y), cell_of(mark.z)};
+  const Block home = block_of(cell);
+  if (mark.level != level_ || home != home_) {
+    level_ = mark.level;
+    home_ = home;
+    around_ = {};
   }
-  const auto upper = [a](std::int32_t v, std::int32_t cell) {
-    return std::int64_t{2} * (std::int64_t{v} - std::int64_t{cell} * a) >= a ? 1 : 0;
+  const int offset = offset_in_block(cell);
+  set_bits(block(0, 0, 0).home, offset >> 6, std::uint64_t{1} << (offset & 63));
+  const float inv = 1.0F / static_cast<float>(a);
+  const auto inside = [inv, a](std::int32_t v, std::int32_t low) {
+    return static_cast<float>(std::int64_t{v} - std::int64_t{low} * a) * inv;
   };
-  mark_corner(c + Cell{upper(mark.x, c.x), upper(mark.y, c.y), upper(mark.z, c.z)});
+  const FourBits corners =
+      corners_within({inside(mark.x, cell.x), inside(mark.y, cell.y), inside(mark.z, cell.z)}, mark.support * inv);
+  // Where the pattern begins, in cells of the home block, and the blocks beside it that it comes to lie in.
+  const int x0 = (cell.x & 7) - 1;
+  const int y0 = (cell.y & 7) - 1;
+  const int z0 = (cell.z & 7) - 1;
+  for (int dy = y0 < 0 ? -1 : 0; dy <= (y0 > 4 ? 1 : 0); ++dy) {
+    const int y = y0 - 8 * dy;
+    for (int dx = x0 < 0 ? -1 : 0; dx <= (x0 > 4 ? 1 : 0); ++dx) {
+      const int x = x0 - 8 * dx;
+      for (int k = 0; k < 4; ++k) {
+        std::uint64_t w = static_cast<std::uint32_t>(corners[k]);
+        w = x < 0 ? (w >> -x) & bits::columns_below(8 + x) : (w & bits::columns_below(8 - x)) << x;
+        w = y < 0 ? w >> (-8 * y) : w << (8 * y);
+        if (w != 0) set_bits(block(dx, dy, (z0 + k) >> 3).acted_on, (z0 + k) & 7, w);
+      }
+    }
+  }
 }
 
 void refine_slab(Window& window, std::int32_t slab) {
@@ -267,9 +305,8 @@ void place_corners(Window& window, std::int32_t slab) {
     touch_around(window, level, slab, &CornerBlock::cells, 0, 1);
     for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
       const bits::Neighbourhood cells = gather(*t.leaf, &CornerBlock::cells, 0);
-      const bits::Neighbourhood nearest = gather(*t.leaf, &CornerBlock::nearest, 1);
       bits::dilate_layers<0, 1>(cells, begin, end, &t.leaf->corners.words[begin]);
-      bits::dilate_layers<-1, 1>(nearest, begin, end, &t.leaf->near.words[begin]);
+      std::copy_n(&t.leaf->acted_on.words[begin], end - begin, &t.leaf->near.words[begin]);
       if (inherits(*t.leaf)) {
         std::array<std::uint64_t, 8> above{};
         bits::dilate_layers<0, 1>(gather(*t.leaf, &CornerBlock::above, 0), begin, end, above.data());

@@ -1,5 +1,6 @@
 // Adaptive refinement: which cells of which level exist, and which corners are worth projecting (METHOD 3.4).
 #pragma once
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -12,24 +13,26 @@ namespace lamina {
 struct Mark {
   std::int32_t x, y, z;  ///< fixed-point position
   std::uint8_t level;    ///< coarsest level whose cells are small enough for the sample
-  bool sparse = false;   ///< the level's cells are so small that gaps between such samples span several
+  float support;         ///< how far it acts, steps, > 0
 };
 
-/// Notes samples' home cells and nearest corners; all corners of the home cell where samples are sparse. Any order, one
-/// marker per thread, slabs at will ahead of refine(). Remembers the block it was in: samples come sorted.
+/// Notes samples' home cells and the corners they act on among those up to two cells away (on each axis the two below
+/// and the two above). Any order, one marker per thread, slabs at will ahead of refine(). Remembers the blocks it
+/// was in: samples come sorted.
 class Marker {
  public:
   explicit Marker(Window& window);
   void mark(const Mark& mark);
 
  private:
-  CornerBlock& block(int level, const Block& b);
+  /// Beside the block of the last sample's home.
+  CornerBlock& block(int dx, int dy, int dz);
 
   Window& window_;
   std::vector<FloorDivider> cells_;  ///< by level
   int level_ = -1;
-  Block last_;
-  CornerBlock* found_ = nullptr;
+  Block home_;
+  std::array<CornerBlock*, 27> around_{};  ///< null while not looked up
 };
 
 /// Fixes the octree of one slab: cells that samples reach, subdivision, taking part. Samples must be marked up to three
@@ -41,9 +44,9 @@ void refine_slab(Window& window, std::int32_t slab);
 /// `out` from its front. The slab must be refined.
 void close_cells(const CornerBlock& leaf, int begin, int end, std::uint64_t* out);
 
-/// Fixes the corners of one slab (its layers of corners, the first plane included) and of them the ones to project: the
-/// corner nearest to a sample and the 26 around it, and those of cells close to a sample of a coarser level. The slab
-/// and the one below must be refined.
+/// Fixes the corners of one slab (its layers of corners, the first plane included) and of them the ones to project:
+/// those that samples were found to act on, and those of cells close to a sample of a coarser level. The slab and the
+/// one below must be refined.
 void place_corners(Window& window, std::int32_t slab);
 
 /// Leaf cells of a slab at a level.

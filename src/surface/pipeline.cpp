@@ -13,9 +13,6 @@
 namespace lamina {
 namespace {
 
-/// Samples whose support is more than so many of their cells leave gaps of several cells between them.
-constexpr float kSparse = 1.6F;
-
 /// Where corners themselves say how many they need.
 constexpr int kMostSteps = 16;
 
@@ -86,17 +83,15 @@ void Pipeline::mark(const ActiveBucket& bucket) {
   constexpr std::size_t kPiece = 4096;
   const std::size_t n = bucket.samples.size();
   const auto [low, high] = std::minmax_element(bucket.samples.z.begin(), bucket.samples.z.end());
-  for (covered_ = std::min(covered_, resolved_.lattice.slab_of(*low)); covered_ <= resolved_.lattice.slab_of(*high) + 1;
-       ++covered_) {
+  for (covered_ = std::min(covered_, resolved_.lattice.slab_of(*low) - 1);
+       covered_ <= resolved_.lattice.slab_of(*high) + 2; ++covered_) {
     window_.cover(covered_);
   }
   tbb::parallel_for(std::size_t{0}, (n + kPiece - 1) / kPiece, [&](std::size_t piece) {
     Marker marker(window_);
     for (std::size_t i = piece * kPiece; i < std::min(n, (piece + 1) * kPiece); ++i) {
       if (bucket.support[i] <= 0) continue;
-      const auto cell = static_cast<float>(resolved_.lattice.cell_size(bucket.level[i]));
-      marker.mark({bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i],
-                   bucket.support[i] > kSparse * cell});
+      marker.mark({bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i], bucket.support[i]});
     }
   });
 }

@@ -40,7 +40,8 @@ void Replay::mark(const ActiveBucket& bucket) {
   tbb::parallel_for(std::size_t{0}, (n + kPiece - 1) / kPiece, [&](std::size_t piece) {
     Marker marker(window_);
     for (std::size_t i = piece * kPiece; i < std::min(n, (piece + 1) * kPiece); ++i) {
-      marker.mark({bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i]});
+      if (bucket.support[i] <= 0) continue;
+      marker.mark({bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i], bucket.support[i]});
     }
   });
 }

@@ -37,6 +37,19 @@ struct Marked {
   }
 };
 
+/// A sample whose support ends so far from all corners that rounding leaves no doubt.
+Mark decided(const Lattice& lattice, Mark m) {
+  const std::int32_t a = lattice.cell_size(m.level);
+  const Cell home{floor_div(m.x, a), floor_div(m.y, a), floor_div(m.z, a)};
+  for (int i = 0; i < 64; ++i) {
+    const double d = OctreeTruth::distance(lattice, m, home + Cell{i % 4 - 1, i / 4 % 4 - 1, i / 16 - 1});
+    if (std::abs(d - static_cast<double>(m.support)) > 1e-5 * a) continue;
+    m.support *= 1.001F;
+    i = -1;
+  }
+  return m;
+}
+
 /// A few clusters of samples, anywhere in or beside the window's table, near and far from cell borders.
 Marked random_marks(std::uint64_t seed, int levels) {
   std::mt19937_64 random(seed);
@@ -49,9 +62,11 @@ Marked random_marks(std::uint64_t seed, int levels) {
     const int width = between(1, 2 * slab);
     const int n = between(1, 8);
     for (int i = 0; i < n; ++i) {
-      out.marks.push_back({at[0] + between(-width, width), at[1] + between(-width, width),
-                           at[2] + between(-width, width), static_cast<std::uint8_t>(between(0, levels - 1)),
-                           between(0, 3) == 0});
+      const auto level = static_cast<std::uint8_t>(between(0, levels - 1));
+      const float support =
+          static_cast<float>(out.lattice.cell_size(level)) * static_cast<float>(between(1, 300)) / 100;
+      out.marks.push_back(decided(out.lattice, {at[0] + between(-width, width), at[1] + between(-width, width),
+                                                at[2] + between(-width, width), level, support}));
     }
   }
   out.bound();
@@ -125,7 +140,7 @@ TEST(Refine, OctreeIsTheOneSamplesAskFor) {
 }
 
 TEST(Refine, EightLevelsAcrossTheOrigin) {
-  Marked m{{3, 8}, {{-1, -1, -1, 0}, {700, -700, 380, 7}, {40, 30, 500, 3}}};
+  Marked m{{3, 8}, {{-1, -1, -1, 0, 4}, {700, -700, 380, 7, 500}, {40, 30, 500, 3, 60}}};
   m.bound();
   Window window(m.lattice, 0, m.bounds());
   mark_all(window, m);
@@ -135,8 +150,9 @@ TEST(Refine, EightLevelsAcrossTheOrigin) {
 
 TEST(Refine, CornersOfFarCoordinatesAreExact) {
   // Near the ends of the fixed-point range, where a float would be off by many cells.
-  Marked m{{64, 4},
-           {{2'000'000'013, -2'000'000'077, 1'900'000'001, 0}, {2'000'000'613, -2'000'000'377, 1'900'000'801, 2}}};
+  Marked m{
+      {64, 4},
+      {{2'000'000'013, -2'000'000'077, 1'900'000'001, 0, 80}, {2'000'000'613, -2'000'000'377, 1'900'000'801, 2, 400}}};
   m.bound();
   Window window(m.lattice, 0, m.bounds());
   mark_all(window, m);
@@ -189,7 +205,8 @@ TEST(Refine, MarkingFromSeveralThreads) {
   std::mt19937_64 random(7);
   for (int i = 0; i < 4000; ++i) {
     const auto at = [&] { return static_cast<std::int32_t>(random() % 6000) - 3000; };
-    m.marks.push_back({at(), at(), at(), static_cast<std::uint8_t>(random() % 5)});
+    const auto level = static_cast<std::uint8_t>(random() % 5);
+    m.marks.push_back({at(), at(), at(), level, 1.5F * static_cast<float>(m.lattice.cell_size(level))});
   }
   m.bound();
   const std::vector<std::uint64_t> alone = refined_bits(m);

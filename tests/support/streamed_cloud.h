@@ -53,7 +53,7 @@ class StreamedCloud {
     feed.prepare(std::numeric_limits<std::int32_t>::max(), [&](const ActiveBucket& b) {
       Marker marker(window);
       for (std::size_t i = 0; i < b.samples.size(); ++i) {
-        if (b.support[i] > 0) marker.mark({b.samples.x[i], b.samples.y[i], b.samples.z[i], b.level[i]});
+        if (b.support[i] > 0) marker.mark({b.samples.x[i], b.samples.y[i], b.samples.z[i], b.level[i], b.support[i]});
       }
     });
     for (std::int32_t s = first; s < end; ++s) refine_slab(window, s);
