@@ -1,10 +1,8 @@
 // Adaptive refinement: which cells of which level exist, and which corners are worth projecting (METHOD 3.4).
 #pragma once
-#include <array>
 #include <cstdint>
-#include <vector>
+#include <span>
 
-#include "lamina/floor_divide.h"
 #include "window/window.h"
 
 namespace lamina {
@@ -17,23 +15,9 @@ struct Mark {
 };
 
 /// Notes samples' home cells and the corners they act on among those up to two cells away (on each axis the two below
-/// and the two above). Any order, one marker per thread, slabs at will ahead of refine(). Remembers the blocks it
-/// was in: samples come sorted.
-class Marker {
- public:
-  explicit Marker(Window& window);
-  void mark(const Mark& mark);
-
- private:
-  /// Beside the block of the last sample's home.
-  CornerBlock& block(int dx, int dy, int dz);
-
-  Window& window_;
-  std::vector<FloorDivider> cells_;  ///< by level
-  int level_ = -1;
-  Block home_;
-  std::array<CornerBlock*, 27> around_{};  ///< null while not looked up
-};
+/// and the two above). Any order, from several threads at once, slabs at will ahead of refine_slab(); quick where one
+/// sample after the other lies in the same block.
+void mark_samples(Window& window, std::span<const Mark> marks);
 
 /// Fixes the octree of one slab: cells that samples reach, subdivision, taking part. Samples must be marked up to three
 /// slabs further, and the slab below be refined. A cell is split when a sample of a finer level lies within three

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "diffuse/diffuse.h"
@@ -80,7 +81,7 @@ ZRead z_read(const SurfaceSettings& settings, const Resolved& resolved, const Sl
 }
 
 void Pipeline::mark(const ActiveBucket& bucket) {
-  constexpr std::size_t kPiece = 4096;
+  constexpr std::size_t kPiece = 2048;
   const std::size_t n = bucket.samples.size();
   const auto [low, high] = std::minmax_element(bucket.samples.z.begin(), bucket.samples.z.end());
   for (covered_ = std::min(covered_, resolved_.lattice.slab_of(*low) - 1);
@@ -88,11 +89,14 @@ void Pipeline::mark(const ActiveBucket& bucket) {
     window_.cover(covered_);
   }
   tbb::parallel_for(std::size_t{0}, (n + kPiece - 1) / kPiece, [&](std::size_t piece) {
-    Marker marker(window_);
+    std::array<Mark, kPiece> marks;
+    std::size_t count = 0;
     for (std::size_t i = piece * kPiece; i < std::min(n, (piece + 1) * kPiece); ++i) {
       if (bucket.support[i] <= 0) continue;
-      marker.mark({bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i], bucket.support[i]});
+      marks[count++] = {bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i],
+                        bucket.support[i]};
     }
+    mark_samples(window_, {marks.data(), count});
   });
 }
 

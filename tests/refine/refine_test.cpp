@@ -73,11 +73,6 @@ Marked random_marks(std::uint64_t seed, int levels) {
   return out;
 }
 
-void mark_all(Window& window, const Marked& m) {
-  Marker marker(window);
-  for (const Mark& mark : m.marks) marker.mark(mark);
-}
-
 void refine_all(Window& window, const Marked& m) {
   for (std::int32_t s = m.first; s < m.end; ++s) refine_slab(window, s);
   for (std::int32_t s = m.first; s < m.end; ++s) place_corners(window, s);
@@ -85,7 +80,7 @@ void refine_all(Window& window, const Marked& m) {
 
 std::vector<std::uint64_t> refined_bits(const Marked& m) {
   Window window(m.lattice, 0);
-  mark_all(window, m);
+  mark_samples(window, m.marks);
   refine_all(window, m);
   return all_bits(window, m.first, m.end);
 }
@@ -130,7 +125,7 @@ TEST(Refine, OctreeIsTheOneSamplesAskFor) {
     const Marked m = random_marks(*rc::gen::arbitrary<std::uint64_t>(), levels);
     // With and without lookup tables.
     Window window(m.lattice, 0, *rc::gen::arbitrary<bool>() ? m.bounds() : Bounds{});
-    mark_all(window, m);
+    mark_samples(window, m.marks);
     refine_all(window, m);
     expect_truth(window, m);
     for (int l = 1; l < levels; ++l) shared += set_cells(window, l, m.first, m.end, &CornerBlock::shared).size();
@@ -143,7 +138,7 @@ TEST(Refine, EightLevelsAcrossTheOrigin) {
   Marked m{{3, 8}, {{-1, -1, -1, 0, 4}, {700, -700, 380, 7, 500}, {40, 30, 500, 3, 60}}};
   m.bound();
   Window window(m.lattice, 0, m.bounds());
-  mark_all(window, m);
+  mark_samples(window, m.marks);
   refine_all(window, m);
   expect_truth(window, m);
 }
@@ -155,7 +150,7 @@ TEST(Refine, CornersOfFarCoordinatesAreExact) {
       {{2'000'000'013, -2'000'000'077, 1'900'000'001, 0, 80}, {2'000'000'613, -2'000'000'377, 1'900'000'801, 2, 400}}};
   m.bound();
   Window window(m.lattice, 0, m.bounds());
-  mark_all(window, m);
+  mark_samples(window, m.marks);
   refine_all(window, m);
   expect_truth(window, m);
 }
@@ -169,7 +164,7 @@ TEST(Refine, OrderOfMarksAndOfPlacingDoesNotMatter) {
     std::shuffle(shuffled.marks.begin(), shuffled.marks.end(), random);
     shuffled.marks.insert(shuffled.marks.end(), m.marks.begin(), m.marks.end());
     Window window(m.lattice, 0);
-    mark_all(window, shuffled);
+    mark_samples(window, shuffled.marks);
     for (std::int32_t s = m.first; s < m.end; ++s) refine_slab(window, s);
     std::vector<std::int32_t> slabs(static_cast<std::size_t>(m.end - m.first));
     std::iota(slabs.begin(), slabs.end(), m.first);
@@ -187,11 +182,12 @@ TEST(Refine, MarkingRunsThreeSlabsAhead) {
     const Marked m = random_marks(seed + 2000, 1 + static_cast<int>(seed % 6));
     Window window(m.lattice, 0, m.bounds());
     for (std::int32_t s = m.first; s < m.end; ++s) {
-      Marker marker(window);
+      std::vector<Mark> next;
       for (const Mark& mark : m.marks) {
         const std::int32_t at = m.lattice.slab_of(mark.z);
-        if (at == s + 3 || (s == m.first && at < s + 3)) marker.mark(mark);
+        if (at == s + 3 || (s == m.first && at < s + 3)) next.push_back(mark);
       }
+      mark_samples(window, next);
       refine_slab(window, s);
       place_corners(window, s);
     }
@@ -214,7 +210,7 @@ TEST(Refine, MarkingFromSeveralThreads) {
     Window window(m.lattice, 0, table ? m.bounds() : Bounds{});
     for (std::int32_t s = m.first; s < m.end; ++s) window.cover(s);
     const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 4);
-    tbb::parallel_for(std::size_t{0}, m.marks.size(), [&](std::size_t i) { Marker(window).mark(m.marks[i]); });
+    tbb::parallel_for(std::size_t{0}, m.marks.size(), [&](std::size_t i) { mark_samples(window, {&m.marks[i], 1}); });
     refine_all(window, m);
     EXPECT_EQ(all_bits(window, m.first, m.end), alone) << "table " << table;
   }
