@@ -320,7 +320,7 @@ void mark_samples(Window& window, std::span<const Mark> marks) {
     block.mark_cell(offset_in_block(cell));
     block.mark_corners(
         offset_in_block(cell),
-        corners_within({inside(m.x, cell.x), inside(m.y, cell.y), inside(m.z, cell.z)}, m.support * inv));
+        corners_within({inside(m.x, cell.x), inside(m.y, cell.y), inside(m.z, cell.z)}, m.reach * inv));
   }
   block.write_to(window);
 }

@@ -11,7 +11,7 @@ namespace lamina {
 struct Mark {
   std::int32_t x, y, z;  ///< fixed-point position
   std::uint8_t level;    ///< coarsest level whose cells are small enough for the sample
-  float support;         ///< how far it acts, steps, > 0
+  float reach;           ///< how far it acts on corners, steps, > 0
 };
 
 /// Notes samples' home cells and the corners they act on among those up to two cells away (on each axis the two below

@@ -82,6 +82,9 @@ ZRead z_read(const SurfaceSettings& settings, const Resolved& resolved, const Sl
 
 void Pipeline::mark(const ActiveBucket& bucket) {
   constexpr std::size_t kPiece = 2048;
+  // Corners beyond the band keep no value. Samples mark up to two cells away: what a wider band holds beyond that,
+  // others have to mark for them.
+  const bool narrow = resolved_.support.band < 2;
   const std::size_t n = bucket.samples.size();
   const auto [low, high] = std::minmax_element(bucket.samples.z.begin(), bucket.samples.z.end());
   for (covered_ = std::min(covered_, resolved_.lattice.slab_of(*low) - 1);
@@ -93,8 +96,9 @@ void Pipeline::mark(const ActiveBucket& bucket) {
     std::size_t count = 0;
     for (std::size_t i = piece * kPiece; i < std::min(n, (piece + 1) * kPiece); ++i) {
       if (bucket.support[i] <= 0) continue;
-      marks[count++] = {bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i],
-                        bucket.support[i]};
+      const auto cell = static_cast<float>(resolved_.lattice.cell_size(bucket.level[i]));
+      const float reach = narrow ? std::min(bucket.support[i], resolved_.support.band * cell) : bucket.support[i];
+      marks[count++] = {bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i], reach};
     }
     mark_samples(window_, {marks.data(), count});
   });

@@ -96,7 +96,7 @@ class OctreeTruth {
         continue;
       }
       bool near = std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {
-        return s.level == level && distance(lattice_, s.mark, corner) < static_cast<double>(s.mark.support);
+        return s.level == level && distance(lattice_, s.mark, corner) < static_cast<double>(s.mark.reach);
       });
       for_around(corner, -1, 0, [&](const Cell& c) {
         near = near || (here.nodes.contains(c) && std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {
