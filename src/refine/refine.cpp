@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <bit>
 #include <cstring>
@@ -303,6 +304,7 @@ void close_cells(const CornerBlock& leaf, int begin, int end, std::uint64_t* out
 
 void mark_samples(Window& window, std::span<const Mark> marks) {
   std::vector<FloorDivider> cells;  // by level
+  cells.reserve(static_cast<std::size_t>(window.levels()));
   for (int level = 0; level < window.levels(); ++level) cells.emplace_back(window.lattice().cell_size(level));
   BlockMarks block;
   for (const Mark& m : marks) {
@@ -318,9 +320,8 @@ void mark_samples(Window& window, std::span<const Mark> marks) {
       return static_cast<float>(std::int64_t{v} - std::int64_t{low} * a) * inv;
     };
     block.mark_cell(offset_in_block(cell));
-    block.mark_corners(
-        offset_in_block(cell),
-        corners_within({inside(m.x, cell.x), inside(m.y, cell.y), inside(m.z, cell.z)}, m.reach * inv));
+    block.mark_corners(offset_in_block(cell),
+                       corners_within({inside(m.x, cell.x), inside(m.y, cell.y), inside(m.z, cell.z)}, m.reach * inv));
   }
   block.write_to(window);
 }
