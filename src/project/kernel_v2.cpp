@@ -1,5 +1,9 @@
 // The projection kernel for x86-64-v2 processors (flags set in src/CMakeLists.txt).
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <vector>
 
 #include "project/kernel.h"
 #include "project/kernels.h"

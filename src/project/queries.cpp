@@ -75,14 +75,27 @@ bool is_apart(const ProjectSettings& settings, const Lanes* all, int lane, const
 
 void list_queries(const Work& work, std::vector<Query>& out) {
   out.clear();
-  for (int z = work.begin; z < work.end; ++z) {
-    const bool corners = work.points == work.tile.leaf;
-    const std::uint64_t shared = corners ? work.tile.leaf->shared.words[z] : 0;
-    for (std::uint64_t w = work.points->near.words[z]; w != 0; w &= w - 1) {
-      const int bit = std::countr_zero(w);
-      if (((shared >> bit) & 1U) != 0) continue;
-      out.push_back(
-          {static_cast<std::uint8_t>(bit & 7), static_cast<std::uint8_t>(bit >> 3), static_cast<std::uint8_t>(z)});
+  const bool corners = work.points == work.tile.leaf;
+  const auto wanted = [&](int z) {
+    if (z < work.begin || z >= work.end) return std::uint64_t{0};
+    return work.points->near.words[z] & ~(corners ? work.tile.leaf->shared.words[z] : 0);
+  };
+  for (int z = work.begin & ~1; z < work.end; z += 2) {
+    const std::array<std::uint64_t, 2> layers{wanted(z), wanted(z + 1)};
+    for (int y = 0; y < 8; y += 2) {
+      if ((((layers[0] | layers[1]) >> (8 * y)) & 0xFFFF) == 0) continue;
+      for (int i = 0; i < 8; i += 2) {
+        // To and fro: what follows lies beside.
+        const int x = (y & 2) == 0 ? i : 6 - i;
+        const std::uint64_t brick = std::uint64_t{0x0303} << (x + 8 * y);
+        for (int k = 0; k < 2; ++k) {
+          for (std::uint64_t w = layers[static_cast<std::size_t>(k)] & brick; w != 0; w &= w - 1) {
+            const int bit = std::countr_zero(w);
+            out.push_back({static_cast<std::uint8_t>(bit & 7), static_cast<std::uint8_t>(bit >> 3),
+                           static_cast<std::uint8_t>(z + k)});
+          }
+        }
+      }
     }
   }
 }

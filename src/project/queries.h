@@ -48,7 +48,8 @@ inline constexpr float kStepLimit = 1.5F;
 /// Query points that a step moves by no more than this (cells) stay where they are, with the sums they have.
 inline constexpr float kStill = 1e-3F;
 
-/// The near points of the slab that this level projects itself: not those that a finer level holds too.
+/// The near points of the slab that this level projects itself: not those that a finer level holds too. By bricks of
+/// 2^3, so that the eight of a group lie close together and few samples act on any of them.
 void list_queries(const Work& work, std::vector<Query>& out);
 /// Puts the query points on the corners (or centres) and clears the sums.
 void start(TileState& state, const std::vector<Query>& queries, std::size_t channels, float shift);

@@ -1,6 +1,7 @@
 #include "project/tile_values.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 
@@ -103,6 +104,11 @@ void store_values(Window& window, int level, const Work& work, const std::vector
     if (fit.good[i] != 0) points.good.words[q.z] |= one;
     if (corners && fit.fits[i / kLanes].distance[static_cast<int>(i % kLanes)] >= 0) leaf.positive.words[q.z] |= one;
   }
+  std::array<std::uint16_t, 512> numbers;  // of queries, by place
+  for (std::size_t i = 0; i < queries.size(); ++i) {
+    const Query& q = queries[i];
+    numbers[static_cast<std::size_t>(BlockMask::offset(q.x, q.y, q.z))] = static_cast<std::uint16_t>(i);
+  }
   std::uint32_t count = 0;
   for (int z = work.begin; z < work.end; ++z) {
     if (corners && level > 0) take_shared(window, level, work.tile, z);
@@ -113,7 +119,6 @@ void store_values(Window& window, int level, const Work& work, const std::vector
   values.allocate(count, window.channels());
   const auto cell = static_cast<float>(window.lattice().cell_size(level));
   std::uint32_t at = 0;
-  std::size_t next = 0;  // query
   for (int z = work.begin; z < work.end; ++z) {
     const std::uint64_t shared = corners ? leaf.shared.words[z] : 0;
     for (std::uint64_t w = points.seen.words[z]; w != 0; w &= w - 1, ++at) {
@@ -122,10 +127,9 @@ void store_values(Window& window, int level, const Work& work, const std::vector
         copy_value(window, level, finer_corner(window, level, work.tile, z, bit), values, at);
         continue;
       }
-      while (fit.seen[next] == 0) ++next;
-      const std::size_t g = next / kLanes;
-      const int l = static_cast<int>(next % kLanes);
-      ++next;
+      const std::size_t query = numbers[static_cast<std::size_t>(z * 64 + bit)];
+      const std::size_t g = query / kLanes;
+      const int l = static_cast<int>(query % kLanes);
       const FitOutput& out = fit.fits[g];
       const Lanes* sums = &state.all.sums[g * channels];
       float* const v = values.of(at);

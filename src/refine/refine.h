@@ -1,9 +1,8 @@
 // Adaptive refinement: which cells of which level exist, and which corners are worth projecting (METHOD 3.4).
 #pragma once
 #include <cstdint>
-#include <vector>
+#include <span>
 
-#include "lamina/floor_divide.h"
 #include "window/window.h"
 
 namespace lamina {
@@ -12,25 +11,13 @@ namespace lamina {
 struct Mark {
   std::int32_t x, y, z;  ///< fixed-point position
   std::uint8_t level;    ///< coarsest level whose cells are small enough for the sample
-  bool sparse = false;   ///< the level's cells are so small that gaps between such samples span several
+  float reach;           ///< how far it acts on corners, steps, > 0
 };
 
-/// Notes samples' home cells and nearest corners; all corners of the home cell where samples are sparse. Any order, one
-/// marker per thread, slabs at will ahead of refine(). Remembers the block it was in: samples come sorted.
-class Marker {
- public:
-  explicit Marker(Window& window);
-  void mark(const Mark& mark);
-
- private:
-  CornerBlock& block(int level, const Block& b);
-
-  Window& window_;
-  std::vector<FloorDivider> cells_;  ///< by level
-  int level_ = -1;
-  Block last_;
-  CornerBlock* found_ = nullptr;
-};
+/// Notes samples' home cells and the corners they act on among those up to two cells away (on each axis the two below
+/// and the two above). Any order, from several threads at once, slabs at will ahead of refine_slab(); quick where one
+/// sample after the other lies in the same block.
+void mark_samples(Window& window, std::span<const Mark> marks);
 
 /// Fixes the octree of one slab: cells that samples reach, subdivision, taking part. Samples must be marked up to three
 /// slabs further, and the slab below be refined. A cell is split when a sample of a finer level lies within three
@@ -41,9 +28,9 @@ void refine_slab(Window& window, std::int32_t slab);
 /// `out` from its front. The slab must be refined.
 void close_cells(const CornerBlock& leaf, int begin, int end, std::uint64_t* out);
 
-/// Fixes the corners of one slab (its layers of corners, the first plane included) and of them the ones to project: the
-/// corner nearest to a sample and the 26 around it, and those of cells close to a sample of a coarser level. The slab
-/// and the one below must be refined.
+/// Fixes the corners of one slab (its layers of corners, the first plane included) and of them the ones to project:
+/// those that samples were found to act on, and those of cells close to a sample of a coarser level. The slab and the
+/// one below must be refined.
 void place_corners(Window& window, std::int32_t slab);
 
 /// Leaf cells of a slab at a level.

@@ -3,6 +3,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "diffuse/diffuse.h"
@@ -12,9 +13,6 @@
 
 namespace lamina {
 namespace {
-
-/// Samples whose support is more than so many of their cells leave gaps of several cells between them.
-constexpr float kSparse = 1.6F;
 
 /// Where corners themselves say how many they need.
 constexpr int kMostProjections = 16;
@@ -83,21 +81,26 @@ ZRead z_read(const SurfaceSettings& settings, const Resolved& resolved, const Sl
 }
 
 void Pipeline::mark(const ActiveBucket& bucket) {
-  constexpr std::size_t kPiece = 4096;
+  constexpr std::size_t kPiece = 2048;
+  // Corners beyond the band keep no value. Samples mark up to two cells away: what a wider band holds beyond that,
+  // others have to mark for them.
+  const bool narrow = resolved_.support.band < 2;
   const std::size_t n = bucket.samples.size();
   const auto [low, high] = std::minmax_element(bucket.samples.z.begin(), bucket.samples.z.end());
-  for (covered_ = std::min(covered_, resolved_.lattice.slab_of(*low)); covered_ <= resolved_.lattice.slab_of(*high) + 1;
-       ++covered_) {
+  for (covered_ = std::min(covered_, resolved_.lattice.slab_of(*low) - 1);
+       covered_ <= resolved_.lattice.slab_of(*high) + 2; ++covered_) {
     window_.cover(covered_);
   }
   tbb::parallel_for(std::size_t{0}, (n + kPiece - 1) / kPiece, [&](std::size_t piece) {
-    Marker marker(window_);
+    std::array<Mark, kPiece> marks;
+    std::size_t count = 0;
     for (std::size_t i = piece * kPiece; i < std::min(n, (piece + 1) * kPiece); ++i) {
       if (bucket.support[i] <= 0) continue;
       const auto cell = static_cast<float>(resolved_.lattice.cell_size(bucket.level[i]));
-      marker.mark({bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i],
-                   bucket.support[i] > kSparse * cell});
+      const float reach = narrow ? std::min(bucket.support[i], resolved_.support.band * cell) : bucket.support[i];
+      marks[count++] = {bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i], reach};
     }
+    mark_samples(window_, {marks.data(), count});
   });
 }
 

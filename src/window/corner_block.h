@@ -131,7 +131,7 @@ struct CornerBlock : Projected {
   BlockMask cells;    ///< leaf cells that take part: existing, not split, reached by a sample
 
   // Corners.
-  BlockMask nearest;   ///< corners nearest to a sample of this level; around a sparse one the corners of its cell
+  BlockMask acted_on;  ///< corners up to two cells from a sample of this level, and not beyond its support
   BlockMask corners;   ///< of the leaf cells in `cells`, of this level
   BlockMask shared;    ///< subset of corners: held by a finer level too, whose value counts
   BlockMask positive;  ///< sign (outside): once projected, of the seen corners' own distances; once finished, of all

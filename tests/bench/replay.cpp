@@ -38,10 +38,13 @@ void Replay::mark(const ActiveBucket& bucket) {
   constexpr std::size_t kPiece = 4096;
   const std::size_t n = bucket.samples.size();
   tbb::parallel_for(std::size_t{0}, (n + kPiece - 1) / kPiece, [&](std::size_t piece) {
-    Marker marker(window_);
+    std::vector<Mark> marks;
     for (std::size_t i = piece * kPiece; i < std::min(n, (piece + 1) * kPiece); ++i) {
-      marker.mark({bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i]});
+      if (bucket.support[i] <= 0) continue;
+      marks.push_back(
+          {bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i], bucket.support[i]});
     }
+    mark_samples(window_, marks);
   });
 }
 

@@ -52,11 +52,15 @@ std::vector<Lanes> sums_of(const Kernel& kernel, const TileSamples& s, const std
   return sums;
 }
 
-TEST(Kernel, SumsAreTheDefinition) {
+/// Queries in a box of this side: the smaller, the more samples act on none of them.
+class KernelSums : public testing::TestWithParam<double> {};
+
+TEST_P(KernelSums, AreTheDefinition) {
   std::mt19937_64 random(1);
   for (const std::size_t attributes : {0U, 1U, 2U, 3U, 5U}) {
     const TileSamples s = random_samples(random, 200, attributes);
-    const Queries q{random_lanes(random, 0, 8), random_lanes(random, 0, 8), random_lanes(random, 0, 8)};
+    const auto lanes = [&] { return random_lanes(random, 4 - GetParam() / 2, 4 + GetParam() / 2); };
+    const Queries q{lanes(), lanes(), lanes()};
     const std::vector<SampleRange> ranges{{3, 50}, {60, 60}, {70, 199}};
     const std::vector<Lanes> sums = sums_of(available_kernels().back(), s, ranges, q);
     for (int l = 0; l < kLanes; ++l) {
@@ -103,6 +107,8 @@ TEST(Kernel, SumsAreTheDefinition) {
     }
   }
 }
+
+INSTANTIATE_TEST_SUITE_P(Sides, KernelSums, testing::Values(8.0, 2.0, 0.0));
 
 TEST(Kernel, SamplesThatFaceAwayDoNotCount) {
   std::mt19937_64 random(5);

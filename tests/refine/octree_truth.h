@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <limits>
 #include <map>
 #include <set>
 #include <vector>
@@ -19,17 +20,22 @@ class OctreeTruth {
   };
   std::vector<Level> levels;
 
+  /// From a sample to a corner of its level, steps; infinite to those that no sample marks, however far it acts.
+  static double distance(const Lattice& lattice, const Mark& m, const Cell& corner) {
+    const std::int32_t a = lattice.cell_size(m.level);
+    const auto axis = [a](std::int32_t v, std::int32_t at) {
+      const std::int32_t home = floor_div(v, a);
+      if (at < home - 1 || at > home + 2) return std::numeric_limits<double>::infinity();
+      return static_cast<double>(at) * a - v;
+    };
+    return std::hypot(axis(m.x, corner.x), axis(m.y, corner.y), axis(m.z, corner.z));
+  }
+
   OctreeTruth(const Lattice& lattice, const std::vector<Mark>& marks) : lattice_(lattice) {
     levels.resize(static_cast<std::size_t>(lattice.levels));
     for (const Mark& m : marks) {
       const std::int32_t a = lattice.cell_size(m.level);
-      const auto nearest = [a](std::int32_t v) {
-        return static_cast<std::int32_t>(std::floor(static_cast<double>(v) / a + 0.5));
-      };
-      samples_.push_back({m.level,
-                          {floor_div(m.x, a), floor_div(m.y, a), floor_div(m.z, a)},
-                          {nearest(m.x), nearest(m.y), nearest(m.z)},
-                          m.sparse});
+      samples_.push_back({m.level, {floor_div(m.x, a), floor_div(m.y, a), floor_div(m.z, a)}, m});
     }
     const int top = lattice.levels - 1;
     for (const Sample& s : samples_) {
@@ -46,9 +52,8 @@ class OctreeTruth {
  private:
   struct Sample {
     int level;
-    Cell home;     ///< the cell of its level it lies in
-    Cell nearest;  ///< the corner of its level it lies nearest to
-    bool sparse;
+    Cell home;  ///< the cell of its level it lies in
+    Mark mark;
   };
   template <typename F>
   static void for_around(const Cell& c, int lo, int hi, const F& f) {
@@ -91,11 +96,7 @@ class OctreeTruth {
         continue;
       }
       bool near = std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {
-        const auto axis = [&](std::int32_t home, std::int32_t nearest, std::int32_t at) {
-          return s.sparse ? at >= home - 1 && at <= home + 2 : std::abs(nearest - at) <= 1;
-        };
-        return s.level == level && axis(s.home.x, s.nearest.x, corner.x) && axis(s.home.y, s.nearest.y, corner.y) &&
-               axis(s.home.z, s.nearest.z, corner.z);
+        return s.level == level && distance(lattice_, s.mark, corner) < static_cast<double>(s.mark.reach);
       });
       for_around(corner, -1, 0, [&](const Cell& c) {
         near = near || (here.nodes.contains(c) && std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {

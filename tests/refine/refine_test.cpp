@@ -37,6 +37,19 @@ struct Marked {
   }
 };
 
+/// A sample whose reach ends so far from all corners that rounding leaves no doubt.
+Mark decided(const Lattice& lattice, Mark m) {
+  const std::int32_t a = lattice.cell_size(m.level);
+  const Cell home{floor_div(m.x, a), floor_div(m.y, a), floor_div(m.z, a)};
+  for (int i = 0; i < 64; ++i) {
+    const double d = OctreeTruth::distance(lattice, m, home + Cell{i % 4 - 1, i / 4 % 4 - 1, i / 16 - 1});
+    if (std::abs(d - static_cast<double>(m.reach)) > 1e-5 * a) continue;
+    m.reach *= 1.001F;
+    i = -1;
+  }
+  return m;
+}
+
 /// A few clusters of samples, anywhere in or beside the window's table, near and far from cell borders.
 Marked random_marks(std::uint64_t seed, int levels) {
   std::mt19937_64 random(seed);
@@ -49,18 +62,14 @@ Marked random_marks(std::uint64_t seed, int levels) {
     const int width = between(1, 2 * slab);
     const int n = between(1, 8);
     for (int i = 0; i < n; ++i) {
-      out.marks.push_back({at[0] + between(-width, width), at[1] + between(-width, width),
-                           at[2] + between(-width, width), static_cast<std::uint8_t>(between(0, levels - 1)),
-                           between(0, 3) == 0});
+      const auto level = static_cast<std::uint8_t>(between(0, levels - 1));
+      const float reach = static_cast<float>(out.lattice.cell_size(level)) * static_cast<float>(between(1, 300)) / 100;
+      out.marks.push_back(decided(out.lattice, {at[0] + between(-width, width), at[1] + between(-width, width),
+                                                at[2] + between(-width, width), level, reach}));
     }
   }
   out.bound();
   return out;
-}
-
-void mark_all(Window& window, const Marked& m) {
-  Marker marker(window);
-  for (const Mark& mark : m.marks) marker.mark(mark);
 }
 
 void refine_all(Window& window, const Marked& m) {
@@ -70,7 +79,7 @@ void refine_all(Window& window, const Marked& m) {
 
 std::vector<std::uint64_t> refined_bits(const Marked& m) {
   Window window(m.lattice, 0);
-  mark_all(window, m);
+  mark_samples(window, m.marks);
   refine_all(window, m);
   return all_bits(window, m.first, m.end);
 }
@@ -115,7 +124,7 @@ TEST(Refine, OctreeIsTheOneSamplesAskFor) {
     const Marked m = random_marks(*rc::gen::arbitrary<std::uint64_t>(), levels);
     // With and without lookup tables.
     Window window(m.lattice, 0, *rc::gen::arbitrary<bool>() ? m.bounds() : Bounds{});
-    mark_all(window, m);
+    mark_samples(window, m.marks);
     refine_all(window, m);
     expect_truth(window, m);
     for (int l = 1; l < levels; ++l) shared += set_cells(window, l, m.first, m.end, &CornerBlock::shared).size();
@@ -125,21 +134,22 @@ TEST(Refine, OctreeIsTheOneSamplesAskFor) {
 }
 
 TEST(Refine, EightLevelsAcrossTheOrigin) {
-  Marked m{{3, 8}, {{-1, -1, -1, 0}, {700, -700, 380, 7}, {40, 30, 500, 3}}};
+  Marked m{{3, 8}, {{-1, -1, -1, 0, 4}, {700, -700, 380, 7, 500}, {40, 30, 500, 3, 60}}};
   m.bound();
   Window window(m.lattice, 0, m.bounds());
-  mark_all(window, m);
+  mark_samples(window, m.marks);
   refine_all(window, m);
   expect_truth(window, m);
 }
 
 TEST(Refine, CornersOfFarCoordinatesAreExact) {
   // Near the ends of the fixed-point range, where a float would be off by many cells.
-  Marked m{{64, 4},
-           {{2'000'000'013, -2'000'000'077, 1'900'000'001, 0}, {2'000'000'613, -2'000'000'377, 1'900'000'801, 2}}};
+  Marked m{
+      {64, 4},
+      {{2'000'000'013, -2'000'000'077, 1'900'000'001, 0, 80}, {2'000'000'613, -2'000'000'377, 1'900'000'801, 2, 400}}};
   m.bound();
   Window window(m.lattice, 0, m.bounds());
-  mark_all(window, m);
+  mark_samples(window, m.marks);
   refine_all(window, m);
   expect_truth(window, m);
 }
@@ -153,7 +163,7 @@ TEST(Refine, OrderOfMarksAndOfPlacingDoesNotMatter) {
     std::shuffle(shuffled.marks.begin(), shuffled.marks.end(), random);
     shuffled.marks.insert(shuffled.marks.end(), m.marks.begin(), m.marks.end());
     Window window(m.lattice, 0);
-    mark_all(window, shuffled);
+    mark_samples(window, shuffled.marks);
     for (std::int32_t s = m.first; s < m.end; ++s) refine_slab(window, s);
     std::vector<std::int32_t> slabs(static_cast<std::size_t>(m.end - m.first));
     std::iota(slabs.begin(), slabs.end(), m.first);
@@ -171,11 +181,12 @@ TEST(Refine, MarkingRunsThreeSlabsAhead) {
     const Marked m = random_marks(seed + 2000, 1 + static_cast<int>(seed % 6));
     Window window(m.lattice, 0, m.bounds());
     for (std::int32_t s = m.first; s < m.end; ++s) {
-      Marker marker(window);
+      std::vector<Mark> next;
       for (const Mark& mark : m.marks) {
         const std::int32_t at = m.lattice.slab_of(mark.z);
-        if (at == s + 3 || (s == m.first && at < s + 3)) marker.mark(mark);
+        if (at == s + 3 || (s == m.first && at < s + 3)) next.push_back(mark);
       }
+      mark_samples(window, next);
       refine_slab(window, s);
       place_corners(window, s);
     }
@@ -189,7 +200,8 @@ TEST(Refine, MarkingFromSeveralThreads) {
   std::mt19937_64 random(7);
   for (int i = 0; i < 4000; ++i) {
     const auto at = [&] { return static_cast<std::int32_t>(random() % 6000) - 3000; };
-    m.marks.push_back({at(), at(), at(), static_cast<std::uint8_t>(random() % 5)});
+    const auto level = static_cast<std::uint8_t>(random() % 5);
+    m.marks.push_back({at(), at(), at(), level, 1.5F * static_cast<float>(m.lattice.cell_size(level))});
   }
   m.bound();
   const std::vector<std::uint64_t> alone = refined_bits(m);
@@ -197,7 +209,7 @@ TEST(Refine, MarkingFromSeveralThreads) {
     Window window(m.lattice, 0, table ? m.bounds() : Bounds{});
     for (std::int32_t s = m.first; s < m.end; ++s) window.cover(s);
     const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 4);
-    tbb::parallel_for(std::size_t{0}, m.marks.size(), [&](std::size_t i) { Marker(window).mark(m.marks[i]); });
+    tbb::parallel_for(std::size_t{0}, m.marks.size(), [&](std::size_t i) { mark_samples(window, {&m.marks[i], 1}); });
     refine_all(window, m);
     EXPECT_EQ(all_bits(window, m.first, m.end), alone) << "table " << table;
   }

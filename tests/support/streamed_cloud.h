@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "feed/sample_feed.h"
 #include "files/temporary_folder.h"
@@ -51,10 +52,13 @@ class StreamedCloud {
         first(lattice.slab_of(*std::min_element(cloud.z.begin(), cloud.z.end())) - 2),
         end(lattice.slab_of(*std::max_element(cloud.z.begin(), cloud.z.end())) + 4) {
     feed.prepare(std::numeric_limits<std::int32_t>::max(), [&](const ActiveBucket& b) {
-      Marker marker(window);
+      std::vector<Mark> marks;
       for (std::size_t i = 0; i < b.samples.size(); ++i) {
-        if (b.support[i] > 0) marker.mark({b.samples.x[i], b.samples.y[i], b.samples.z[i], b.level[i]});
+        if (b.support[i] > 0) {
+          marks.push_back({b.samples.x[i], b.samples.y[i], b.samples.z[i], b.level[i], b.support[i]});
+        }
       }
+      mark_samples(window, marks);
     });
     for (std::int32_t s = first; s < end; ++s) refine_slab(window, s);
     for (std::int32_t s = first; s < end; ++s) place_corners(window, s);
