@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace lamina {
@@ -40,6 +41,11 @@ struct AttributeSpec {
   ScalarType type = ScalarType::float32;
   bool operator==(const AttributeSpec&) const = default;
 };
+
+/// Whether an attribute of that name is a channel of the colour.
+inline bool is_colour(std::string_view name) {
+  return name == "red" || name == "green" || name == "blue" || name == "alpha";
+}
 
 using AttributeLayout = std::vector<AttributeSpec>;
 

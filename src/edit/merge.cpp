@@ -20,10 +20,6 @@ struct Named {
   std::size_t first = 0;   ///< input it was first seen in
 };
 
-bool is_colour(const std::string& name) {
-  return name == "red" || name == "green" || name == "blue" || name == "alpha";
-}
-
 bool is_integer(ScalarType t) {
   return t != ScalarType::float32 && t != ScalarType::float64;
 }

@@ -13,10 +13,6 @@
 namespace lamina {
 namespace {
 
-bool is_colour(const std::string& name) {
-  return name == "red" || name == "green" || name == "blue" || name == "alpha";
-}
-
 /// What full brightness is in a type; 1 for floats.
 double full(ScalarType type) {
   switch (type) {

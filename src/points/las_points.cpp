@@ -32,7 +32,7 @@ std::vector<Candidate> candidates(int point_format) {
   return list;
 }
 
-bool is_colour(const Candidate& c) {
+bool holds_colour(const Candidate& c) {
   return c.enough > 0;
 }
 
@@ -47,10 +47,10 @@ void look_for_values(const InputFile& file, const BinaryRows& rows, std::uint64_
   targets.reserve(list.size());
   for (auto& v : values) targets.push_back({.narrow = v.data()});
   const auto undecided = [&] {
-    const bool wide_colour =
-        std::any_of(list.begin(), list.end(), [](const Candidate& c) { return is_colour(c) && c.highest > c.enough; });
+    const bool wide_colour = std::any_of(list.begin(), list.end(),
+                                         [](const Candidate& c) { return holds_colour(c) && c.highest > c.enough; });
     return std::any_of(list.begin(), list.end(),
-                       [&](const Candidate& c) { return is_colour(c) ? !wide_colour : c.highest == 0; });
+                       [&](const Candidate& c) { return holds_colour(c) ? !wide_colour : c.highest == 0; });
   };
   for (std::uint64_t first = 0; first < count && undecided(); first += kBlock) {
     const auto n = static_cast<std::size_t>(std::min<std::uint64_t>(kBlock, count - first));
@@ -111,11 +111,11 @@ class LasPoints final : public PointSource {
     look_for_values(file_, layout_, header_.count, list);
     float brightest = 0;
     for (const Candidate& c : list) {
-      if (is_colour(c)) brightest = std::max(brightest, c.highest);
+      if (holds_colour(c)) brightest = std::max(brightest, c.highest);
     }
     eight_bit_colours_ = brightest > 0 && brightest <= 255;
     for (const Candidate& c : list) {
-      if ((is_colour(c) ? brightest : c.highest) > 0) columns_.push_back(c.column);
+      if ((holds_colour(c) ? brightest : c.highest) > 0) columns_.push_back(c.column);
     }
     if (eight_bit_colours_) {
       info_.remarks.push_back(fmt::format("{}: no colour is above 255: taken as 8-bit colours", file_.name));

@@ -17,10 +17,6 @@ namespace {
 
 constexpr std::string_view kSkip = "-";
 
-bool is_colour(std::string_view name) {
-  return name == "red" || name == "green" || name == "blue" || name == "alpha";
-}
-
 struct Told {
   std::string name;
   std::optional<ScalarType> type;

@@ -183,9 +183,9 @@ enum Compression : std::uint32_t { kZip = 1, kActiveMask = 2, kBlosc = 4 };
 
 class TreeWalk {
  public:
-  TreeWalk(Walker& walker, const ValueKind& kind, std::uint32_t compression, bool half)
-      : w_(walker), kind_(kind), compression_(compression), stored_(half && kind.half > 0 ? kind.half : kind.bytes) {
-    half_ = half && kind.half > 0;
+  TreeWalk(Walker& walker, const ValueKind& kind, std::uint32_t compression, bool as_half)
+      : w_(walker), kind_(kind), compression_(compression), stored_(as_half && kind.half > 0 ? kind.half : kind.bytes) {
+    half_ = as_half && kind.half > 0;
   }
   void run() {
     const bool buffers = kind_.leaves != ValueKind::Leaves::unknown;

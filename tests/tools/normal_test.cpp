@@ -46,10 +46,10 @@ TEST_F(NormalTool, AddsNormalsAndKeepsEverythingElse) {
   EXPECT_EQ(out.exact, rows_.exact);
   EXPECT_EQ(out.quality, rows_.quality);
   EXPECT_GT(outward(out), 0.999);
-  const auto json = nlohmann::json::parse(read_text(stats));
-  EXPECT_EQ(json["estimated"], 3000);
-  EXPECT_EQ(json["sign_from"]["outside"], 3000);
-  EXPECT_EQ(json["sign_conflicts"]["slabs"].size(), 1);
+  const auto report = nlohmann::json::parse(read_text(stats));
+  EXPECT_EQ(report["estimated"], 3000);
+  EXPECT_EQ(report["sign_from"]["outside"], 3000);
+  EXPECT_EQ(report["sign_conflicts"]["slabs"].size(), 1);
 }
 
 TEST_F(NormalTool, WritesOtherFormatsAndReadsPipes) {
