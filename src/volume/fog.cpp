@@ -8,6 +8,7 @@
 #include "lamina/error.h"
 #include "meshes/with_threads.h"
 #include "volume/level_set_data.h"
+#include "volume/open_inside.h"
 #include "volume/vdb_file.h"
 
 namespace lamina {
@@ -17,6 +18,7 @@ std::uint64_t write_fog(const LevelSet& level_set, const FogSettings& settings, 
   if (settings.name.empty()) throw Error(ExitCode::usage, "--name must be a word");
   if (!(settings.ramp >= 0)) throw Error(ExitCode::usage, "--ramp must be a length, or 0 for the whole band");
   openvdb::FloatGrid::Ptr fog = level_set.data().grid->deepCopy();
+  if (level_set.data().open) volume::empty_open_inside(*fog);
   const auto band = static_cast<float>(level_set.band());
   const float ramp = settings.ramp > 0 ? std::min(static_cast<float>(settings.ramp), band) : band;
   meshes::with_threads(run.threads, [&] {
