@@ -281,7 +281,7 @@ double expected_cpu_seconds(const SurfaceSettings& s, const Resolved& r, std::si
   // steps; and per cell of surface, which a sample gives some: refined, numbered, triangulated, clustered, written.
   // Coefficients: docs/performance.md.
   constexpr double kSample = 230e-9;
-  constexpr double kAttribute = 45e-9;
+  constexpr double kPerAttribute = 45e-9;
   constexpr double kSums = 300e-9;
   constexpr double kCell = 1190e-9;
   constexpr double kRefit = 550e-9, kRefitSums = 30e-9;  // --refit: each sample, and by the square of the support
@@ -303,7 +303,7 @@ double expected_cpu_seconds(const SurfaceSettings& s, const Resolved& r, std::si
   const auto support = static_cast<double>(r.refit.support);
   const double refit = support > 0 ? kRefit + kRefitSums * support * support : 0;
   const double per_sample =
-      kSample + kAttribute * static_cast<double>(attributes) + refit + sums + (kCell + volume) * cells;
+      kSample + kPerAttribute * static_cast<double>(attributes) + refit + sums + (kCell + volume) * cells;
   return static_cast<double>(r.plan.samples) * per_sample;
 }
 
