@@ -20,6 +20,10 @@ struct BandSettings {
   std::vector<int> channels;  ///< of the window (corner_block.h), beside distance and normal
 };
 
+inline Growth growth_of(const BandSettings& settings) {
+  return {static_cast<float>(settings.band), settings.rounds};
+}
+
 class Band {
  public:
   Band(BandSettings settings, const Lattice& lattice);
@@ -47,7 +51,6 @@ class Band {
 
   BandSettings settings_;
   Lattice lattice_;
-  float farthest_;  ///< a step along the normal, half a voxel at least, leads out of the band from here
   BrickMap bricks_;
   std::int32_t known_end_ = 0;                       ///< planes below are collected
   std::array<std::int32_t, kMaxRounds + 1> done_{};  ///< planes below have had the round

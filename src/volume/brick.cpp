@@ -43,6 +43,10 @@ Brick& BrickMap::touch(const Block& b) {
   const auto rounds = static_cast<std::size_t>(rounds_);
   std::fill_n(brick.known.begin(), rounds + 1, BlockMask{});
   std::fill_n(brick.source.begin(), rounds + 1, BlockMask{});
+  brick.oblique = {};
+  brick.active = {};
+  brick.negative = {};
+  brick.last_negative = {};
   brick.contested = {};
   brick.repaired = {};
   own.add(std::move(place));

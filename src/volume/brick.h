@@ -1,6 +1,7 @@
 // A piece of the band, and where its neighbours are.
 #pragma once
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -18,15 +19,29 @@ inline constexpr int kMaxRounds = 8;
 /// whoever reads one wants the other.
 typedef float Plane __attribute__((vector_size(16)));  // NOLINT(modernize-use-using): attributes on typedefs
 
+/// The band grows by steps that lead away from the surface by so much at least (Reach), voxels; those along two axes or
+/// three at once by more.
+inline constexpr float kShortestStep = 0.5F, kShortestOblique = 1.118F;
+
+struct Growth {
+  float band = 3;  ///< half width, voxels
+  int rounds = 2;
+};
+
 /// 8^3 voxels.
 struct Brick {
   Block block;
   /// The bricks around, x fastest, itself in the middle; null where there is none.
   std::array<Brick*, 27> around;
-  /// By round: the projected voxels first, the whole band last.
+  /// By round: the projected voxels first; last also voxels beyond the band of which no more is known than the side.
   std::array<BlockMask, kMaxRounds + 1> known;
   /// By round: the voxels new in it that the band grows from.
   std::array<BlockMask, kMaxRounds + 1> source;
+  /// Voxels of `source` from which the band also grows along two axes at once.
+  BlockMask oblique;
+  BlockMask active;  ///< voxels in the band
+  /// Known voxels inside: from before the last round, and those of the last.
+  BlockMask negative, last_negative;
   /// Voxels that the planes around disagree on.
   BlockMask contested;
   /// Corners that extraction gives a value from their trusted neighbours.
@@ -35,6 +50,19 @@ struct Brick {
   std::vector<float> extra;      ///< 512 for each of BandSettings::channels
 
   [[nodiscard]] float distance(std::size_t at) const { return plane[at][3]; }
+  /// A voxel got its plane in a round.
+  void know(int round, int at, float distance, const Growth& growth) {
+    const float room = growth.band - std::abs(distance);
+    known[static_cast<std::size_t>(round)].set(at);
+    if (room > 0) active.set(at);
+    if (round == growth.rounds) {  // the bricks around are looking at the masks of what they grow from
+      if (distance < 0) last_negative.set(at);
+      return;
+    }
+    if (distance < 0) negative.set(at);
+    if (room > kShortestStep) source[static_cast<std::size_t>(round)].set(at);
+    if (room > kShortestOblique) oblique.set(at);
+  }
 };
 
 /// The bricks of a band that moves along z.

@@ -9,6 +9,7 @@
 #include "volume/band.h"
 #include "volume/band_push.h"
 #include "volume/band_reach.h"
+#include "volume/brick_sides.h"
 #include "window/bits.h"
 
 namespace lamina::volume {
@@ -36,13 +37,13 @@ std::optional<float> store(const Sums& sums, int at, float least, std::size_t ch
 /// are not. What older voxels reach is known already, but for places between two sheets that face each other.
 class Step {
  public:
-  Step(Brick& brick, int round, int begin, int end, const BandSettings& settings, float farthest, Push way, Sums& sums)
+  Step(Brick& brick, int round, int begin, int end, const BandSettings& settings, Push way, Sums& sums)
       : brick_(brick),
         round_(round),
         begin_(begin),
         end_(end),
         channels_(settings.channels.size()),
-        farthest_(farthest),
+        growth_(growth_of(settings)),
         push_(way),
         sums_(sums) {
     sums_.extra.resize(std::max(sums_.extra.size(), 512 * channels_));
@@ -50,38 +51,136 @@ class Step {
 
   void run() {
     for (int z = begin_; z < end_; ++z) brick_.known[round_].words[z] = brick_.known[round_ - 1].words[z];
-    BlockMask wanted, contested;
-    bits::Neighbourhood fresh{};
-    for (int i = 0; i < 27; ++i)
-      if (brick_.around[i] != nullptr) fresh[i / 9][i / 3 % 3][i % 3] = &brick_.around[i]->source[round_ - 1];
-    bits::dilate_layers<-1, 1>(fresh, begin_, end_, wanted.words.data() + begin_);
-    for (int z = begin_; z < end_; ++z) {
-      wanted.words[z] &= ~brick_.known[round_ - 1].words[z];
-      contested.words[z] = wanted.words[z] & brick_.contested.words[z];
-    }
-    if (wanted.any()) {
-      for_each(wanted, [&](int at) {
-        sums_.clear(at, channels_);
-        __builtin_prefetch(&brick_.plane[at], 1);
-      });
-      push(round_ - 1, wanted);
-      for (int r = 0; contested.any() && r < round_ - 1; ++r) push(r, contested);
-      for_each(wanted, [&](int at) {
-        if (!(sums_.weight[at] > 0)) return;
-        if (const auto distance = store(sums_, at, 0.5F, channels_, brick_))
-          know(at, *distance);
-        else
-          brick_.contested.set(at);
-      });
+    if (round_ < growth_.rounds) {
+      learn(beside_sources());
+    } else {
+      const BlockMask beyond = learn_last();
+      if (sides_depend_on(beyond)) learn(beyond);
     }
     if (round_ == 1) repair_gaps();
   }
 
  private:
+  void learn(const BlockMask& wanted) {
+    if (!wanted.any()) return;
+    BlockMask contested;
+    for (int z = begin_; z < end_; ++z) contested.words[z] = wanted.words[z] & brick_.contested.words[z];
+    for_each(wanted, [&](int at) {
+      sums_.clear(at, channels_);
+      __builtin_prefetch(&brick_.plane[at], 1);
+    });
+    push(round_ - 1, wanted);
+    for (int r = 0; contested.any() && r < round_ - 1; ++r) push(r, contested);
+    for_each(wanted, [&](int at) {
+      if (!(sums_.weight[at] > 0)) return;
+      if (const auto distance = store(sums_, at, 0.5F, channels_, brick_))
+        know(at, *distance);
+      else
+        brick_.contested.set(at);
+    });
+  }
+
   template <class Visit>
   void for_each(const BlockMask& mask, const Visit& visit) const {
     for (int z = begin_; z < end_; ++z)
       for (std::uint64_t w = mask.words[z]; w != 0; w &= w - 1) visit(z * 64 + std::countr_zero(w));
+  }
+
+  [[nodiscard]] const Brick* around(int dx, int dy, int dz) const {
+    return brick_.around[static_cast<std::size_t>(13 + dx + 3 * dy + 9 * dz)];
+  }
+
+  [[nodiscard]] BlockMask beside(const bits::Neighbourhood& masks) const {
+    BlockMask out;
+    bits::dilate_layers<-1, 1>(masks, begin_, end_, out.words.data() + begin_);
+    return out;
+  }
+
+  /// Unknown voxels beside those that the round before made known.
+  [[nodiscard]] BlockMask beside_sources() const {
+    bits::Neighbourhood masks{};
+    for (int i = 0; i < 27; ++i)
+      if (brick_.around[i] != nullptr) masks[i / 9][i / 3 % 3][i % 3] = &brick_.around[i]->source[round_ - 1];
+    BlockMask out = beside(masks);
+    for (int z = begin_; z < end_; ++z) out.words[z] &= ~brick_.known[round_].words[z];
+    return out;
+  }
+
+  /// Unknown voxels that share a face with those that the round before made known.
+  [[nodiscard]] BlockMask facing_sources() const {
+    const auto sources = [this](int dx, int dy, int dz) -> const BlockMask& {
+      const Brick* const from = around(dx, dy, dz);
+      return from == nullptr ? bits::kNoBits : from->source[round_ - 1];
+    };
+    const BlockMask &here = sources(0, 0, 0), &left = sources(-1, 0, 0), &right = sources(1, 0, 0),
+                    &front = sources(0, -1, 0), &back = sources(0, 1, 0);
+    BlockMask out;
+    for (int z = begin_; z < end_; ++z) {
+      const std::uint64_t w = here.words[z];
+      out.words[z] = bits::spread_x<-1, 1>(left.words[z], w, right.words[z]) |
+                     bits::spread_y<-1, 1>(front.words[z], w, back.words[z]) |
+                     (z > 0 ? here.words[z - 1] : sources(0, 0, -1).words[7]) |
+                     (z < 7 ? here.words[z + 1] : sources(0, 0, 1).words[0]);
+    }
+    return out;
+  }
+
+  /// Nothing grows from the last round, and most of what it would reach lies beyond the band. Learns of what may lie in
+  /// it; of the rest, which is returned, the side is taken from the voxels beside.
+  BlockMask learn_last() {
+    enum Kind : std::size_t { outside, inside, oblique };
+    std::array<std::array<BlockMask, 27>, 3> masks;
+    std::array<bits::Neighbourhood, 3> from{};
+    std::array<bool, 3> any{};
+    for (std::size_t i = 0; i < 27; ++i) {
+      const Brick* const other = brick_.around[i];
+      if (other == nullptr || !other->source[round_ - 1].any()) continue;
+      for (std::size_t z = 0; z < 8; ++z) {
+        const std::uint64_t w = other->source[round_ - 1].words[z];
+        masks[outside][i].words[z] = w & ~other->negative.words[z];
+        masks[inside][i].words[z] = w & other->negative.words[z];
+        masks[oblique][i].words[z] = w & other->oblique.words[z];
+      }
+      for (const Kind k : {outside, inside, oblique}) {
+        if (!masks[k][i].any()) continue;
+        from[k][i / 9][i / 3 % 3][i % 3] = &masks[k][i];
+        any[k] = true;
+      }
+    }
+    std::array<BlockMask, 3> reached;
+    for (const Kind k : {outside, inside, oblique})
+      if (any[k]) reached[k] = beside(from[k]);
+    BlockMask wanted = facing_sources(), beyond;
+    for (int z = begin_; z < end_; ++z) {
+      const std::uint64_t all = reached[outside].words[z] | reached[inside].words[z];
+      const std::uint64_t doubtful =
+          (reached[outside].words[z] & reached[inside].words[z]) | (all & brick_.contested.words[z]);
+      std::uint64_t& known = brick_.known[round_].words[z];
+      wanted.words[z] = (wanted.words[z] | reached[oblique].words[z] | doubtful) & ~known;
+      beyond.words[z] = all & ~wanted.words[z] & ~known;
+    }
+    learn(wanted);
+    for (int z = begin_; z < end_; ++z) {
+      brick_.last_negative.words[z] |= beyond.words[z] & reached[inside].words[z];
+      brick_.known[round_].words[z] |= beyond.words[z];
+    }
+    return beyond;
+  }
+
+  /// Whether voxels that nobody knows change sides with those `beyond`, some of which nobody may know either: then they
+  /// are forgotten again.
+  bool sides_depend_on(const BlockMask& beyond) {
+    if (!beyond.any() || !brick_.active.any()) return false;
+    const BlockMask negative = negative_of(brick_);
+    BlockMask less_negative = negative, less_known = brick_.known[round_];
+    for (int z = begin_; z < end_; ++z) {
+      less_negative.words[z] &= ~beyond.words[z];
+      less_known.words[z] &= ~beyond.words[z];
+    }
+    if (inside_of(negative, brick_.known[round_]).words == inside_of(less_negative, less_known).words) return false;
+    brick_.known[round_] = less_known;
+    for (int z = begin_; z < end_; ++z) brick_.last_negative.words[z] &= ~beyond.words[z];
+    return true;
   }
 
   void push(int round, const BlockMask& wanted) {
@@ -123,8 +222,7 @@ class Step {
   }
 
   void know(int at, float distance) {
-    brick_.known[round_].set(at);
-    if (std::abs(distance) < farthest_) brick_.source[round_].set(at);
+    brick_.know(round_, at, distance, growth_);
   }
 
   void repair_gaps() {
@@ -158,7 +256,7 @@ class Step {
   Brick& brick_;
   int round_, begin_, end_;
   std::size_t channels_;
-  float farthest_;
+  Growth growth_;
   Push push_;
   Sums& sums_;
 };
@@ -179,7 +277,7 @@ void Band::grow(int round, std::int32_t begin, std::int32_t end) {
   static const Push way = available_pushes().back();
   tbb::parallel_for(std::size_t{0}, jobs.size(), [&](std::size_t j) {
     static thread_local Sums sums;
-    Step(*jobs[j].brick, round, jobs[j].begin, jobs[j].end, settings_, farthest_, way, sums).run();
+    Step(*jobs[j].brick, round, jobs[j].begin, jobs[j].end, settings_, way, sums).run();
   });
 }
 
