@@ -88,9 +88,9 @@ void Band::collect_level(const Window& window, std::int32_t slab) {
         const std::uint32_t i =
             base + static_cast<std::uint32_t>(std::popcount(near & ((std::uint64_t{1} << bit) - 1)));
         const float d = values.channel(kDistance)[i] * per_voxel;
-        brick->know(0, at, d, growth);
         brick->plane[at] =
             Plane{values.channel(kNormalX)[i], values.channel(kNormalX + 1)[i], values.channel(kNormalX + 2)[i], d};
+        brick->know(0, at, brick->plane[at], growth);
         for (std::size_t c = 0; c < settings_.channels.size(); ++c)
           brick->extra[c * 512 + at] = values.channel(settings_.channels[c])[i];
       }
@@ -102,8 +102,8 @@ void Band::put(const Found& f) {
   Brick& brick = bricks_.touch(block_of(f.at));
   const int at = offset_in_block(f.at);
   if (brick.known[0].test(at)) return;
-  brick.know(0, at, f.distance, growth_of(settings_));
   brick.plane[at] = Plane{f.normal[0], f.normal[1], f.normal[2], f.distance};
+  brick.know(0, at, brick.plane[at], growth_of(settings_));
   for (std::size_t c = 0; c < f.extra.size(); ++c) brick.extra[c * 512 + at] = f.extra[c];
 }
 

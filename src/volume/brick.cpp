@@ -42,11 +42,11 @@ Brick& BrickMap::touch(const Block& b) {
   brick.around.fill(nullptr);
   const auto rounds = static_cast<std::size_t>(rounds_);
   std::fill_n(brick.known.begin(), rounds + 1, BlockMask{});
-  std::fill_n(brick.source.begin(), rounds + 1, BlockMask{});
+  std::fill_n(brick.source.begin(), rounds, std::array<BlockMask, 2>{});
   brick.oblique = {};
+  brick.straight = {};
   brick.active = {};
   brick.negative = {};
-  brick.last_negative = {};
   brick.contested = {};
   brick.repaired = {};
   own.add(std::move(place));

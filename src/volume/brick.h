@@ -35,13 +35,13 @@ struct Brick {
   std::array<Brick*, 27> around;
   /// By round: the projected voxels first; last also voxels beyond the band of which no more is known than the side.
   std::array<BlockMask, kMaxRounds + 1> known;
-  /// By round: the voxels new in it that the band grows from.
-  std::array<BlockMask, kMaxRounds + 1> source;
-  /// Voxels of `source` from which the band also grows along two axes at once.
-  BlockMask oblique;
-  BlockMask active;  ///< voxels in the band
-  /// Known voxels inside: from before the last round, and those of the last.
-  BlockMask negative, last_negative;
+  /// By round: the voxels new in it that the band grows from, outside and inside.
+  std::array<std::array<BlockMask, 2>, kMaxRounds> source;
+  /// Of the last `source`: those from which it also grows along two axes at once, and those from which it grows along
+  /// one and stays a band.
+  BlockMask oblique, straight;
+  BlockMask active;    ///< voxels in the band
+  BlockMask negative;  ///< known voxels inside
   /// Voxels that the planes around disagree on.
   BlockMask contested;
   /// Corners that extraction gives a value from their trusted neighbours.
@@ -51,17 +51,19 @@ struct Brick {
 
   [[nodiscard]] float distance(std::size_t at) const { return plane[at][3]; }
   /// A voxel got its plane in a round.
-  void know(int round, int at, float distance, const Growth& growth) {
-    const float room = growth.band - std::abs(distance);
+  void know(int round, int at, const Plane& of, const Growth& growth) {
+    const float distance = of[3], room = growth.band - std::abs(distance);
     known[static_cast<std::size_t>(round)].set(at);
     if (room > 0) active.set(at);
-    if (round == growth.rounds) {  // the bricks around are looking at the masks of what they grow from
-      if (distance < 0) last_negative.set(at);
-      return;
-    }
     if (distance < 0) negative.set(at);
-    if (room > kShortestStep) source[static_cast<std::size_t>(round)].set(at);
+    if (round == growth.rounds || !(room > kShortestStep)) return;
+    source[static_cast<std::size_t>(round)][distance < 0 ? 1 : 0].set(at);
+    if (round + 1 < growth.rounds) return;
     if (room > kShortestOblique) oblique.set(at);
+    for (int axis = 0; axis < 3; ++axis) {
+      const float up = std::abs(of[axis]);
+      if (up >= kShortestStep && up < room) straight.set(at);
+    }
   }
 };
 

@@ -9,9 +9,9 @@
 
 #include "lamina/error.h"
 #include "lamina/volume_export.h"
+#include "volume/brick_sides.h"
 #include "volume/full_range.h"
 #include "volume/mask_axes.h"
-#include "volume/brick_sides.h"
 #include "volume/pack_leaf.h"
 
 namespace lamina::volume {
@@ -71,7 +71,7 @@ BrickLeaves LeafMaker::operator()(const Brick& brick) const {
   BrickLeaves out;
   if (!brick.active.any()) return out;
   out.any = true;
-  LeafMasks masks{with_axes(brick.active, axes), with_axes(inside_of(negative_of(brick), band.all(brick)), axes)};
+  LeafMasks masks{with_axes(brick.active, axes), with_axes(inside_of(brick.negative, band.all(brick)), axes)};
   // The active voxels of the brick in the leaf's order.
   std::array<std::uint16_t, 512> order;
   std::size_t count = 0;

@@ -21,12 +21,6 @@ BlockMask dilated(const BlockMask& m) {
 
 }  // namespace
 
-BlockMask negative_of(const Brick& brick) {
-  BlockMask out;
-  for (int z = 0; z < 8; ++z) out.words[z] = brick.negative.words[z] | brick.last_negative.words[z];
-  return out;
-}
-
 BlockMask inside_of(const BlockMask& negative, const BlockMask& known) {
   BlockMask inside = negative, outside;
   std::uint64_t any_inside = 0, any_outside = 0;

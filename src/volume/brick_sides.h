@@ -1,12 +1,9 @@
-// Which side of the surface the voxels of a brick lie on, those beside the band as well.
+// Which side of the surface the voxels of a block lie on, those beside the band as well.
 #pragma once
-#include "volume/brick.h"
 #include "window/corner_block.h"
 
 namespace lamina::volume {
 
-/// Known voxels inside.
-BlockMask negative_of(const Brick& brick);
 /// Voxels nobody knows take the side of the nearest that somebody does, outside first. `negative`: of `known`.
 BlockMask inside_of(const BlockMask& negative, const BlockMask& known);
 

@@ -9,6 +9,7 @@
 #include "volume/band.h"
 #include "volume/band_push.h"
 #include "volume/band_reach.h"
+#include "volume/beside.h"
 #include "volume/brick_sides.h"
 #include "window/bits.h"
 
@@ -18,9 +19,9 @@ namespace {
 /// Repaired corners count within this distance of the surface, voxels.
 constexpr float kRepaired = 1;
 
-/// What the sums at a voxel say; its distance, or nothing where neighbours of two sheets that face each other say
+/// What the sums at a voxel say, or nothing where neighbours of two sheets that face each other say
 /// nothing together.
-std::optional<float> store(const Sums& sums, int at, float least, std::size_t channels, Brick& to) {
+std::optional<Plane> store(const Sums& sums, int at, float least, std::size_t channels, Brick& to) {
   const float weight = sums.weight[at];
   const Plane t = sums.total[at], squares = t * t;
   const float squared = squares[0] + squares[1] + squares[2];
@@ -30,7 +31,7 @@ std::optional<float> store(const Sums& sums, int at, float least, std::size_t ch
   const Plane plane = t * Plane{unit, unit, unit, inverse};
   to.plane[at] = plane;
   for (std::size_t c = 0; c < channels; ++c) to.extra[c * 512 + at] = sums.extra[c * 512 + at] * inverse;
-  return plane[3];  // reading it again would wait for its way to memory
+  return plane;  // reading it again would wait for its way to memory
 }
 
 /// One step of one brick: from the voxels that the step before made known, in a fixed order, to those beside them that
@@ -51,12 +52,10 @@ class Step {
 
   void run() {
     for (int z = begin_; z < end_; ++z) brick_.known[round_].words[z] = brick_.known[round_ - 1].words[z];
-    if (round_ < growth_.rounds) {
-      learn(beside_sources());
-    } else {
-      const BlockMask beyond = learn_last();
-      if (sides_depend_on(beyond)) learn(beyond);
-    }
+    if (round_ < growth_.rounds)
+      learn_all();
+    else
+      learn_last();
     if (round_ == 1) repair_gaps();
   }
 
@@ -73,8 +72,8 @@ class Step {
     for (int r = 0; contested.any() && r < round_ - 1; ++r) push(r, contested);
     for_each(wanted, [&](int at) {
       if (!(sums_.weight[at] > 0)) return;
-      if (const auto distance = store(sums_, at, 0.5F, channels_, brick_))
-        know(at, *distance);
+      if (const auto plane = store(sums_, at, 0.5F, channels_, brick_))
+        brick_.know(round_, at, *plane, growth_);
       else
         brick_.contested.set(at);
     });
@@ -86,111 +85,71 @@ class Step {
       for (std::uint64_t w = mask.words[z]; w != 0; w &= w - 1) visit(z * 64 + std::countr_zero(w));
   }
 
-  [[nodiscard]] const Brick* around(int dx, int dy, int dz) const {
-    return brick_.around[static_cast<std::size_t>(13 + dx + 3 * dy + 9 * dz)];
-  }
-
-  [[nodiscard]] BlockMask beside(const bits::Neighbourhood& masks) const {
-    BlockMask out;
-    bits::dilate_layers<-1, 1>(masks, begin_, end_, out.words.data() + begin_);
-    return out;
-  }
-
-  /// Unknown voxels beside those that the round before made known.
-  [[nodiscard]] BlockMask beside_sources() const {
-    bits::Neighbourhood masks{};
-    for (int i = 0; i < 27; ++i)
-      if (brick_.around[i] != nullptr) masks[i / 9][i / 3 % 3][i % 3] = &brick_.around[i]->source[round_ - 1];
-    BlockMask out = beside(masks);
-    for (int z = begin_; z < end_; ++z) out.words[z] &= ~brick_.known[round_].words[z];
-    return out;
-  }
-
-  /// Unknown voxels that share a face with those that the round before made known.
-  [[nodiscard]] BlockMask facing_sources() const {
-    const auto sources = [this](int dx, int dy, int dz) -> const BlockMask& {
-      const Brick* const from = around(dx, dy, dz);
-      return from == nullptr ? bits::kNoBits : from->source[round_ - 1];
-    };
-    const BlockMask &here = sources(0, 0, 0), &left = sources(-1, 0, 0), &right = sources(1, 0, 0),
-                    &front = sources(0, -1, 0), &back = sources(0, 1, 0);
-    BlockMask out;
-    for (int z = begin_; z < end_; ++z) {
-      const std::uint64_t w = here.words[z];
-      out.words[z] = bits::spread_x<-1, 1>(left.words[z], w, right.words[z]) |
-                     bits::spread_y<-1, 1>(front.words[z], w, back.words[z]) |
-                     (z > 0 ? here.words[z - 1] : sources(0, 0, -1).words[7]) |
-                     (z < 7 ? here.words[z + 1] : sources(0, 0, 1).words[0]);
+  /// A mask of the bricks around.
+  template <class Of>
+  [[nodiscard]] Around around(const Of& of) const {
+    Around out;
+    for (std::size_t i = 0; i < 27; ++i) {
+      const Brick* const brick = brick_.around[i];
+      out[i] = brick == nullptr ? &bits::kNoBits : &of(*brick);
     }
     return out;
+  }
+  [[nodiscard]] BlockMask beside_sources(std::size_t side) const {
+    return beside(around([&](const Brick& b) -> const BlockMask& { return b.source[before()][side]; }));
+  }
+  [[nodiscard]] std::size_t before() const { return static_cast<std::size_t>(round_ - 1); }
+
+  void learn_all() {
+    const BlockMask outside = beside_sources(0), inside = beside_sources(1);
+    BlockMask wanted;
+    for (int z = begin_; z < end_; ++z)
+      wanted.words[z] = (outside.words[z] | inside.words[z]) & ~brick_.known[round_].words[z];
+    learn(wanted);
   }
 
   /// Nothing grows from the last round, and most of what it would reach lies beyond the band. Learns of what may lie in
-  /// it; of the rest, which is returned, the side is taken from the voxels beside.
-  BlockMask learn_last() {
-    enum Kind : std::size_t { outside, inside, oblique };
-    std::array<std::array<BlockMask, 27>, 3> masks;
-    std::array<bits::Neighbourhood, 3> from{};
-    std::array<bool, 3> any{};
-    for (std::size_t i = 0; i < 27; ++i) {
-      const Brick* const other = brick_.around[i];
-      if (other == nullptr || !other->source[round_ - 1].any()) continue;
-      for (std::size_t z = 0; z < 8; ++z) {
-        const std::uint64_t w = other->source[round_ - 1].words[z];
-        masks[outside][i].words[z] = w & ~other->negative.words[z];
-        masks[inside][i].words[z] = w & other->negative.words[z];
-        masks[oblique][i].words[z] = w & other->oblique.words[z];
-      }
-      for (const Kind k : {outside, inside, oblique}) {
-        if (!masks[k][i].any()) continue;
-        from[k][i / 9][i / 3 % 3][i % 3] = &masks[k][i];
-        any[k] = true;
-      }
-    }
-    std::array<BlockMask, 3> reached;
-    for (const Kind k : {outside, inside, oblique})
-      if (any[k]) reached[k] = beside(from[k]);
-    BlockMask wanted = facing_sources(), beyond;
+  /// it; of the rest the side is that of the voxels beside.
+  void learn_last() {
+    const BlockMask outside = beside_sources(0), inside = beside_sources(1);
+    const BlockMask oblique = beside(around([](const Brick& b) -> const BlockMask& { return b.oblique; }));
+    const BlockMask straight = facing(around([](const Brick& b) -> const BlockMask& { return b.straight; }));
+    BlockMask wanted, beyond, beyond_inside;
     for (int z = begin_; z < end_; ++z) {
-      const std::uint64_t all = reached[outside].words[z] | reached[inside].words[z];
-      const std::uint64_t doubtful =
-          (reached[outside].words[z] & reached[inside].words[z]) | (all & brick_.contested.words[z]);
-      std::uint64_t& known = brick_.known[round_].words[z];
-      wanted.words[z] = (wanted.words[z] | reached[oblique].words[z] | doubtful) & ~known;
-      beyond.words[z] = all & ~wanted.words[z] & ~known;
+      const std::uint64_t all = (outside.words[z] | inside.words[z]) & ~brick_.known[round_].words[z];
+      const std::uint64_t doubtful = (outside.words[z] & inside.words[z]) | brick_.contested.words[z];
+      wanted.words[z] = all & (oblique.words[z] | straight.words[z] | doubtful);
+      beyond.words[z] = all & ~wanted.words[z];
+      beyond_inside.words[z] = beyond.words[z] & inside.words[z];
     }
     learn(wanted);
-    for (int z = begin_; z < end_; ++z) {
-      brick_.last_negative.words[z] |= beyond.words[z] & reached[inside].words[z];
-      brick_.known[round_].words[z] |= beyond.words[z];
+    if (!beyond.any() || !brick_.active.any()) return;
+    if (sides_depend_on(beyond, beyond_inside)) {
+      learn(beyond);
+      return;
     }
-    return beyond;
+    for (int z = begin_; z < end_; ++z) {
+      brick_.known[round_].words[z] |= beyond.words[z];
+      brick_.negative.words[z] |= beyond_inside.words[z];
+    }
   }
 
-  /// Whether voxels that nobody knows change sides with those `beyond`, some of which nobody may know either: then they
-  /// are forgotten again.
-  bool sides_depend_on(const BlockMask& beyond) {
-    if (!beyond.any() || !brick_.active.any()) return false;
-    const BlockMask negative = negative_of(brick_);
-    BlockMask less_negative = negative, less_known = brick_.known[round_];
+  /// Whether voxels that nobody knows would change sides if these were known, as not all of them may be.
+  [[nodiscard]] bool sides_depend_on(const BlockMask& beyond, const BlockMask& beyond_inside) const {
+    const BlockMask& known = brick_.known[round_];
+    BlockMask more_negative = brick_.negative, more_known = known;
     for (int z = begin_; z < end_; ++z) {
-      less_negative.words[z] &= ~beyond.words[z];
-      less_known.words[z] &= ~beyond.words[z];
+      more_negative.words[z] |= beyond_inside.words[z];
+      more_known.words[z] |= beyond.words[z];
     }
-    if (inside_of(negative, brick_.known[round_]).words == inside_of(less_negative, less_known).words) return false;
-    brick_.known[round_] = less_known;
-    for (int z = begin_; z < end_; ++z) brick_.last_negative.words[z] &= ~beyond.words[z];
-    return true;
+    return inside_of(more_negative, more_known).words != inside_of(brick_.negative, known).words;
   }
 
   void push(int round, const BlockMask& wanted) {
     const Targets targets(wanted, begin_, end_);
     // Where one of them may be beside, a layer beyond the brick included. Of the bricks around only what touches this
     // one counts.
-    bits::Neighbourhood only{};
-    only[1][1][1] = &wanted;
-    std::array<std::uint64_t, 10> reached;
-    bits::dilate_layers<-1, 1>(only, -1, 9, reached.data());
+    const std::array<std::uint64_t, 10> reached = beside_alone(wanted);
     const auto touching = [&reached](int dx, int dy, int z) {
       std::uint64_t w = reached[static_cast<std::size_t>(z + 1)];
       if (dx != 0) w = dx < 0 ? (w & bits::columns_below(1)) << 7 : w >> 7 & bits::columns_below(1);
@@ -202,9 +161,11 @@ class Step {
     for (int i = 0; i < 27; ++i) {
       const Brick* const from = brick_.around[i];
       if (from == nullptr) continue;
+      const auto& sources = from->source[static_cast<std::size_t>(round)];
       const int dx = i % 3 - 1, dy = i / 3 % 3 - 1, dz = i / 9 - 1;
       for (int z = std::max(begin_ - 1, dz * 8); z < std::min(end_ + 1, dz * 8 + 8); ++z) {
-        for (std::uint64_t w = from->source[round].words[z & 7] & touching(dx, dy, z); w != 0; w &= w - 1) {
+        for (std::uint64_t w = (sources[0].words[z & 7] | sources[1].words[z & 7]) & touching(dx, dy, z); w != 0;
+             w &= w - 1) {
           const int bit = std::countr_zero(w), x = (bit & 7) + 8 * dx, y = (bit >> 3) + 8 * dy;
           const PairBits beside = targets.beside(x, y, z);
           if (!beside.any()) continue;
@@ -221,22 +182,18 @@ class Step {
     push_({waiting.data(), count}, channels_, sums_);
   }
 
-  void know(int at, float distance) {
-    brick_.know(round_, at, distance, growth_);
-  }
-
   void repair_gaps() {
     for (int z = begin_; z < end_; ++z) {
       for (std::uint64_t w = brick_.repaired.words[z] & ~brick_.known[1].words[z]; w != 0; w &= w - 1) {
         const int at = z * 64 + std::countr_zero(w);
-        if (const auto distance = repair(at)) know(at, *distance);
+        if (const auto plane = repair(at)) brick_.know(round_, at, *plane, growth_);
       }
     }
   }
 
   /// A gap between samples that extraction bridges. As corner_value() does it: the mean of all neighbours' planes,
   /// weights 1 / m^2.
-  std::optional<float> repair(int at) {
+  std::optional<Plane> repair(int at) {
     sums_.clear(at, channels_);
     for (const Offset& o : kOffsets) {
       if (o.squared == 0) continue;
