@@ -83,17 +83,19 @@ void Band::collect_level(const Window& window, std::int32_t slab) {
       if (values.count == 0) continue;
       const std::uint32_t base = leaf->value_index(z * 64, window.brick_layers(level));
       const std::uint64_t near = leaf->near.words[z];
+      LayerMasks masks;
       for (std::uint64_t w = leaf->good.words[z] & leaf->valued.words[z]; w != 0; w &= w - 1) {
         const int bit = std::countr_zero(w), at = z * 64 + bit;
         const std::uint32_t i =
             base + static_cast<std::uint32_t>(std::popcount(near & ((std::uint64_t{1} << bit) - 1)));
-        const float d = values.channel(kDistance)[i] * per_voxel;
-        brick->plane[at] =
-            Plane{values.channel(kNormalX)[i], values.channel(kNormalX + 1)[i], values.channel(kNormalX + 2)[i], d};
-        brick->know(0, at, brick->plane[at], growth);
+        const Plane plane{values.channel(kNormalX)[i], values.channel(kNormalX + 1)[i], values.channel(kNormalX + 2)[i],
+                          values.channel(kDistance)[i] * per_voxel};
+        brick->plane[at] = plane;
+        masks.add(bit, plane, growth);
         for (std::size_t c = 0; c < settings_.channels.size(); ++c)
           brick->extra[c * 512 + at] = values.channel(settings_.channels[c])[i];
       }
+      brick->know(0, z, masks, growth);
     }
   });
 }
@@ -103,7 +105,9 @@ void Band::put(const Found& f) {
   const int at = offset_in_block(f.at);
   if (brick.known[0].test(at)) return;
   brick.plane[at] = Plane{f.normal[0], f.normal[1], f.normal[2], f.distance};
-  brick.know(0, at, brick.plane[at], growth_of(settings_));
+  LayerMasks masks;
+  masks.add(at & 63, brick.plane[at], growth_of(settings_));
+  brick.know(0, at >> 6, masks, growth_of(settings_));
   for (std::size_t c = 0; c < f.extra.size(); ++c) brick.extra[c * 512 + at] = f.extra[c];
 }
 

@@ -28,6 +28,26 @@ struct Growth {
   int rounds = 2;
 };
 
+/// What planes of a layer's voxels say, gathered without branches.
+struct LayerMasks {
+  std::uint64_t known = 0, active = 0, negative = 0, source = 0, oblique = 0, straight = 0;
+
+  void add(int bit, const Plane& plane, const Growth& growth) {
+    const float distance = plane[3], room = growth.band - std::abs(distance);
+    const auto set = [bit](bool on) { return std::uint64_t{on} << bit; };
+    known |= set(true);
+    active |= set(room > 0);
+    negative |= set(distance < 0);
+    source |= set(room > kShortestStep);
+    oblique |= set(room > kShortestOblique);
+    const float x = std::abs(plane[0]), y = std::abs(plane[1]), z = std::abs(plane[2]);
+    const auto stays = [room](float up) {
+      return static_cast<int>(up >= kShortestStep) & static_cast<int>(up <= room);
+    };
+    straight |= set((stays(x) | stays(y) | stays(z)) != 0);
+  }
+};
+
 /// 8^3 voxels.
 struct Brick {
   Block block;
@@ -50,20 +70,18 @@ struct Brick {
   std::vector<float> extra;      ///< 512 for each of BandSettings::channels
 
   [[nodiscard]] float distance(std::size_t at) const { return plane[at][3]; }
-  /// A voxel got its plane in a round.
-  void know(int round, int at, const Plane& of, const Growth& growth) {
-    const float distance = of[3], room = growth.band - std::abs(distance);
-    known[static_cast<std::size_t>(round)].set(at);
-    if (room > 0) active.set(at);
-    if (distance < 0) negative.set(at);
-    if (round == growth.rounds || !(room > kShortestStep)) return;
-    source[static_cast<std::size_t>(round)][distance < 0 ? 1 : 0].set(at);
+  /// Voxels of a layer got their planes in a round.
+  void know(int round, int layer, const LayerMasks& of, const Growth& growth) {
+    const auto z = static_cast<std::size_t>(layer), r = static_cast<std::size_t>(round);
+    known[r].words[z] |= of.known;
+    active.words[z] |= of.active;
+    negative.words[z] |= of.negative;
+    if (round == growth.rounds) return;
+    source[r][0].words[z] |= of.source & ~of.negative;
+    source[r][1].words[z] |= of.source & of.negative;
     if (round + 1 < growth.rounds) return;
-    if (room > kShortestOblique) oblique.set(at);
-    for (int axis = 0; axis < 3; ++axis) {
-      const float up = std::abs(of[axis]);
-      if (up >= kShortestStep && up < room) straight.set(at);
-    }
+    oblique.words[z] |= of.oblique;
+    straight.words[z] |= of.straight;
   }
 };
 

@@ -70,13 +70,18 @@ class Step {
     });
     push(round_ - 1, wanted);
     for (int r = 0; contested.any() && r < round_ - 1; ++r) push(r, contested);
-    for_each(wanted, [&](int at) {
-      if (!(sums_.weight[at] > 0)) return;
-      if (const auto plane = store(sums_, at, 0.5F, channels_, brick_))
-        brick_.know(round_, at, *plane, growth_);
-      else
-        brick_.contested.set(at);
-    });
+    for (int z = begin_; z < end_; ++z) {
+      LayerMasks masks;
+      for (std::uint64_t w = wanted.words[z]; w != 0; w &= w - 1) {
+        const int bit = std::countr_zero(w), at = z * 64 + bit;
+        if (!(sums_.weight[at] > 0)) continue;
+        if (const auto plane = store(sums_, at, 0.5F, channels_, brick_))
+          masks.add(bit, *plane, growth_);
+        else
+          brick_.contested.set(at);
+      }
+      brick_.know(round_, z, masks, growth_);
+    }
   }
 
   template <class Visit>
@@ -184,10 +189,12 @@ class Step {
 
   void repair_gaps() {
     for (int z = begin_; z < end_; ++z) {
+      LayerMasks masks;
       for (std::uint64_t w = brick_.repaired.words[z] & ~brick_.known[1].words[z]; w != 0; w &= w - 1) {
-        const int at = z * 64 + std::countr_zero(w);
-        if (const auto plane = repair(at)) brick_.know(round_, at, *plane, growth_);
+        const int bit = std::countr_zero(w);
+        if (const auto plane = repair(z * 64 + bit)) masks.add(bit, *plane, growth_);
       }
+      brick_.know(1, z, masks, growth_);
     }
   }
 
