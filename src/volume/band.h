@@ -29,7 +29,7 @@ class Band {
   Band(BandSettings settings, const Lattice& lattice);
   /// Takes the slab's corners, slab after slab. The slabs below and above must be finished, their values still there.
   void collect(const Window& window, std::int32_t slab);
-  /// Bricks in which nothing changes any more, in canonical order (z, y, x); with `end`, all that are left.
+  /// Bricks in which nothing changes any more, in canonical order (z, then as BrickMap has them); with `end`, all that are left.
   std::vector<std::unique_ptr<Brick>> pop(bool end);
   /// Bricks that were popped and are done with.
   void give_back(std::vector<std::unique_ptr<Brick>> bricks) { bricks_.give_back(std::move(bricks)); }

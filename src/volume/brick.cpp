@@ -72,9 +72,9 @@ std::vector<std::unique_ptr<Brick>> BrickMap::take_lowest() {
     for (std::size_t i = 18; i < 27; ++i)
       if (brick->around[i] != nullptr) brick->around[i]->around[26 - i] = nullptr;
   layers_.erase(layers_.begin());
-  std::sort(out.begin(), out.end(), [](const auto& a, const auto& b) {
-    return std::pair(a->block.y, a->block.x) < std::pair(b->block.y, b->block.x);
-  });
+  // A node of OpenVDB's is 16 leaves wide.
+  const auto key = [](const Block& b) { return std::array{b.y >> 4, b.x >> 4, b.y, b.x}; };
+  std::sort(out.begin(), out.end(), [&](const auto& a, const auto& b) { return key(a->block) < key(b->block); });
   return out;
 }
 

@@ -102,7 +102,7 @@ class BrickMap {
     if (layer == layers_.end()) return;
     for (const auto& brick : layer->second.bricks) visit(*brick);
   }
-  /// Takes the lowest layer out, in canonical order (y, x).
+  /// Takes the lowest layer out, in canonical order: by squares of 16 bricks and inside them by y, x.
   std::vector<std::unique_ptr<Brick>> take_lowest();
   /// Bricks taken out, to be used again: fresh memory costs more than growing the band in it.
   void give_back(std::vector<std::unique_ptr<Brick>> bricks);

@@ -71,6 +71,7 @@ BrickLeaves LeafMaker::operator()(const Brick& brick) const {
   BrickLeaves out;
   if (!brick.active.any()) return out;
   out.any = true;
+  out.leaves.reserve(1 + extras.size());
   LeafMasks masks{with_axes(brick.active, axes), with_axes(inside_of(brick.negative, band.all(brick)), axes)};
   // The active voxels of the brick in the leaf's order.
   std::array<std::uint16_t, 512> order;

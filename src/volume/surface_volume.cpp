@@ -172,11 +172,11 @@ void SurfaceVolume::Impl::emit(LevelGrid& level, bool end) {
   std::vector<BrickLeaves> leaves(bricks.size());
   tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t i) { leaves[i] = make(*bricks[i]); });
   level.band.give_back(std::move(bricks));
-  for (const BrickLeaves& b : leaves) {
-    if (!b.any) continue;
-    stats.voxels += b.leaves[0].active;
-    for (std::size_t g = 0; g < b.leaves.size(); ++g) files.back()->add(level.numbers[g], b.leaves[g]);
-  }
+  for (const BrickLeaves& b : leaves)
+    if (b.any) stats.voxels += b.leaves[0].active;
+  for (std::size_t g = 0; g < level.numbers.size(); ++g)
+    for (const BrickLeaves& b : leaves)
+      if (b.any) files.back()->add(level.numbers[g], b.leaves[g]);
 }
 
 void SurfaceVolume::Impl::set_open(bool open) {
