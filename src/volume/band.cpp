@@ -83,7 +83,7 @@ void Band::collect_level(const Window& window, std::int32_t slab) {
       if (values.count == 0) continue;
       const std::uint32_t base = leaf->value_index(z * 64, window.brick_layers(level));
       const std::uint64_t near = leaf->near.words[z];
-      LayerMasks masks;
+      LayerMasks masks(0, growth);
       for (std::uint64_t w = leaf->good.words[z] & leaf->valued.words[z]; w != 0; w &= w - 1) {
         const int bit = std::countr_zero(w), at = z * 64 + bit;
         const std::uint32_t i =
@@ -91,11 +91,11 @@ void Band::collect_level(const Window& window, std::int32_t slab) {
         const Plane plane{values.channel(kNormalX)[i], values.channel(kNormalX + 1)[i], values.channel(kNormalX + 2)[i],
                           values.channel(kDistance)[i] * per_voxel};
         brick->plane[at] = plane;
-        masks.add(bit, plane, growth);
+        masks.add(bit, plane);
         for (std::size_t c = 0; c < settings_.channels.size(); ++c)
           brick->extra[c * 512 + at] = values.channel(settings_.channels[c])[i];
       }
-      brick->know(0, z, masks, growth);
+      brick->know(z, masks);
     }
   });
 }
@@ -105,9 +105,9 @@ void Band::put(const Found& f) {
   const int at = offset_in_block(f.at);
   if (brick.known[0].test(at)) return;
   brick.plane[at] = Plane{f.normal[0], f.normal[1], f.normal[2], f.distance};
-  LayerMasks masks;
-  masks.add(at & 63, brick.plane[at], growth_of(settings_));
-  brick.know(0, at >> 6, masks, growth_of(settings_));
+  LayerMasks masks(0, growth_of(settings_));
+  masks.add(at & 63, brick.plane[at]);
+  brick.know(at >> 6, masks);
   for (std::size_t c = 0; c < f.extra.size(); ++c) brick.extra[c * 512 + at] = f.extra[c];
 }
 

@@ -1,6 +1,9 @@
 // A piece of the band, and where its neighbours are.
 #pragma once
+#include <xmmintrin.h>
+
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -28,24 +31,36 @@ struct Growth {
   int rounds = 2;
 };
 
-/// What planes of a layer's voxels say, gathered without branches.
-struct LayerMasks {
-  std::uint64_t known = 0, active = 0, negative = 0, source = 0, oblique = 0, straight = 0;
+/// What the planes say that voxels of a layer get in a round, gathered without branches.
+class LayerMasks {
+ public:
+  LayerMasks(int of_round, const Growth& growth)
+      : round(static_cast<std::size_t>(of_round)),
+        steps(of_round + 1 == growth.rounds),
+        grows(of_round < growth.rounds),
+        band_(growth.band) {}
 
-  void add(int bit, const Plane& plane, const Growth& growth) {
-    const float distance = plane[3], room = growth.band - std::abs(distance);
+  void add(int bit, const Plane& plane) {
+    const float distance = plane[3], room = band_ - std::abs(distance);
     const auto set = [bit](bool on) { return std::uint64_t{on} << bit; };
     known |= set(true);
     active |= set(room > 0);
     negative |= set(distance < 0);
     source |= set(room > kShortestStep);
+    if (!steps) return;
     oblique |= set(room > kShortestOblique);
-    const float x = std::abs(plane[0]), y = std::abs(plane[1]), z = std::abs(plane[2]);
-    const auto stays = [room](float up) {
-      return static_cast<int>(up >= kShortestStep) & static_cast<int>(up <= room);
-    };
-    straight |= set((stays(x) | stays(y) | stays(z)) != 0);
+    const auto up = _mm_andnot_ps(_mm_set1_ps(-0.0F), std::bit_cast<__m128>(plane));
+    const auto stays = _mm_and_ps(_mm_cmpge_ps(up, _mm_set1_ps(kShortestStep)), _mm_cmple_ps(up, _mm_set1_ps(room)));
+    straight |= set((_mm_movemask_ps(stays) & 7) != 0);
   }
+
+  const std::size_t round;
+  const bool steps;  ///< of the last round that anything grows from: `oblique` and `straight` are asked for
+  const bool grows;
+  std::uint64_t known = 0, active = 0, negative = 0, source = 0, oblique = 0, straight = 0;
+
+ private:
+  float band_;
 };
 
 /// 8^3 voxels.
@@ -70,16 +85,14 @@ struct Brick {
   std::vector<float> extra;      ///< 512 for each of BandSettings::channels
 
   [[nodiscard]] float distance(std::size_t at) const { return plane[at][3]; }
-  /// Voxels of a layer got their planes in a round.
-  void know(int round, int layer, const LayerMasks& of, const Growth& growth) {
-    const auto z = static_cast<std::size_t>(layer), r = static_cast<std::size_t>(round);
-    known[r].words[z] |= of.known;
+  void know(int layer, const LayerMasks& of) {
+    const auto z = static_cast<std::size_t>(layer);
+    known[of.round].words[z] |= of.known;
     active.words[z] |= of.active;
     negative.words[z] |= of.negative;
-    if (round == growth.rounds) return;
-    source[r][0].words[z] |= of.source & ~of.negative;
-    source[r][1].words[z] |= of.source & of.negative;
-    if (round + 1 < growth.rounds) return;
+    if (!of.grows) return;
+    source[of.round][0].words[z] |= of.source & ~of.negative;
+    source[of.round][1].words[z] |= of.source & of.negative;
     oblique.words[z] |= of.oblique;
     straight.words[z] |= of.straight;
   }

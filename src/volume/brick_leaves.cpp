@@ -67,11 +67,11 @@ LeafMaker::LeafMaker(const Band& b, const GridFrame& g, const std::vector<ExtraG
   }
 }
 
-BrickLeaves LeafMaker::operator()(const Brick& brick) const {
-  BrickLeaves out;
-  if (!brick.active.any()) return out;
+void LeafMaker::operator()(const Brick& brick, BrickLeaves& out) const {
+  out.any = false;
+  if (!brick.active.any()) return;
   out.any = true;
-  out.leaves.reserve(1 + extras.size());
+  out.leaves.resize(1 + extras.size());
   LeafMasks masks{with_axes(brick.active, axes), with_axes(inside_of(brick.negative, band.all(brick)), axes)};
   // The active voxels of the brick in the leaf's order.
   std::array<std::uint16_t, 512> order;
@@ -88,11 +88,13 @@ BrickLeaves LeafMaker::operator()(const Brick& brick) const {
   const std::span<const float> scalars{values.data(), count}, vectors{values.data(), 3 * count};
   const auto voxel = static_cast<float>(grid.voxel);
   for (std::size_t i = 0; i < count; ++i) values[i] = brick.distance(order[i]) * voxel;
-  out.leaves.push_back(pack(origin, masks, scalars, 1, half));
-  out.leaves.back().faces = face_votes(masks.active, masks.inside);
+  pack(origin, masks, scalars, 1, half, out.leaves[0]);
+  out.leaves[0].faces = face_votes(masks.active, masks.inside);
 
   masks.inside = {};
-  for (const ExtraGrid& extra : extras) {
+  for (std::size_t e = 0; e < extras.size(); ++e) {
+    const ExtraGrid& extra = extras[e];
+    PackedLeaf& leaf = out.leaves[1 + e];
     const auto value = [&](std::size_t k, int at) {
       return extra.scale *
              brick.extra[static_cast<std::size_t>(extra.channels[k]) * 512 + static_cast<std::size_t>(at)];
@@ -104,7 +106,7 @@ BrickLeaves LeafMaker::operator()(const Brick& brick) const {
         const float own = brick.known[0].test(order[i]) ? std::max(0.0F, 1 - value(0, order[i])) : 0.0F;
         values[i] = weight ? own : value(0, order[i]);
       }
-      out.leaves.push_back(pack(origin, masks, scalars, 1, half));
+      pack(origin, masks, scalars, 1, half, leaf);
       continue;
     }
     for (std::size_t i = 0; i < count; ++i) {
@@ -118,9 +120,8 @@ BrickLeaves LeafMaker::operator()(const Brick& brick) const {
         for (int k = 0; k < 3; ++k) v[k] = static_cast<float>(n[k]);
       }
     }
-    out.leaves.push_back(pack(origin, masks, vectors, 3, half));
+    pack(origin, masks, vectors, 3, half, leaf);
   }
-  return out;
 }
 
 }  // namespace lamina::volume

@@ -71,16 +71,16 @@ class Step {
     push(round_ - 1, wanted);
     for (int r = 0; contested.any() && r < round_ - 1; ++r) push(r, contested);
     for (int z = begin_; z < end_; ++z) {
-      LayerMasks masks;
+      LayerMasks masks(round_, growth_);
       for (std::uint64_t w = wanted.words[z]; w != 0; w &= w - 1) {
         const int bit = std::countr_zero(w), at = z * 64 + bit;
         if (!(sums_.weight[at] > 0)) continue;
         if (const auto plane = store(sums_, at, 0.5F, channels_, brick_))
-          masks.add(bit, *plane, growth_);
+          masks.add(bit, *plane);
         else
           brick_.contested.set(at);
       }
-      brick_.know(round_, z, masks, growth_);
+      brick_.know(z, masks);
     }
   }
 
@@ -189,12 +189,12 @@ class Step {
 
   void repair_gaps() {
     for (int z = begin_; z < end_; ++z) {
-      LayerMasks masks;
+      LayerMasks masks(round_, growth_);
       for (std::uint64_t w = brick_.repaired.words[z] & ~brick_.known[1].words[z]; w != 0; w &= w - 1) {
         const int bit = std::countr_zero(w);
-        if (const auto plane = repair(z * 64 + bit)) masks.add(bit, *plane, growth_);
+        if (const auto plane = repair(z * 64 + bit)) masks.add(bit, *plane);
       }
-      brick_.know(1, z, masks, growth_);
+      brick_.know(z, masks);
     }
   }
 

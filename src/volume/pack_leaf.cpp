@@ -24,7 +24,6 @@ void put_compressed(std::string& to, const void* data, std::size_t bytes, std::s
   const bool smaller = size > 0 && static_cast<std::size_t>(size) < bytes;
   const std::size_t stored = smaller ? static_cast<std::size_t>(size) : bytes;
   if (!smaller) size = -static_cast<std::int64_t>(bytes);
-  to.reserve(to.size() + sizeof size + stored);
   put(to, &size, sizeof size);
   put(to, smaller ? packed.data() : data, stored);
 }
@@ -88,9 +87,10 @@ std::array<std::int8_t, 6> face_votes(const BlockMask& active, const BlockMask& 
   return out;
 }
 
-PackedLeaf pack(const openvdb::Coord& origin, const LeafMasks& masks, std::span<const float> values, int width,
-                bool half) {
-  PackedLeaf out;
+void pack(const openvdb::Coord& origin, const LeafMasks& masks, std::span<const float> values, int width, bool half,
+          PackedLeaf& out) {
+  out.bytes.clear();
+  out.faces = {};
   out.origin = origin;
   out.active = static_cast<std::uint32_t>(values.size() / static_cast<std::size_t>(width));
   out.box = box_of(origin, masks.active);
@@ -99,7 +99,6 @@ PackedLeaf pack(const openvdb::Coord& origin, const LeafMasks& masks, std::span<
     inside.words[x] = masks.inside.words[x] & ~masks.active.words[x];
     outside.words[x] = ~masks.inside.words[x] & ~masks.active.words[x];
   }
-  out.bytes.reserve(2 * sizeof(BlockMask) + 16 + values.size_bytes());
   put(out.bytes, masks.active.words.data(), sizeof masks.active.words);
   const char kind = !inside.any()   ? openvdb::io::NO_MASK_OR_INACTIVE_VALS
                     : outside.any() ? openvdb::io::MASK_AND_NO_INACTIVE_VALS
@@ -108,13 +107,12 @@ PackedLeaf pack(const openvdb::Coord& origin, const LeafMasks& masks, std::span<
   if (kind == openvdb::io::MASK_AND_NO_INACTIVE_VALS) put(out.bytes, outside.words.data(), sizeof outside.words);
   if (!half) {
     put_compressed(out.bytes, values.data(), values.size_bytes(), sizeof(float));
-    return out;
+    return;
   }
   static const Halve halve_fast = fastest_halve();
   std::array<std::uint16_t, 3 * 512> halves;
   halve_fast(values, halves.data());
   put_compressed(out.bytes, halves.data(), values.size() * sizeof halves[0], sizeof halves[0]);
-  return out;
 }
 
 }  // namespace lamina::volume

@@ -58,7 +58,8 @@ RC_GTEST_PROP(PackLeaf, IsWhatOpenVdbReadsAndVotesFor, ()) {
     }
   }
   if (values.empty()) return;
-  const PackedLeaf packed = pack(origin, masks, values, 1, half);
+  PackedLeaf packed;
+  pack(origin, masks, values, 1, half, packed);
   FloatTree::LeafNodeType back(origin, 0);
   read_back(packed, kBackground, half, back);
   for (openvdb::Index at = 0; at < 512; ++at) {
@@ -80,7 +81,8 @@ RC_GTEST_PROP(PackLeaf, HoldsVectors, (bool half)) {
     masks.active.set(at);
     for (int k = 0; k < 3; ++k) values.push_back(static_cast<float>(at - 200 * k));
   }
-  const PackedLeaf packed = pack({}, masks, values, 3, half);
+  PackedLeaf packed;
+  pack({}, masks, values, 3, half, packed);
   Vec3STree::LeafNodeType back;
   read_back(packed, openvdb::Vec3s(0), half, back);
   std::size_t next = 0;
