@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <iterator>
 #include <utility>
 
 #include "project/corner_value.h"
@@ -260,17 +259,17 @@ void Band::advance(bool end) {
   }
 }
 
-std::vector<std::unique_ptr<Brick>> Band::pop(bool end) {
+std::vector<Brick*> Band::pop(bool end) {
   advance(end);
-  std::vector<std::unique_ptr<Brick>> out;
+  std::vector<Brick*> out;
   // A layer's last plane is still read by the round of the plane above.
   const std::int32_t done = done_[settings_.rounds] - (settings_.rounds > 0 ? 1 : 0);
   while (!bricks_.empty() && begun_ && (end || bricks_.lowest() * 8 + 8 < done)) {
-    std::vector<std::unique_ptr<Brick>> layer = bricks_.take_lowest();
-    const auto full = std::stable_partition(layer.begin(), layer.end(), [](const auto& b) { return b->active.any(); });
-    std::move(layer.begin(), full, std::back_inserter(out));
+    std::vector<Brick*> layer = bricks_.take_lowest();
+    const auto full = std::stable_partition(layer.begin(), layer.end(), [](const Brick* b) { return b->active.any(); });
+    out.insert(out.end(), layer.begin(), full);
     layer.erase(layer.begin(), full);
-    bricks_.give_back(std::move(layer));
+    bricks_.give_back(layer);
   }
   return out;
 }

@@ -3,7 +3,6 @@
 #pragma once
 #include <array>
 #include <cstdint>
-#include <memory>
 #include <utility>
 #include <vector>
 
@@ -29,10 +28,11 @@ class Band {
   Band(BandSettings settings, const Lattice& lattice);
   /// Takes the slab's corners, slab after slab. The slabs below and above must be finished, their values still there.
   void collect(const Window& window, std::int32_t slab);
-  /// Bricks in which nothing changes any more, in canonical order (z, then as BrickMap has them); with `end`, all that are left.
-  std::vector<std::unique_ptr<Brick>> pop(bool end);
+  /// Bricks in which nothing changes any more, in canonical order (z, then as BrickMap has them); with `end`, all that
+  /// are left.
+  std::vector<Brick*> pop(bool end);
   /// Bricks that were popped and are done with.
-  void give_back(std::vector<std::unique_ptr<Brick>> bricks) { bricks_.give_back(std::move(bricks)); }
+  void give_back(const std::vector<Brick*>& bricks) { bricks_.give_back(bricks); }
   /// After pop(true): the memory of those given back.
   void free_spare() { bricks_.free_spare(); }
   [[nodiscard]] const BandSettings& settings() const { return settings_; }

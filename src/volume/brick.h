@@ -102,7 +102,10 @@ struct Brick {
 class BrickMap {
  public:
   /// `rounds`: that the band grows by; `channels`: beside distance and normal.
-  BrickMap(int rounds, std::size_t channels) : rounds_(rounds), channels_(channels) {}
+  BrickMap(int rounds, std::size_t channels);
+  ~BrickMap();
+  BrickMap(BrickMap&& other) noexcept;
+  BrickMap& operator=(BrickMap&& other) = delete;
 
   [[nodiscard]] bool empty() const { return layers_.empty(); }
   /// The block z of the lowest bricks.
@@ -113,30 +116,35 @@ class BrickMap {
   void for_each(std::int32_t block_z, const Visit& visit) {
     const auto layer = layers_.find(block_z);
     if (layer == layers_.end()) return;
-    for (const auto& brick : layer->second.bricks) visit(*brick);
+    for (Brick* const brick : layer->second.bricks) visit(*brick);
   }
   /// Takes the lowest layer out, in canonical order: by squares of 16 bricks and inside them by y, x.
-  std::vector<std::unique_ptr<Brick>> take_lowest();
+  std::vector<Brick*> take_lowest();
   /// Bricks taken out, to be used again: fresh memory costs more than growing the band in it.
-  void give_back(std::vector<std::unique_ptr<Brick>> bricks);
-  void free_spare() { spare_ = std::vector<std::unique_ptr<Brick>>(); }
+  void give_back(const std::vector<Brick*>& bricks);
+  /// When none is in use.
+  void free_spare();
 
  private:
   /// Bricks of one z in order of arrival, and a table of them by y, x with open addressing.
   struct Layer {
-    std::vector<std::unique_ptr<Brick>> bricks;
+    std::vector<Brick*> bricks;
     std::vector<Brick*> slots = std::vector<Brick*>(64, nullptr);  ///< a power of two, half of it empty
 
     /// The place of the brick, or the empty one where it would be.
     std::size_t slot_of(std::int32_t y, std::int32_t x) const;
     [[nodiscard]] Brick* find(std::int32_t y, std::int32_t x) const { return slots[slot_of(y, x)]; }
-    void add(std::unique_ptr<Brick> brick);
+    void add(Brick& brick);
   };
 
   int rounds_;
   std::size_t channels_;
   std::map<std::int32_t, Layer> layers_;  ///< by block z
-  std::vector<std::unique_ptr<Brick>> spare_;
+  /// Bricks lie side by side in large pages: looking at twenty-seven at a time would miss the processor's table of
+  /// pages at every step.
+  class Slab;
+  std::vector<std::unique_ptr<Slab>> slabs_;
+  std::vector<Brick*> spare_;
 };
 
 }  // namespace lamina::volume

@@ -162,7 +162,7 @@ void SurfaceVolume::Impl::begin_file() {
 }
 
 void SurfaceVolume::Impl::emit(LevelGrid& level, bool end) {
-  std::vector<std::unique_ptr<Brick>> bricks = level.band.pop(end);
+  std::vector<Brick*> bricks = level.band.pop(end);
   if (bricks.empty()) return;
   constexpr std::uint64_t kLeafBytes = 512 * sizeof(float) + 112;
   if (settings.split > 0 && files.back()->leaves() * kLeafBytes >= settings.split) {
@@ -174,7 +174,7 @@ void SurfaceVolume::Impl::emit(LevelGrid& level, bool end) {
   if (leaves.size() < bricks.size()) leaves.resize(bricks.size());
   const std::span<BrickLeaves> made{leaves.data(), bricks.size()};
   tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t i) { make(*bricks[i], made[i]); });
-  level.band.give_back(std::move(bricks));
+  level.band.give_back(bricks);
   for (const BrickLeaves& b : made)
     if (b.any) stats.voxels += b.leaves[0].active;
   for (std::size_t g = 0; g < level.numbers.size(); ++g)
