@@ -26,6 +26,7 @@ typedef float Plane __attribute__((vector_size(16)));  // NOLINT(modernize-use-u
 /// three at once by more.
 inline constexpr float kShortestStep = 0.5F, kShortestOblique = 1.118F;
 
+/// How far the band grows.
 struct Growth {
   float band = 3;  ///< half width, voxels
   int rounds = 2;
@@ -56,7 +57,7 @@ class LayerMasks {
 
   const std::size_t round;
   const bool steps;  ///< of the last round that anything grows from: `oblique` and `straight` are asked for
-  const bool grows;
+  const bool grows;  ///< anything grows from this round
   std::uint64_t known = 0, active = 0, negative = 0, source = 0, oblique = 0, straight = 0;
 
  private:
@@ -68,7 +69,8 @@ struct Brick {
   Block block;
   /// The bricks around, x fastest, itself in the middle; null where there is none.
   std::array<Brick*, 27> around;
-  /// By round: the projected voxels first; last also voxels beyond the band of which no more is known than the side.
+  /// By round: the projected voxels first, the whole band last, there also voxels beyond it of which the side alone
+  /// is known.
   std::array<BlockMask, kMaxRounds + 1> known;
   /// By round: the voxels new in it that the band grows from, outside and inside.
   std::array<std::array<BlockMask, 2>, kMaxRounds> source;
@@ -85,6 +87,7 @@ struct Brick {
   std::vector<float> extra;      ///< 512 for each of BandSettings::channels
 
   [[nodiscard]] float distance(std::size_t at) const { return plane[at][3]; }
+  /// Takes over what was gathered of a layer, its planes written.
   void know(int layer, const LayerMasks& of) {
     const auto z = static_cast<std::size_t>(layer);
     known[of.round].words[z] |= of.known;

@@ -122,7 +122,8 @@ class Step {
     BlockMask wanted, beyond, beyond_inside;
     for (int z = begin_; z < end_; ++z) {
       const std::uint64_t all = (outside.words[z] | inside.words[z]) & ~brick_.known[round_].words[z];
-      const std::uint64_t doubtful = (outside.words[z] & inside.words[z]) | brick_.contested.words[z];
+      const std::uint64_t doubtful =
+          (outside.words[z] & inside.words[z]) | brick_.contested.words[z] | brick_.repaired.words[z];
       wanted.words[z] = all & (oblique.words[z] | straight.words[z] | doubtful);
       beyond.words[z] = all & ~wanted.words[z];
       beyond_inside.words[z] = beyond.words[z] & inside.words[z];
