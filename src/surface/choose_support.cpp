@@ -39,10 +39,12 @@ SupportChoice choose_support(const SurfaceSettings& settings, const RadiusSurvey
     out.cell = {kCell, Length::Unit::sample_radius};
     out.good_reach = 0.25F;
     out.good_samples = 4;
-    // Around thin things cells are half as large: values must reach over as many more of them.
-    out.thin_cells = !settings.cell;
-    out.band = 4;
     out.watertight = true;
+    if (!settings.cell) {
+      // Around thin things cells are half as large: values must reach over as many more of them.
+      out.thin_cells = true;
+      out.band = 4;
+    }
   }
   if (settings.cell) out.cell = *settings.cell;
   if (settings.watertight) out.watertight = *settings.watertight;
