@@ -91,7 +91,7 @@ std::uint64_t expected_disk(const SlabStore& store, std::uint64_t faces) {
 double expected_volume_memory(const SurfaceSettings& s, const Resolved& r, double per_slab, double cells,
                               std::uint64_t samples, std::size_t attributes) {
   if (s.volume.path.empty()) return 0;
-  constexpr double kCellsPerBrick = 25, kPlanes = 24, kBrick = 9.1e3, kRecords = 60, kBuffers = 4e6;
+  constexpr double kCellsPerBrick = 25, kPlanes = 24, kBrick = 10.4e3, kRecords = 60, kBuffers = 4e6;
   const double extra = attributes > 0 ? 3 * 2048.0 * static_cast<double>(s.volume.grids.size()) : 0;
   const double per_plane = per_slab * cells / r.lattice.layers(r.main_level);
   const double bricks = std::min(per_plane * kPlanes, static_cast<double>(samples) * cells) / kCellsPerBrick;
