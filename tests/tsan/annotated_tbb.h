@@ -5,18 +5,8 @@
 // Jobs that run side by side get no order among them: their races are found. Stages of a pipeline are the exception:
 // every stage waits for all that ended before it began.
 #pragma once
-#include <tbb/blocked_range.h>
-#include <tbb/combinable.h>
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
-#include <tbb/parallel_pipeline.h>
-#include <tbb/parallel_reduce.h>
-#include <tbb/parallel_sort.h>
-#include <tbb/partitioner.h>
-#include <tbb/task_arena.h>
-#include <tbb/task_group.h>
+// All of it: no header of TBB may come after the name is another's.
+#include <tbb/tbb.h>
 
 #include <algorithm>
 #include <memory>
