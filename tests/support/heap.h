@@ -3,7 +3,7 @@
 #include <malloc.h>
 
 #include <cstddef>
-#include <memory>
+#include <string>
 
 namespace lamina::test {
 
@@ -16,9 +16,8 @@ inline std::size_t heap_bytes() {
 inline bool heap_is_counted() {
   constexpr std::size_t kProbe = std::size_t{1} << 22;
   const std::size_t before = heap_bytes();
-  const std::unique_ptr<char[]> probe(new char[kProbe]);
-  probe[kProbe / 2] = 1;
-  return heap_bytes() >= before + kProbe;
+  const std::string probe(kProbe, 'x');
+  return heap_bytes() >= before + kProbe && probe.find('y') == std::string::npos;
 }
 
 }  // namespace lamina::test
