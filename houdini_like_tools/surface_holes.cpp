@@ -9,6 +9,17 @@ void add_hole_options(CLI::App& tool, SurfaceSettings& settings, const std::stri
       ->type_name("RADII")
       ->capture_default_str()
       ->group(group);
+  tool.add_option_function<std::string>(
+          "--watertight",
+          [&settings](const std::string& word) {
+            settings.watertight = word == "auto" ? std::nullopt : std::optional(word == "yes");
+          },
+          "close all holes, whatever lies around, unless a rim longer than three times --close-holes shows that the "
+          "surface is an open one; auto: where --blend auto finds a clean, even cloud")
+      ->check(CLI::IsMember({"auto", "yes", "no"}))
+      ->type_name("auto|yes|no")
+      ->default_str("auto")
+      ->group(group);
 }
 
 nlohmann::ordered_json holes_json(const HoleStats& h) {

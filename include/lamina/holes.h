@@ -18,6 +18,16 @@ struct OpenLoop {
   std::string reason;
 };
 
+/// Which boundary loops are closed.
+struct HoleSettings {
+  double longest =
+      8;  ///< of loops that are closed where the surface around tells how, in local influence radii; 0: none
+  /// Where no loop is longer than kWatertight times that, the cloud is of a closed thing: its loops are all closed,
+  /// whatever lies around, by the surface of least area.
+  bool watertight = false;
+  static constexpr double kWatertight = 3;
+};
+
 struct HoleStats {
   std::uint64_t closed = 0, closed_edges = 0;
   std::uint64_t vertices = 0, triangles = 0;  ///< added

@@ -59,7 +59,7 @@ struct SurfaceSettings {
   double boundary = 0;         ///< isovertices whose corners' projections lie farther than this from the average of
                                ///< their samples (in R) are rejected; 0: no limit
   ClusterMode cluster = ClusterMode::preserving;
-  double chord = 0.17;         ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
+  double chord = 0.2;          ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
   bool vertex_levels = false;  ///< give vertices an attribute `level`: of the octree, 0 the finest
   /// Give vertices an attribute `curvature`: mean curvature of the fitted sphere, 1 / input unit, positive where the
   /// surface is convex seen from outside.
@@ -68,6 +68,9 @@ struct SurfaceSettings {
   /// it goes on; 0: none, and none with ClusterMode::free. R is taken from the octree's cells, which follow it by
   /// powers of two.
   double close_holes = 8;
+  /// Where no loop is longer than three times that, the cloud is of a closed thing, and all loops are closed. Unset:
+  /// chosen where `blend` is, else not.
+  std::optional<bool> watertight;
   std::uint64_t prune_triangles = 0;  ///< connected parts of the mesh with fewer triangles are left out
   Length prune_size;     ///< parts whose box has a shorter diagonal, too; `r`, `R`: of the median sample; 0: none
   bool local = false;    ///< write coordinates less a shift (SurfaceStats::shift), which floats then hold

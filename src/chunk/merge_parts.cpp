@@ -47,7 +47,7 @@ void require_successive(const std::vector<PartReader>& parts) {
 /// What closes the holes of the whole mesh; counts it.
 holes::Addition close_holes(const std::vector<PartReader>& parts, MergedParts& merged) {
   const PartInfo& info = parts.front().info();
-  holes::HoleCloser closer(info.close_holes, info.attributes.size());
+  holes::HoleCloser closer(info.holes, info.attributes.size());
   std::uint64_t first = 0;
   for (const PartReader& part : parts) {
     if (!part.info().span.empty()) closer.add_part(part.read_rims(), first);

@@ -63,7 +63,8 @@ nlohmann::json to_json(const PartInfo& info) {
           {"double_positions", info.double_positions},
           {"attributes", attributes},
           {"comments", info.comments},
-          {"close_holes", info.close_holes},
+          {"close_holes", info.holes.longest},
+          {"watertight", info.holes.watertight},
           {"vertices", info.vertices},
           {"triangles", info.triangles},
           {"below", to_json(info.below)},
@@ -83,7 +84,7 @@ PartInfo info_from(const nlohmann::json& j) {
     info.attributes.push_back({a.at("name").get<std::string>(), *type});
   }
   info.comments = j.at("comments").get<std::vector<std::string>>();
-  info.close_holes = j.at("close_holes").get<double>();
+  info.holes = {j.at("close_holes").get<double>(), j.at("watertight").get<bool>()};
   info.vertices = j.at("vertices").get<std::uint64_t>();
   info.triangles = j.at("triangles").get<std::uint64_t>();
   info.below = mark_from(j.at("below"));

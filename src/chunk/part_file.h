@@ -29,7 +29,7 @@ struct PartInfo {
   bool double_positions = false;
   AttributeLayout attributes;
   std::vector<std::string> comments;
-  double close_holes = 0;  ///< SurfaceSettings::close_holes, where it applies
+  HoleSettings holes;
   std::uint64_t vertices = 0, triangles = 0;
   SlabMark below;  ///< the slab before the first, as this part's run has it
   SlabMark last;   ///< the last slab

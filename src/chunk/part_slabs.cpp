@@ -34,8 +34,9 @@ void make_relative(const std::vector<std::array<std::uint32_t, 3>>& triangles, s
   }
 }
 
-PartSlabs::PartSlabs(std::vector<Part> parts, int count, std::uint64_t job, double close_holes, MeshSinkSettings layout)
-    : parts_(std::move(parts)), count_(count), job_(job), close_holes_(close_holes), layout_(std::move(layout)) {}
+PartSlabs::PartSlabs(std::vector<Part> parts, int count, std::uint64_t job, const HoleSettings& holes,
+                     MeshSinkSettings layout)
+    : parts_(std::move(parts)), count_(count), job_(job), holes_(holes), layout_(std::move(layout)) {}
 
 void PartSlabs::open() {
   writer_.emplace(parts_[at_].path, layout_);
@@ -44,7 +45,7 @@ void PartSlabs::open() {
   info_.number = parts_[at_].number;
   info_.count = count_;
   info_.span = parts_[at_].span;
-  info_.close_holes = close_holes_;
+  info_.holes = holes_;
   info_.below = previous_;
   first_ = numbered_;
   finder_ = holes::RimFinder(first_, below_);

@@ -19,8 +19,8 @@ class PartSlabs : public SlabSink {
     SlabSpan span;
     std::string path;
   };
-  /// `job`, `count`, `close_holes`: of every part (PartInfo).
-  PartSlabs(std::vector<Part> parts, int count, std::uint64_t job, double close_holes, MeshSinkSettings layout);
+  /// `job`, `count`, `holes`: of every part (PartInfo).
+  PartSlabs(std::vector<Part> parts, int count, std::uint64_t job, const HoleSettings& holes, MeshSinkSettings layout);
 
   /// Slabs below the first part only tell what it stands on.
   void write(const FinalSlab& slab, const VertexBatch& vertices) override;
@@ -37,7 +37,7 @@ class PartSlabs : public SlabSink {
   std::vector<Part> parts_;
   int count_;
   std::uint64_t job_;
-  double close_holes_;
+  HoleSettings holes_;
   MeshSinkSettings layout_;
   std::size_t at_ = 0;  ///< part that the next slab may belong to
   std::optional<PartWriter> writer_;

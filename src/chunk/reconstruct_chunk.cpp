@@ -29,7 +29,7 @@ ChunkStats run_chunk(const SurfaceSettings& settings, const Chunk& chunk, const 
   stats.slabs = span.end - span.begin;
   stats.all_slabs = all.end - all.begin;
   const std::uint64_t job = job_hash(settings, kept_input_id(settings.input), resolved);
-  PartSlabs parts({{chunk.number, span, settings.output}}, chunk.count, job, longest_closed(settings),
+  PartSlabs parts({{chunk.number, span, settings.output}}, chunk.count, job, hole_settings(settings, resolved.support),
                   mesh_layout(settings, input, resolved));
   if (!span.empty()) {
     const SlabSpan projected = stage_spans(span, all, settings.diffuse).projected;

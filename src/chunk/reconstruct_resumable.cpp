@@ -131,7 +131,8 @@ class ResumableRun {
     if (folder_.resumed()) run_.info(fmt::format("{}: {} of {} parts are done", folder_.path(), done, count));
     if (left.empty()) return;
     const SlabSpan span{left.front().span.begin, all.end};
-    PartSlabs slabs(std::move(left), count, job, longest_closed(settings_), mesh_layout(settings_, input, resolved));
+    PartSlabs slabs(std::move(left), count, job, hole_settings(settings_, resolved.support),
+                    mesh_layout(settings_, input, resolved));
     if (!span.empty()) sweep(settings_, input, resolved, span, slabs, nullptr, run_, watch_, stats_);
     slabs.finish();
   }

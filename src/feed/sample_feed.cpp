@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "feed/thin_cells.h"
 #include "ground/resize_anew.h"
 
 namespace lamina {
@@ -215,6 +216,7 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
       out.level[i] = settings_.fixed_cell ? std::uint8_t{0} : level_for(static_cast<double>(r) * ratio, lattice_);
     }
   });
+  if (settings_.thin_cells && !settings_.fixed_cell) refine_thin(lattice_, out.samples, known.radius, out.level);
 }
 
 std::shared_ptr<const ActiveBucket> SampleFeed::fetch(std::size_t bucket) {

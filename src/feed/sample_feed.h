@@ -23,6 +23,7 @@ struct FeedSettings {
   float blend = 1;                      ///< H
   double cell_ratio = 0.9;              ///< a cell is split while larger than this times its smallest radius
   bool cell_follows_support = true;     ///< the smallest R_i = H r_i counts, else the smallest r_i
+  bool thin_cells = false;              ///< a level less where normals cancel (feed/thin_cells.h)
   bool fixed_cell = false;              ///< every sample asks for the finest level
   float max_radius = 0;                 ///< samples with a larger r_i are left out, steps; 0: none
   std::size_t cache_bytes = 64u << 20;  ///< memory for samples kept between uses

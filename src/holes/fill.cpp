@@ -327,6 +327,34 @@ Filling fill_loop(const Loop& loop, double longest) {
   return small.verdict == Verdict::filled ? small : filling;
 }
 
+Filling fill_any(const Loop& loop) {
+  const std::size_t n = loop.vertices.size();
+  if (n < 3) return refused(Verdict::bent);
+  if (is_triangle(loop)) return refused(Verdict::outer_rim);
+  const Base base = widest_base(loop);
+  const Rim rim(loop, base);
+  Filling filling;
+  filling.verdict = Verdict::filled;
+  if (auto triangles =
+          triangulate_by_area(rim.points, [&](std::uint32_t i, std::uint32_t j) { return rim.allows(i, j); })) {
+    filling.triangles = std::move(*triangles);
+    return filling;
+  }
+  const auto middle = static_cast<std::uint32_t>(n);
+  for (std::uint32_t i = 0; i < middle; ++i) filling.triangles.push_back({i, (i + 1) % middle, middle});
+  const Vec3 normal = base.axes.row(2);
+  filling.positions.push_back({base.middle.x(), base.middle.y(), base.middle.z()});
+  filling.normals.push_back(
+      {static_cast<float>(normal.x()), static_cast<float>(normal.y()), static_cast<float>(normal.z())});
+  const std::size_t attributes = loop.attributes.size() / n;
+  for (std::size_t a = 0; a < attributes; ++a) {
+    double sum = 0;
+    for (std::size_t i = 0; i < n; ++i) sum += static_cast<double>(loop.attributes[i * attributes + a]);
+    filling.attributes.push_back(static_cast<float>(sum / static_cast<double>(n)));
+  }
+  return filling;
+}
+
 bool occupies(const RimVertex& other, const Loop& loop, const Filling& filling) {
   const Base base = widest_base(loop);
   const Vec3 p = base.local(to_vec(other.position));

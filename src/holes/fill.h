@@ -32,6 +32,11 @@ struct Filling {
 /// the triangles around, and uses no edge that the mesh has already. Depends on the loop alone.
 Filling fill_loop(const Loop& loop, double longest);
 
+/// The filling of least area, whatever lies around: for rims of which is known that they are none of the thing itself.
+/// Around a new vertex in the middle where the mesh has too many of the edges that would be needed. A lone triangle's
+/// back is no filling.
+Filling fill_any(const Loop& loop);
+
 /// Whether a vertex of another rim lies in the filling, or so near (in R) that the two would be one surface twice.
 bool occupies(const RimVertex& other, const Loop& loop, const Filling& filling);
 

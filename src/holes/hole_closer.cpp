@@ -24,11 +24,11 @@ std::string describe(const HoleStats& s) {
 
 namespace holes {
 
-HoleCloser::HoleCloser(double longest, std::size_t attributes)
-    : longest_(longest),
+HoleCloser::HoleCloser(const HoleSettings& settings, std::size_t attributes)
+    : settings_(settings),
       attributes_(attributes),
       paths_(
-          longest, attributes,
+          settings.longest * (settings.watertight ? HoleSettings::kWatertight : 1), attributes,
           [this](Loop&& loop, const RimExtent& extent) { loops_.emplace_back(std::move(loop), extent); },
           [this](const RimExtent& extent) { leave(extent, Verdict::too_long); }) {}
 
@@ -81,7 +81,7 @@ void HoleCloser::add_part(const RimPiece& piece, std::uint64_t first) {
 
 void HoleCloser::fill_all(std::vector<Filling>& fillings) const {
   tbb::parallel_for(std::size_t{0}, loops_.size(),
-                    [&](std::size_t i) { fillings[i] = fill_loop(loops_[i].first, longest_); });
+                    [&](std::size_t i) { fillings[i] = fill_loop(loops_[i].first, settings_.longest); });
 }
 
 void HoleCloser::refuse_occupied(std::vector<Filling>& fillings) const {
@@ -119,6 +119,22 @@ void HoleCloser::refuse_occupied(std::vector<Filling>& fillings) const {
   for (std::size_t l = 0; l < loops_.size(); ++l) {
     if (occupied[l] != 0) fillings[l].verdict = Verdict::occupied;
   }
+}
+
+/// Those of the dragon, whose whiskers leave many, are one in four hundred.
+constexpr std::uint64_t kRims = 100;
+
+/// An open surface has one long rim at least, unless it is so small that its rim is a good part of it.
+bool HoleCloser::is_closed_thing(std::uint64_t vertices) const {
+  std::uint64_t edges = 0;
+  for (const auto& [loop, extent] : loops_) edges += extent.edges;
+  return settings_.watertight && settings_.longest > 0 && stats_.open == 0 && edges * kRims <= vertices;
+}
+
+void HoleCloser::fill_rest(std::vector<Filling>& fillings) const {
+  tbb::parallel_for(std::size_t{0}, loops_.size(), [&](std::size_t i) {
+    if (fillings[i].verdict != Verdict::filled) fillings[i] = fill_any(loops_[i].first);
+  });
 }
 
 void HoleCloser::append(const Loop& loop, const Filling& filling, std::uint64_t vertices, Addition& out) const {
@@ -163,6 +179,7 @@ Addition HoleCloser::finish(std::uint64_t vertices) {
   std::vector<Filling> fillings(loops_.size());
   fill_all(fillings);
   refuse_occupied(fillings);
+  if (is_closed_thing(vertices)) fill_rest(fillings);
   Addition out;
   out.vertices.attributes.resize(attributes_);
   for (std::size_t l = 0; l < loops_.size(); ++l) {

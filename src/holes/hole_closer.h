@@ -18,12 +18,12 @@ struct Addition {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-/// Takes the rims as they are found. Memory: rims that are not closed yet, and closed loops of at most `longest` radii.
+/// Takes the rims as they are found. Memory: rims that are not closed yet, and closed loops that may be filled.
 /// What comes out depends on the mesh alone, not on the order of the pieces.
 class HoleCloser {
  public:
-  /// `longest`: loops of more influence radii stay open, all at 0. `attributes`: of a vertex.
-  HoleCloser(double longest, std::size_t attributes);
+  /// `attributes`: of a vertex.
+  HoleCloser(const HoleSettings& settings, std::size_t attributes);
   HoleCloser(const HoleCloser&) = delete;
   HoleCloser& operator=(const HoleCloser&) = delete;
 
@@ -39,9 +39,11 @@ class HoleCloser {
   void leave(const RimExtent& extent, Verdict why);
   void fill_all(std::vector<Filling>& fillings) const;
   void refuse_occupied(std::vector<Filling>& fillings) const;
+  [[nodiscard]] bool is_closed_thing(std::uint64_t vertices) const;
+  void fill_rest(std::vector<Filling>& fillings) const;
   void append(const Loop& loop, const Filling& filling, std::uint64_t vertices, Addition& out) const;
 
-  double longest_;
+  HoleSettings settings_;
   std::size_t attributes_;
   HoleStats stats_;
   std::vector<std::pair<Loop, RimExtent>> loops_;

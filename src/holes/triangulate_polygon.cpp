@@ -39,9 +39,15 @@ struct Cost {
 
 class Polygon {
  public:
+  /// `facing`: normals beside the polygon's edges; empty where folds do not matter.
   Polygon(const std::vector<Vec3>& corners, const std::vector<Vec3>& facing,
-          const std::function<bool(std::uint32_t, std::uint32_t)>& allowed)
-      : corners_(corners), facing_(facing), n_(static_cast<std::uint32_t>(corners.size())), cells_(n_ * n_) {
+          const std::function<bool(std::uint32_t, std::uint32_t)>& allowed,
+          bool (*proper)(const Vec3&, const Vec3&, const Vec3&))
+      : corners_(corners),
+        facing_(facing),
+        proper_(proper),
+        n_(static_cast<std::uint32_t>(corners.size())),
+        cells_(n_ * n_) {
     for (std::uint32_t gap = 2; gap < n_; ++gap) {
       for (std::uint32_t i = 0; i + gap < n_; ++i) {
         const std::uint32_t k = i + gap;
@@ -51,6 +57,9 @@ class Polygon {
     }
   }
   [[nodiscard]] bool solved() const { return std::isfinite(at(0, n_ - 1).cost.fold); }
+  void list(std::vector<PlaneTriangle>& out) const { list(0, n_ - 1, out); }
+
+ private:
   void list(std::uint32_t i, std::uint32_t k, std::vector<PlaneTriangle>& out) const {
     if (k < i + 2) return;
     const std::uint32_t j = at(i, k).middle;
@@ -58,8 +67,6 @@ class Polygon {
     list(i, j, out);
     list(j, k, out);
   }
-
- private:
   struct Cell {
     Cost cost;
     std::uint32_t middle = 0;
@@ -75,7 +82,7 @@ class Polygon {
   void solve(std::uint32_t i, std::uint32_t k) {
     Cell& best = cells_[i * n_ + k];
     for (std::uint32_t j = i + 1; j < k; ++j) {
-      if (!is_proper(corners_[i].head<2>(), corners_[j].head<2>(), corners_[k].head<2>())) continue;
+      if (!proper_(corners_[i], corners_[j], corners_[k])) continue;
       Cost cost{0, 0};
       if (j > i + 1) cost = at(i, j).cost;
       if (k > j + 1) {
@@ -84,18 +91,28 @@ class Polygon {
       }
       if (!std::isfinite(cost.fold)) continue;
       const Vec3 here = normal(i, j, k);
-      cost.fold = std::max({cost.fold, fold(here, beside(i, j)), fold(here, beside(j, k))});
-      if (i == 0 && k == n_ - 1) cost.fold = std::max(cost.fold, fold(here, facing_[n_ - 1]));
+      if (!facing_.empty()) {
+        cost.fold = std::max({cost.fold, fold(here, beside(i, j)), fold(here, beside(j, k))});
+        if (i == 0 && k == n_ - 1) cost.fold = std::max(cost.fold, fold(here, facing_[n_ - 1]));
+      }
       cost.area += here.norm();
       if (cost < best.cost) best = {cost, j};
     }
   }
 
   const std::vector<Vec3>& corners_;
-  const std::vector<Vec3>& facing_;
+  std::vector<Vec3> facing_;
+  bool (*proper_)(const Vec3&, const Vec3&, const Vec3&);
   std::uint32_t n_;
   std::vector<Cell> cells_;
 };
+
+std::optional<std::vector<PlaneTriangle>> triangles_of(const Polygon& polygon) {
+  if (!polygon.solved()) return std::nullopt;
+  std::vector<PlaneTriangle> triangles;
+  polygon.list(triangles);
+  return triangles;
+}
 
 using Edge = std::array<std::uint32_t, 2>;
 
@@ -186,11 +203,18 @@ bool split_large(std::vector<Vec2>& points, std::vector<double>& scale, std::vec
 std::optional<std::vector<PlaneTriangle>> triangulate_polygon(
     const std::vector<Vec3>& corners, const std::vector<Vec3>& facing,
     const std::function<bool(std::uint32_t, std::uint32_t)>& allowed) {
-  const Polygon polygon(corners, facing, allowed);
-  if (!polygon.solved()) return std::nullopt;
-  std::vector<PlaneTriangle> triangles;
-  polygon.list(0, static_cast<std::uint32_t>(corners.size() - 1), triangles);
-  return triangles;
+  return triangles_of({corners, facing, allowed, [](const Vec3& a, const Vec3& b, const Vec3& c) {
+                         return is_proper(a.head<2>(), b.head<2>(), c.head<2>());
+                       }});
+}
+
+std::optional<std::vector<PlaneTriangle>> triangulate_by_area(
+    const std::vector<Vec3>& corners, const std::function<bool(std::uint32_t, std::uint32_t)>& allowed) {
+  return triangles_of(
+      {corners, {}, allowed, [](const Vec3& a, const Vec3& b, const Vec3& c) {
+         const double longest = std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
+         return (b - a).cross(c - a).norm() > kLeastHeight * longest;
+       }});
 }
 
 void refine_triangles(std::vector<Vec2>& points, std::vector<double>& scale, std::vector<PlaneTriangle>& triangles,

@@ -1,4 +1,4 @@
-// Triangles of a polygon in a plane.
+// Triangles of a polygon, in a plane or in space.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -24,6 +24,11 @@ inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
 std::optional<std::vector<PlaneTriangle>> triangulate_polygon(
     const std::vector<Eigen::Vector3d>& corners, const std::vector<Eigen::Vector3d>& facing,
     const std::function<bool(std::uint32_t, std::uint32_t)>& allowed);
+
+/// The triangulation of least area of a polygon in space, however it winds. Nothing where every one has a triangle
+/// without area, or a chord that is not allowed.
+std::optional<std::vector<PlaneTriangle>> triangulate_by_area(
+    const std::vector<Eigen::Vector3d>& corners, const std::function<bool(std::uint32_t, std::uint32_t)>& allowed);
 
 /// Adds points inside until triangles are about as large as the edges of the polygon around them (Liepa 2003), and
 /// flips edges to Delaunay's in the plane. `points`: the polygon's corners, then what is added; `scale`: the length of

@@ -118,7 +118,7 @@ class Job {
     own_.sweeping = Stopwatch::now().wall - before;
     watch_.time("commit", [&] {
       const Place place = write_together(ranks_, span, *part, settings_.output, settings_.input, resolved.plan.samples,
-                                         longest_closed(settings_), stats_.holes, run_);
+                                         hole_settings(settings_, resolved.support), stats_.holes, run_);
       stats_.vertices = place.vertices;
       stats_.triangles = place.triangles;
     });

@@ -62,14 +62,14 @@ void write_part(SharedFile& file, RankSlabs& part, const Place& place, bool firs
 }
 
 /// What rank 0 finds closes the holes of all; of the others, only how much there is.
-holes::Addition close_together(Ranks& ranks, RankSlabs& part, const std::vector<Border>& borders, double longest,
-                               Place& place, HoleStats& stats) {
+holes::Addition close_together(Ranks& ranks, RankSlabs& part, const std::vector<Border>& borders,
+                               const HoleSettings& settings, Place& place, HoleStats& stats) {
   const std::vector<Bytes> rims = ranks.gather(part.take_rims());
   holes::Addition addition;
   std::array<std::uint64_t, 2> added{};
   ranks.together([&] {
     if (!ranks.first()) return;
-    holes::HoleCloser closer(longest, part.layout().attributes.size());
+    holes::HoleCloser closer(settings, part.layout().attributes.size());
     std::uint64_t first = 0;
     for (std::size_t r = 0; r < rims.size(); ++r) {
       if (borders[r].any) closer.add_part(holes::unpack(rims[r]), first);
@@ -129,7 +129,7 @@ Place find_place(std::span<const Border> parts, std::size_t rank, const std::str
 }
 
 Place write_together(Ranks& ranks, const SlabSpan& span, RankSlabs& part, const std::string& output,
-                     const std::string& input, std::uint64_t samples, double close_holes, HoleStats& closed,
+                     const std::string& input, std::uint64_t samples, const HoleSettings& holes, HoleStats& closed,
                      const RunContext& run) {
   const std::vector<Border> borders =
       gather_borders(ranks, {span, part.any(), part.below(), part.last(), part.vertices(), part.triangles()});
@@ -140,7 +140,7 @@ Place write_together(Ranks& ranks, const SlabSpan& span, RankSlabs& part, const 
     place = find_place(borders, static_cast<std::size_t>(ranks.rank()), output);
     if (place.triangles == 0) no_surface(input, samples);
   });
-  const holes::Addition addition = close_together(ranks, part, borders, close_holes, place, closed);
+  const holes::Addition addition = close_together(ranks, part, borders, holes, place, closed);
   ranks.together([&] {
     if (!ranks.first()) return;
     file.emplace(output, std::string());

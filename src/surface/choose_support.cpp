@@ -17,7 +17,7 @@ constexpr float kVeryNoisy = 0.1F;
 /// gaps.
 constexpr float kEven = 3;
 
-/// As many triangles as 0.9 R had at H = 1 on the dragon, and no more than 1.3 M of a million samples.
+/// No more than 1.3 M triangles of a million samples.
 constexpr double kCell = 0.892;
 
 }  // namespace
@@ -37,9 +37,17 @@ SupportChoice choose_support(const SurfaceSettings& settings, const RadiusSurvey
   } else if (survey.high < kEven * survey.low) {
     out.blend = 1;
     out.cell = {kCell, Length::Unit::sample_radius};
-    out.good_reach = 0.3F;
+    out.good_reach = 0.25F;
+    out.good_samples = 4;
+    out.watertight = true;
+    if (!settings.cell) {
+      // Around thin things cells are half as large: values must reach over as many more of them.
+      out.thin_cells = true;
+      out.band = 4;
+    }
   }
   if (settings.cell) out.cell = *settings.cell;
+  if (settings.watertight) out.watertight = *settings.watertight;
   if (settings.refit) out.refit = *settings.refit;
   return out;
 }

@@ -13,6 +13,9 @@ struct SupportChoice {
   double refit = 0;         ///< SurfaceSettings::refit
   float band = 2.25F;       ///< ProjectSettings::band
   float good_reach = 0.4F;  ///< ProjectSettings::good_reach
+  int good_samples = 3;     ///< ProjectSettings::good_samples
+  bool thin_cells = false;  ///< FeedSettings::thin_cells
+  bool watertight = false;  ///< HoleSettings::watertight
 };
 
 /// A function of settings and survey alone, so that all parts of a job choose the same.

@@ -2,9 +2,9 @@
 
 namespace lamina {
 
-double longest_closed(const SurfaceSettings& settings) {
+HoleSettings hole_settings(const SurfaceSettings& settings, const SupportChoice& support) {
   // Free clustering joins sheets: a rim may pass through a vertex several times.
-  return settings.cluster == ClusterMode::free ? 0 : settings.close_holes;
+  return {settings.cluster == ClusterMode::free ? 0 : settings.close_holes, support.watertight};
 }
 
 void ClosingSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {

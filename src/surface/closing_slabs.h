@@ -3,18 +3,20 @@
 #include "holes/hole_closer.h"
 #include "holes/rim_finder.h"
 #include "lamina/surface.h"
+#include "surface/choose_support.h"
 #include "surface/mesh_output.h"
 
 namespace lamina {
 
-/// SurfaceSettings::close_holes where it applies.
-double longest_closed(const SurfaceSettings& settings);
+/// What is asked for, where it applies.
+HoleSettings hole_settings(const SurfaceSettings& settings, const SupportChoice& support);
 
 /// Passes slabs on and watches for rims.
 class ClosingSlabs final : public SlabSink {
  public:
-  /// `longest`, `attributes`: as HoleCloser.
-  ClosingSlabs(double longest, std::size_t attributes, SlabSink& to) : closer_(longest, attributes), to_(to) {}
+  /// `settings`, `attributes`: as HoleCloser.
+  ClosingSlabs(const HoleSettings& settings, std::size_t attributes, SlabSink& to)
+      : closer_(settings, attributes), to_(to) {}
   void write(const FinalSlab& slab, const VertexBatch& vertices) override;
   /// All slabs have come: what is to be added to the mesh.
   holes::Addition finish();

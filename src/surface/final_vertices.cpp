@@ -100,12 +100,14 @@ void place_curvatures(const FinalSlab& slab, const IsoSlab& here, const IsoSlab*
   }
 }
 
-void place_radii(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, double per_cell, VertexBatch& out) {
+void place_radii(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, const RadiusRule& rule,
+                 VertexBatch& out) {
   out.radius.clear();
   out.radius.reserve(slab.vertices.size());
   for (const FinalVertex& v : slab.vertices) {
     const IsoSlab& s = v.corner.next() ? *next : here;
-    out.radius.push_back(static_cast<float>(per_cell * static_cast<double>(s.corners[v.corner.index()].cell)));
+    const double by_cell = rule.per_cell * static_cast<double>(s.corners[v.corner.index()].cell);
+    out.radius.push_back(static_cast<float>(std::max(rule.least, by_cell)));
   }
 }
 

@@ -20,7 +20,14 @@ void place_levels(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* nex
 /// Adds an attribute behind those that are there: mean curvature of the fit, 1 / input unit. `step`: Frame::step.
 void place_curvatures(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, double step, VertexBatch& out);
 
-/// The influence radius around each vertex: `per_cell` times the finest cell around its corner.
-void place_radii(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, double per_cell, VertexBatch& out);
+/// The influence radius R that goes with a cell, input units.
+struct RadiusRule {
+  double per_cell = 1;  ///< for each step of its side
+  double least = 0;     ///< whatever the cell
+};
+
+/// The influence radius around each vertex, by the finest cell around its corner.
+void place_radii(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, const RadiusRule& rule,
+                 VertexBatch& out);
 
 }  // namespace lamina

@@ -8,11 +8,11 @@
 
 namespace lamina {
 
-MeshOutput::MeshOutput(const ClusterSettings& settings, float chord, double finest, double radius_per_cell,
+MeshOutput::MeshOutput(const ClusterSettings& settings, float chord, double finest, const RadiusRule& radii,
                        bool curvature, const Frame& frame, SlabSink& sink)
     : chord_(chord),
       finest_(finest),
-      radius_per_cell_(radius_per_cell),
+      radii_(radii),
       curvature_(curvature),
       frame_(frame),
       sink_(sink),
@@ -69,7 +69,7 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
     place_vertices(done_, *clustered_.front(), next, frame_, chord_, vertices_);
     if (finest_ > 0) place_levels(done_, *clustered_.front(), next, finest_, vertices_);
     if (curvature_) place_curvatures(done_, *clustered_.front(), next, frame_.step, vertices_);
-    place_radii(done_, *clustered_.front(), next, radius_per_cell_, vertices_);
+    place_radii(done_, *clustered_.front(), next, radii_, vertices_);
     sink_.write(done_, vertices_);
     triangles_ += done_.triangles.size();
     if (clustered_.front().use_count() == 1) {

@@ -13,6 +13,7 @@
 #include "lamina/frame.h"
 #include "lamina/iso_mesh.h"
 #include "lamina/mesh_sink.h"
+#include "surface/final_vertices.h"
 
 namespace lamina {
 
@@ -46,10 +47,10 @@ class MeshFileSlabs : public SlabSink {
 class MeshOutput {
  public:
   /// `chord`: SurfaceSettings::chord. `finest`: the finest level's cell where vertices are to have their level as the
-  /// last attribute, else 0. `radius_per_cell`: the influence radius (input units) that goes with a cell of one step.
+  /// last attribute, else 0. `radii`: of cells.
   /// `curvature`: vertices have it as the last attribute.
   /// The sink is the caller's; nobody else may write to it.
-  MeshOutput(const ClusterSettings& settings, float chord, double finest, double radius_per_cell, bool curvature,
+  MeshOutput(const ClusterSettings& settings, float chord, double finest, const RadiusRule& radii, bool curvature,
              const Frame& frame, SlabSink& sink);
   /// Drops what is not written yet.
   ~MeshOutput();
@@ -75,7 +76,8 @@ class MeshOutput {
   void work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last);
 
   float chord_;
-  double finest_, radius_per_cell_;
+  double finest_;
+  RadiusRule radii_;
   bool curvature_;
   const Frame& frame_;
   SlabSink& sink_;

@@ -25,13 +25,16 @@ ProjectSettings project_settings(const SurfaceSettings& s, const SupportChoice& 
   p.centres = s.diffuse;
   p.band = support.band;
   p.good_reach = support.good_reach;
+  p.good_samples = support.good_samples;
   return p;
 }
 
-/// Cells follow the radii, so most cells tell the median radius and larger ones as much more.
-double radius_per_cell(const Resolved& resolved) {
-  return resolved.support.blend * resolved.plan.radius_median /
-         static_cast<double>(resolved.lattice.cell_size(resolved.main_level));
+/// Cells follow the radii, so most cells tell the median radius and larger ones as much more. Cells that are smaller
+/// for thin things tell nothing.
+RadiusRule radius_rule(const Resolved& resolved) {
+  const double influence = resolved.support.blend * resolved.plan.radius_median;
+  const auto main_cell = static_cast<double>(resolved.lattice.cell_size(resolved.main_level));
+  return {influence / main_cell, resolved.support.thin_cells ? influence : 0};
 }
 
 }  // namespace
@@ -47,8 +50,8 @@ Pipeline::Pipeline(const SurfaceSettings& settings, const Resolved& resolved, co
       window_(resolved.lattice, static_cast<int>(attributes), extent),
       projector_(project_settings(settings, resolved.support), kernel_),
       output_(ClusterSettings{settings.cluster}, static_cast<float>(settings.chord),
-              settings.vertex_levels ? static_cast<double>(resolved.lattice.cell_size(0)) : 0,
-              radius_per_cell(resolved), settings.vertex_curvature, frame, sink),
+              settings.vertex_levels ? static_cast<double>(resolved.lattice.cell_size(0)) : 0, radius_rule(resolved),
+              settings.vertex_curvature, frame, sink),
       all_(all_slabs(resolved.lattice, extent)),
       stages_(stage_spans(span, all_, settings.diffuse)),
       refined_(stages_.refined.begin),

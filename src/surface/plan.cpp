@@ -36,10 +36,12 @@ struct Levels {
   int count;
 };
 
-/// Main cells follow the median radius; levels are added below for the 1 % smallest and above for the 1 % largest.
-Levels choose_levels(const SurfaceSettings& s, double ratio, const RadiusSurvey& radii) {
+/// Main cells follow the median radius; levels are added below for the 1 % smallest and for thin things, and above for
+/// the 1 % largest.
+Levels choose_levels(const SurfaceSettings& s, double ratio, const RadiusSurvey& radii, bool thin_cells) {
   const double main = kMainCell * ratio * radii.median;
-  const int finer = std::max(0, static_cast<int>(std::ceil(std::log2(main / (ratio * radii.low)) - 1e-9)));
+  const int finer =
+      std::max(0, static_cast<int>(std::ceil(std::log2(main / (ratio * radii.low)) - 1e-9))) + (thin_cells ? 1 : 0);
   const int coarser = std::max(0, static_cast<int>(std::floor(std::log2(ratio * radii.high / main))));
   const int count = s.levels > 0 ? s.levels : std::clamp(finer + coarser + 1, kDefaultLevels, kMaxLevels);
   return {std::ldexp(main, -std::min(finer, count - 1)), count};
@@ -58,7 +60,8 @@ void set_counting_cells(const SurfaceSettings& s, const RadiusSurvey& survey, Re
     out.radii.levels = std::clamp(static_cast<int>(std::ceil(octaves)) + 3, 3, kMaxLevels);
   } else {
     const double blend = out.feed.cell_follows_support ? out.support.blend : 1.0;
-    finest_radius = out.lattice.cell / (kMainCell * out.feed.cell_ratio * blend);
+    // Counting cells follow the radii, which know nothing of thin things.
+    finest_radius = (out.feed.thin_cells ? 2.0 : 1.0) * out.lattice.cell / (kMainCell * out.feed.cell_ratio * blend);
   }
   const double half = kHalfWidth * std::sqrt(s.density / 16.0) * finest_radius / s.radius_scale;
   out.radii.finest_cell = static_cast<std::int32_t>(2 * std::clamp(std::lrint(half), 1L, 1L << 24));
@@ -179,6 +182,7 @@ Resolved plan_once(const SurfaceSettings& s, const Frame& frame, const SlabStore
   out.feed.blend = static_cast<float>(support.blend);
   out.feed.radius_scale = static_cast<float>(s.radius_scale);
   out.feed.max_radius = static_cast<float>(max_radius);
+  out.feed.thin_cells = support.thin_cells;
   if (cell.unit == Length::Unit::world) {
     // A fixed cell: one level in use, whatever the radii.
     levels = {cell.value / frame.step, s.levels > 0 ? s.levels : kDefaultLevels};
@@ -187,7 +191,8 @@ Resolved plan_once(const SurfaceSettings& s, const Frame& frame, const SlabStore
   } else {
     out.feed.cell_follows_support = cell.unit == Length::Unit::influence_radius;
     out.feed.cell_ratio = cell.value;
-    levels = choose_levels(s, cell.value * (out.feed.cell_follows_support ? support.blend : 1.0), survey);
+    levels = choose_levels(s, cell.value * (out.feed.cell_follows_support ? support.blend : 1.0), survey,
+                           support.thin_cells);
   }
   double reach = 0;
   for (const std::int32_t end : {bounds.x_min, bounds.x_max, bounds.y_min, bounds.y_max, bounds.z_min, bounds.z_max}) {

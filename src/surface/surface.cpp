@@ -462,7 +462,7 @@ SurfaceStats reconstruct(const SurfaceSettings& settings, const RunContext& run)
                          resolve(settings.prune_size, resolved.plan.radius_median, resolved.support.blend)};
     const bool prunes = rule.triangles > 0 || rule.size > 0;
     MeshFileSlabs whole(sink);
-    ClosingSlabs closing(longest_closed(settings), out.attributes.size(), whole);
+    ClosingSlabs closing(hole_settings(settings, resolved.support), out.attributes.size(), whole);
     Pruner pruner(rule, tmp, closing);
     PrunedSlabs pruned(pruner);
     sweep(settings, input, resolved, all_slabs(resolved.lattice, input.ingested.extent),

@@ -5,6 +5,7 @@
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -284,6 +285,18 @@ std::optional<Survey> survey_part(PointSource& source, const RowPick& pick) {
   return survey;
 }
 
+namespace {
+
+/// Floors, plinths and facades lie across the axes of what they belong to, and one of them would fill a slab. A few
+/// degrees spread it over some hundred.
+Eigen::Matrix3d tilt() {
+  constexpr double kAboutX = 0.06, kAboutY = 0.04;
+  return (Eigen::AngleAxisd(kAboutX, Eigen::Vector3d::UnitX()) * Eigen::AngleAxisd(kAboutY, Eigen::Vector3d::UnitY()))
+      .toRotationMatrix();
+}
+
+}  // namespace
+
 Frame choose_frame(const Survey& survey, FrameMode mode) {
   Frame frame;
   const Eigen::Vector3d extent = survey.high - survey.low;
@@ -298,6 +311,7 @@ Frame choose_frame(const Survey& survey, FrameMode mode) {
       frame.rotation.row(k) = axis.transpose();
     }
     frame.rotation.row(0) = frame.rotation.row(1).cross(frame.rotation.row(2));
+    frame.rotation = tilt() * frame.rotation;
   } else {
     int longest = 0;
     extent.maxCoeff(&longest);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <rapidcheck/gtest.h>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -110,6 +111,68 @@ TEST(Fill, UsesNoEdgeOfTheMesh) {
     EXPECT_EQ(std::count(t.begin(), t.end(), 0U) + std::count(t.begin(), t.end(), 2U), 1);
   loop.taken = {{0, 2}, {1, 3}};
   EXPECT_EQ(fill_loop(loop, 100).verdict, Verdict::bent);
+}
+
+double area_of(const Loop& loop, const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  const auto at = [&](std::uint32_t v) { return Eigen::Vector3d(loop.vertices[v].position.data()); };
+  double sum = 0;
+  for (const auto& t : triangles) sum += (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).norm() / 2;
+  return sum;
+}
+
+/// Oracle: the least area of all triangulations of the vertices from i to k.
+double least_area(const Loop& loop, std::uint32_t i, std::uint32_t k) {
+  if (k < i + 2) return 0;
+  double least = 1e300;
+  for (std::uint32_t j = i + 1; j < k; ++j)
+    least = std::min(least, least_area(loop, i, j) + least_area(loop, j, k) + area_of(loop, {{i, j, k}}));
+  return least;
+}
+
+/// A rim that no plane shows without crossings.
+Loop winding_rim(std::uint32_t n, std::uint32_t seed) {
+  Loop loop = sphere_rim(n, 0.5, 0.2);
+  std::mt19937 random(seed);
+  std::normal_distribution<> normal;
+  for (RimVertex& v : loop.vertices) v.position = {normal(random), normal(random), normal(random)};
+  return loop;
+}
+
+RC_GTEST_PROP(FillAny, IsADiscOfLeastArea, ()) {
+  const auto n = *rc::gen::inRange<std::uint32_t>(3, 9);
+  const Loop loop = winding_rim(n, *rc::gen::arbitrary<std::uint32_t>());
+  RC_PRE(!(n == 3 && fill_any(loop).verdict == Verdict::outer_rim));
+  const Filling filling = fill_any(loop);
+  expect_disc(loop, filling);
+  RC_ASSERT(filling.positions.empty());
+  RC_ASSERT(std::abs(area_of(loop, filling.triangles) - least_area(loop, 0, n - 1)) < 1e-9);
+}
+
+TEST(FillAny, ClosesWhatNothingSupports) {
+  Loop outer = sphere_rim(12, 0.3, 0.2);
+  reverse(outer);
+  expect_disc(outer, fill_any(outer));
+  const Loop winding = winding_rim(30, 3);
+  EXPECT_NE(fill_loop(winding, 1000).verdict, Verdict::filled);
+  expect_disc(winding, fill_any(winding));
+}
+
+TEST(FillAny, GoesAroundANewVertexWhereEdgesAreTaken) {
+  Loop loop = sphere_rim(4, 0.2, 0.3);
+  loop.taken = {{0, 2}, {1, 3}};
+  const Filling filling = fill_any(loop);
+  expect_disc(loop, filling);
+  ASSERT_EQ(filling.positions.size(), 1U);
+  EXPECT_EQ(filling.attributes.size(), 1U);
+  EXPECT_NEAR(filling.positions[0][2], std::cos(0.2), 1e-9);
+  EXPECT_NEAR(static_cast<double>(filling.normals[0][2]), 1, 1e-6);
+}
+
+TEST(FillAny, GivesNoLoneTriangleABack) {
+  Loop loop = sphere_rim(3, 0.2, 0.3);
+  expect_disc(loop, fill_any(loop));
+  loop.facing.assign(3, {0, 0, -1});
+  EXPECT_EQ(fill_any(loop).verdict, Verdict::outer_rim);
 }
 
 TEST(Fill, IsOccupiedByVerticesInItOnly) {

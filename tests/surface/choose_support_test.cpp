@@ -29,6 +29,18 @@ TEST(ChooseSupport, EvenCleanCloudsGetTheNarrowestSupport) {
   EXPECT_EQ(even.cell.unit, Length::Unit::sample_radius);
   EXPECT_EQ(varying.blend, 1.2);
   EXPECT_EQ(even.refit + varying.refit, 0);
+  EXPECT_TRUE(even.thin_cells && even.watertight);
+  EXPECT_FALSE(varying.thin_cells || varying.watertight);
+}
+
+TEST(ChooseSupport, ClosedMeshesAreMadeWhereAskedFor) {
+  SurfaceSettings settings;
+  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2)).watertight);
+  settings.watertight = true;
+  EXPECT_TRUE(choose_support(settings, survey(0.2F, 8)).watertight);
+  settings.blend.reset();
+  settings.watertight = false;
+  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2)).watertight);
 }
 
 TEST(ChooseSupport, NoiseWidensTheSupportAndRefitsNormals) {
@@ -55,6 +67,7 @@ TEST(ChooseSupport, GivenNumbersStand) {
   EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).refit, 0);
   EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).cell, *settings.cell);
   EXPECT_GT(choose_support(settings, survey(0.2F, 2)).blend, 2);
+  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2)).thin_cells);
 }
 
 }  // namespace

@@ -65,6 +65,36 @@ TEST(Holes, OfASphereAreClosedOnTheSphere) {
   EXPECT_EQ(left.facts.boundary.size(), open.facts.boundary.size());
 }
 
+TEST(Holes, OfAClosedThingAreAllClosedWhereAskedFor) {
+  // Too wide for the bound.
+  const Cloud cloud = pierced_sphere(16000, {{0.6, 0, 0.8}, {-0.6, 0, 0.8}}, 0.165);
+  SurfaceSettings s = closing(8);
+  s.watertight = false;
+  const Reconstruction open = test::reconstruct(cloud, s);
+  ASSERT_EQ(open.stats.holes.open, 2U);
+  const double longest = open.stats.holes.longest.front().radii;
+  ASSERT_GT(longest, 8);
+  ASSERT_LT(longest, 3 * 8);
+  s.watertight = true;
+  const Reconstruction closed = test::reconstruct(cloud, s);
+  EXPECT_TRUE(closed.facts.is_closed_manifold());
+  EXPECT_EQ(closed.facts.euler, std::vector<long>{2});
+  EXPECT_EQ(closed.stats.holes.closed, 2U);
+  s.close_holes = longest / 3.1;
+  EXPECT_EQ(test::reconstruct(cloud, s).facts.boundary.size(), open.facts.boundary.size())
+      << "a long rim: an open thing";
+  s.close_holes = 0;
+  EXPECT_EQ(test::reconstruct(cloud, s).facts.boundary.size(), open.facts.boundary.size());
+}
+
+TEST(Holes, OfOpenThingsStayOpenWhateverIsAskedFor) {
+  SurfaceSettings s = closing(8);
+  s.watertight = true;
+  EXPECT_EQ(test::reconstruct(test::plane_cloud(6000), s).facts.euler, std::vector<long>{1});
+  // Its rim is short, but a good part of it.
+  EXPECT_EQ(test::reconstruct(test::plane_cloud(60), s).facts.euler, std::vector<long>{1});
+}
+
 TEST(Holes, OuterRimsStayOpen) {
   const Reconstruction plane = test::reconstruct(test::plane_cloud(600), closing(1000));
   EXPECT_EQ(plane.facts.euler, std::vector<long>{1});

@@ -142,6 +142,23 @@ RC_GTEST_PROP(Survey, FramesHoldTheCloud, (unsigned seed)) {
   }
 }
 
+TEST(Survey, FloorsAreSpreadAlongTheSweepAxis) {
+  // A tower, 1 x 1 x 3: by its axes alone, its floor would lie in one slab.
+  Cloud cloud;
+  for (int i = 0; i <= 20; ++i)
+    for (int j = 0; j <= 20; ++j)
+      for (const double z : {0.0, 1.0, 2.0, 3.0}) cloud.add({i / 20.0, j / 20.0, z}, {0, 0, 1});
+  const Frame frame = choose_frame(survey_of(cloud), FrameMode::pca);
+  double low = 0, high = 0;
+  for (const Point3& corner : {Point3{0, 0, 0}, Point3{1, 0, 0}, Point3{0, 1, 0}, Point3{1, 1, 0}}) {
+    const double z = (frame.rotation * Eigen::Vector3d(corner[0], corner[1], corner[2])).z();
+    low = std::min(low, z);
+    high = std::max(high, z);
+  }
+  EXPECT_GT(high - low, 0.05);
+  EXPECT_LT(high - low, 0.15) << "the cross-section grows";
+}
+
 TEST(Survey, UsableAttributes) {
   EXPECT_EQ(usable_attribute(static_cast<float>(std::numeric_limits<double>::quiet_NaN())), 0);
   EXPECT_EQ(usable_attribute(-3.5F), -3.5F);
