@@ -12,7 +12,7 @@ struct PointRadiiSettings {
   double minradius = 0;        ///< input units: smaller ones become this
   double maxradius = 0;        ///< input units: larger ones become this; 0: no limit
   BadSamples bad_samples = BadSamples::drop;
-  std::size_t memory = std::size_t{256} << 20;  ///< for radii on their way to their rows; at most run.max_memory / 4
+  std::size_t memory = std::size_t{64} << 20;  ///< for radii on their way to their rows; at most run.max_memory / 4
 };
 
 struct PointRadiiReport {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include "lamina/error.h"
 #include "points/las_records.h"
@@ -82,6 +83,14 @@ LasHeader read_las_header(const InputFile& file) {
     refuse(file, fmt::format("points begin at byte {}, which is {} (at byte 96)", h.data,
                              h.data < header_bytes ? "inside the header" : "behind the end of the file"));
   }
+  // Points end where the file does, or what is announced to lie behind them begins.
+  std::uint64_t end = file.bytes;
+  constexpr std::size_t kWaves = 227;
+  constexpr std::size_t kExtendedRecords = 235;
+  for (const auto& [place, minor] : {std::pair{kWaves, 3}, std::pair{kExtendedRecords, 4}}) {
+    if (h.minor < minor || header_bytes < place + sizeof(std::uint64_t)) continue;
+    if (const auto begin = load_little<std::uint64_t>(at(place)); begin > h.data) end = std::min(end, begin);
+  }
   const std::uint64_t room = (file.bytes - h.data) / h.record_bytes;
   if (h.count > room) {
     refuse(file,
@@ -89,10 +98,18 @@ LasHeader read_las_header(const InputFile& file) {
                        "header's count is wrong",
                        h.count, room, h.record_bytes));
   }
+  h.uncounted = (end - h.data) / h.record_bytes;
+  h.uncounted -= std::min(h.uncounted, h.count);
+  if (h.count == 0 && h.uncounted > 0) {
+    refuse(file, fmt::format("the header counts no points (at byte {}), but there is room for {}: its writer was "
+                             "stopped before it knew their number",
+                             h.minor >= 4 ? 247 : 107, h.uncounted));
+  }
   LasRecords records;
   read_las_records(file, header_bytes, load_little<std::uint32_t>(at(100)), h.data, records);
   if (h.minor >= 4) {
-    read_las_extended_records(file, load_little<std::uint64_t>(at(235)), load_little<std::uint32_t>(at(243)), records);
+    read_las_extended_records(file, load_little<std::uint64_t>(at(kExtendedRecords)),
+                              load_little<std::uint32_t>(at(243)), records);
   }
   h.geographic = records.coordinates == LasRecords::Coordinates::geographic ||
                  (records.coordinates == LasRecords::Coordinates::unknown && h.count > 0 && looks_geographic(h));

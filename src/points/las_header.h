@@ -24,7 +24,8 @@ struct LasHeader {
   int point_format = 0;  ///< 0 to 10
   std::size_t record_bytes = 0;
   std::uint64_t count = 0;
-  std::uint64_t data = 0;  ///< offset of the first point
+  std::uint64_t data = 0;       ///< offset of the first point
+  std::uint64_t uncounted = 0;  ///< points for which there is room behind those that are counted
   std::array<double, 3> scale{}, offset{};
   std::array<double, 3> low{}, high{};  ///< bounding box as the header gives it
   bool geographic = false;              ///< x and y are degrees
@@ -32,7 +33,7 @@ struct LasHeader {
 };
 
 /// Throws Error(unreadable) for what no version allows: sizes too small, an unknown point format, a scale of 0, more
-/// points than the file has room for.
+/// points than the file has room for; and for a count of 0 before points, which a writer leaves that was stopped.
 LasHeader read_las_header(const InputFile& file);
 
 /// Bytes of the standard values of a point format, 0 to 10.

@@ -76,6 +76,10 @@ class LasPoints final : public PointSource {
     give_roles(columns_, info_, file_.name, "value");
     declare_types();
     info_.double_precision = true;
+    if (header_.uncounted > 0) {
+      info_.remarks.push_back(fmt::format("{}: the header counts {} points; behind them is room for {} more, left out",
+                                          file_.name, header_.count, header_.uncounted));
+    }
   }
 
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 #include <limits>
 #include <vector>
 
@@ -65,22 +66,19 @@ void estimate(const SlabStore& store, const RadiiSettings& settings, edit::Recor
   RadiusEstimator estimator(settings);
   LocalSamples samples;
   std::vector<float> radii;
-  std::vector<std::uint64_t> rows;
-  std::vector<std::vector<std::uint64_t>> waiting;  // rows of the buckets pushed and not popped
-  std::size_t popped = 0;
+  std::deque<std::vector<std::uint64_t>> waiting;  // rows of the buckets pushed and not popped
   const auto pop_all = [&] {
-    while (popped < waiting.size() && estimator.pop(radii)) {
-      by_row.add(waiting[popped], reinterpret_cast<const std::byte*>(radii.data()));
-      waiting[popped++] = {};
+    while (!waiting.empty() && estimator.pop(radii)) {
+      by_row.add(waiting.front(), reinterpret_cast<const std::byte*>(radii.data()));
+      waiting.pop_front();
     }
   };
   for (std::size_t b = 0; b < store.buckets(); ++b) {
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
     store.read(b, samples);
-    rows.resize(samples.size());
+    std::vector<std::uint64_t>& rows = waiting.emplace_back(samples.size());
     for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = row_of(samples, i);
     estimator.push(samples);
-    waiting.push_back(rows);
     pop_all();
     if (run.progress) run.progress({"radii", by_row.size(), store.total(), 0, 0});
   }
@@ -167,9 +165,7 @@ PointRadiiReport write_radii(PointSource& source, PointsWriter& writer, const Po
   constexpr std::uint64_t kProgram = std::uint64_t{80} << 20;  // measured: the store's buffers, the window, the program
   constexpr std::uint64_t kRecord = sizeof(float) + 12;
   const std::uint64_t records = std::min<std::uint64_t>(memory, source.info().count * kRecord);
-  constexpr std::uint64_t kRow = 7;
-  require_memory(run, kProgram + records + records / 2 + kRow * source.info().count, source.info().path,
-                 "finding radii");
+  require_memory(run, kProgram + records, source.info().path, "finding radii");
   RunContext silent = run;  // what is left out is told by whoever writes the rows
   silent.log = nullptr;
   NumberedRows positions(source);

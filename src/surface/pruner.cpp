@@ -204,7 +204,7 @@ void Pruner::spill(Slab& slab) {
   slab.radii = !slab.vertices.radius.empty();
   slab.vertices = {};
   slab.vertices.attributes.resize(attributes);
-  slab.triangles = {};
+  slab.triangles = Triangles();  // empty braces would keep the array
   slab.spilled_triangles = triangles;
 }
 

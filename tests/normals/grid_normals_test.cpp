@@ -1,6 +1,7 @@
 // Normals by the faces of an organised scan's grid, against what was scanned.
 #include "normals/grid_normals.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -120,6 +121,47 @@ TEST(GridNormals, ThroughTheWholeSearch) {
   EXPECT_EQ(a.right_side, 1);
   EXPECT_EQ(report.estimated, truth.size());
   EXPECT_EQ(report.by_viewpoint, truth.size());
+}
+
+/// The scan as a part of a PTX file, in a pose that makes it `scale` times as large, mirrors x where it is negative,
+/// and moves it; lines end as on other systems. Adds to the truth.
+std::string ptx_of(const Scan& s, double scale, const Vector& shift, Oriented& truth) {
+  const double size = std::abs(scale);
+  std::string text = fmt::format("{}\r\n{}\r\n0 0 0\r\n1 0 0\r\n0 1 0\r\n0 0 1\r\n", s.grid->lines(), Scan::kAcross);
+  text += fmt::format("{} 0 0 0\r\n0 {} 0 0\r\n0 0 {} 0\r\n{} {} {} 1\r\n", scale, size, size, shift[0], shift[1],
+                      shift[2]);
+  std::size_t row = 0;
+  for (std::uint64_t line = 0; line < s.grid->lines(); ++line) {
+    for (std::size_t at = 0; at < Scan::kAcross; ++at) {
+      if (!s.grid->has(line, at)) {
+        text += "0 0 0 0.5 0 0 0\r\n";
+        continue;
+      }
+      const Vector& p = s.truth.positions[row];
+      const Vector& n = s.truth.normals[row++];
+      text += fmt::format("{} {} {} 0.25 200 100 50\r\n", p[0], p[1], p[2]);
+      truth.add({scale * p[0] + shift[0], size * p[1] + shift[1], size * p[2] + shift[2]},
+                {scale < 0 ? -n[0] : n[0], n[1], n[2]});
+    }
+  }
+  return text;
+}
+
+TEST(GridNormals, OfAPtxFileWithSeveralPoses) {
+  const Scan s = scan();
+  const test::TemporaryFolder folder;
+  Oriented truth;
+  std::string text = ptx_of(s, 1, {0, 0, 0}, truth);
+  text += ptx_of(s, -0.5, {100, 0, 0}, truth);
+  NormalsReport report;
+  const auto found = with_normals(open_points(test::write_file(folder / "scans.ptx", text)), NormalsSettings{}, report);
+  EXPECT_EQ(report.by_viewpoint, truth.size());
+  ASSERT_EQ(found->info().count, truth.size());
+  EXPECT_EQ(found->info().attributes.size(), 4U);
+  const Agreement a = compare(*found, truth);
+  EXPECT_EQ(a.found, 1);
+  EXPECT_GT(a.near, 0.99);
+  EXPECT_EQ(a.right_side, 1);
 }
 
 }  // namespace

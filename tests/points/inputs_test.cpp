@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <numbers>
 #include <random>
 
 #include "files/temporary_folder.h"
@@ -105,6 +106,47 @@ TEST_F(Inputs, AScanListGivesItsScansTheirPoses) {
   // A pose of the whole list comes after those of the scans.
   const std::string pose = write("up.txt", "1 0 0 0  0 1 0 0  0 0 1 5  0 0 0 1");
   EXPECT_EQ(all_rows(*open_points(std::vector{list + "@" + pose}, PointSettings{})).z[0], 6);
+}
+
+TEST_F(Inputs, PublishedPosesOfTheBunny) {
+  // The list as Stanford publishes it. The object stands upright, the scanner's axis (its z) points back to it: scans
+  // of the sides turn about the vertical by what their names say, "top" ones look from above, the chin's from below.
+  // The camera is a viewer's, no scan's.
+  const std::string list =
+      write("bun.conf",
+            "camera -0.0172 -0.0936 -0.734  -0.0461723 0.970603 -0.235889 0.0124573\r\n"
+            "bmesh bun000.ply 0 0 0 0 0 0 1\r\n"
+            "bmesh bun045.ply -0.0520211 -0.000383981 -0.0109223 0.00548449 -0.294635 -0.0038555 0.955586\r\n"
+            "bmesh bun090.ply 2.20761e-05 -3.34606e-05 -7.20881e-05 0.000335889 -0.708202 0.000602459 0.706009\r\n"
+            "bmesh bun180.ply 0.000116991 2.47732e-05 -4.6283e-05 -0.00215148 0.999996 -0.0015001 0.000892527\r\n"
+            "bmesh bun270.ply 0.000130273 1.58623e-05 0.000406764 0.000462632 0.707006 -0.00333301 0.7072\r\n"
+            "bmesh top2.ply -0.0530127 0.138516 0.0990356 0.908911 -0.0569874 0.154429 0.383126\r\n"
+            "bmesh bun315.ply -0.00646017 -1.36122e-05 -0.0129064 0.00449209 0.38422 -0.00976512 0.923179\r\n"
+            "bmesh chin.ply 0.00435102 0.0882863 -0.108853 -0.441019 0.213083 0.00705734 0.871807\r\n");
+  const std::vector<PointInput> scans = expand_inputs({list});
+  ASSERT_EQ(scans.size(), 8U);
+  const auto axis = [&](const std::string& name) {
+    for (const PointInput& scan : scans) {
+      const Pose& p = scan.pose;
+      if (std::filesystem::path(scan.path).stem() == name) return std::array{p[0][2], p[1][2], p[2][2]};
+    }
+    return std::array{0.0, 0.0, 0.0};
+  };
+  const auto sideways = [&](const std::string& name, double degrees, double tolerance) {
+    const std::array<double, 3> a = axis(name);
+    EXPECT_NEAR(a[1], 0, 0.02) << name;
+    EXPECT_NEAR(std::remainder(std::atan2(a[0], a[2]) * 180 / std::numbers::pi - degrees, 360), 0, tolerance) << name;
+  };
+  sideways("bun000", 0, 0);
+  sideways("bun090", 90, 0.5);
+  sideways("bun180", 180, 0.5);
+  sideways("bun270", 270, 0.5);
+  sideways("bun045", 45, 12);  // turned by hand
+  sideways("bun315", 315, 2);
+  EXPECT_GT(axis("top2")[1], 0.5);
+  EXPECT_LT(axis("chin")[1], -0.5);
+  EXPECT_EQ(scans[1].pose[0][3], -0.0520211);
+  EXPECT_EQ(scans[1].pose[2][3], -0.0109223);
 }
 
 TEST_F(Inputs, RangeGridsAreTheirVertices) {

@@ -262,6 +262,79 @@ TEST_F(LasPoints, HeadersThatLie) {
     EXPECT_NE(test::refusal(write(good.substr(0, size))), "") << size;
 }
 
+/// A record behind the points, which may be longer than those before.
+std::string extended_record(const std::string& user, std::uint16_t id, const std::string& data) {
+  std::string b(60, '\0');
+  b.replace(2, user.size(), user);
+  put_at(b, 18, id);
+  put_at(b, 20, static_cast<std::uint64_t>(data.size()));
+  return b + data;
+}
+
+TEST_F(LasPoints, RecordsBehindThePoints) {
+  const LasFile file{.minor = 4, .format = 6, .points = random_points(30, 65535)};
+  const std::string good = las_bytes(file);
+  const auto with = [&](const std::string& records, std::uint32_t count, std::uint64_t begin) {
+    std::string bytes = good;
+    put_at(bytes, 235, begin);
+    put_at(bytes, 243, count);
+    return open_points(write(bytes + records));
+  };
+  const std::string text = extended_record("LASF_Projection", 2112, "GEOGCS[\"WGS 84\",DATUM[]]");
+  const auto geographic = with(extended_record("other", 7, std::string(70'000, 'x')) + text, 2, good.size());
+  EXPECT_TRUE(geographic->info().geographic);
+  EXPECT_THAT(geographic->info().remarks, IsEmpty());
+  EXPECT_EQ(all_rows(*geographic).size(), 30U);
+  // Those that lie: begin nowhere, go on without end, are longer than the file. Points do not depend on them.
+  std::string endless = text;
+  put_at(endless, 20, ~std::uint64_t{0});
+  for (const auto& source : {with(text, 1, ~std::uint64_t{0}), with(text, 1, 3), with(endless, 1, good.size()),
+                             with(endless, ~std::uint32_t{0}, good.size())}) {
+    EXPECT_FALSE(source->info().geographic);
+    EXPECT_EQ(all_rows(*source).size(), 30U);
+  }
+  EXPECT_TRUE(with(text, ~std::uint32_t{0}, good.size())->info().geographic);
+}
+
+TEST_F(LasPoints, CountsOfBothGenerations) {
+  // 1.4 keeps the old count for old formats, or 0 where it does not fit; the wide one decides where there is one.
+  const LasFile file{.minor = 4, .format = 3, .points = random_points(30, 65535)};
+  const auto counted = [&](std::uint32_t narrow, std::uint64_t wide) {
+    std::string bytes = las_bytes(file);
+    put_at(bytes, 107, narrow);
+    put_at(bytes, 247, wide);
+    return open_points(write(bytes));
+  };
+  for (const auto& [narrow, wide] : {std::pair{30U, 30U}, std::pair{0U, 30U}, std::pair{30U, 0U}, std::pair{7U, 30U}}) {
+    const auto source = counted(narrow, wide);
+    EXPECT_EQ(source->info().count, 30U);
+    EXPECT_THAT(source->info().remarks, IsEmpty());
+  }
+  const auto fewer = counted(30, 28);
+  EXPECT_EQ(fewer->info().count, 28U);
+  EXPECT_THAT(fewer->info().remarks, ElementsAre(HasSubstr("counts 28 points; behind them is room for 2 more")));
+}
+
+TEST_F(LasPoints, NoPointsAndThoseThatWereNeverCounted) {
+  for (const int minor : {0, 2, 3, 4}) {
+    SCOPED_TRACE(minor);
+    const LasFile none{.minor = minor, .format = minor == 4 ? 6 : 1};
+    EXPECT_EQ(open(none)->info().count, 0U);
+    EXPECT_EQ(all_rows(*open(none)).size(), 0U);
+    LasFile file = none;
+    file.points = random_points(30, 65535);
+    std::string bytes = las_bytes(file);
+    put_at(bytes, 107, std::uint32_t{0});
+    if (minor == 4) put_at(bytes, 247, std::uint64_t{0});
+    EXPECT_THAT(test::refusal(write(bytes)), HasSubstr("counts no points"));
+    EXPECT_THAT(test::refusal(write(bytes)), HasSubstr("there is room for 30"));
+  }
+  // Wave packets lie behind the points, too.
+  std::string waves = las_bytes({.minor = 3, .format = 4, .points = random_points(30, 65535)});
+  put_at(waves, 227, static_cast<std::uint64_t>(waves.size()));
+  EXPECT_THAT(open_points(write(waves + std::string(5000, 'w')))->info().remarks, IsEmpty());
+}
+
 TEST_F(LasPoints, RealFiles) {
   const std::string folder = LAMINA_SOURCE_DIR "/../shared/data/";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is absent";

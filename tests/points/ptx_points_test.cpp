@@ -53,6 +53,65 @@ TEST_F(PtxPoints, KnowsWhereItsScannersStood) {
   }
 }
 
+TEST_F(PtxPoints, PublishedExample) {
+  // Pose, points and what becomes of them as LAStools' makers publish them ("Matrix transformation in LAStools"), three
+  // of six returns; coordinates there are rounded to millimetres.
+  const auto source = open_points(
+      write("2\n3\n0.000000 0.000000 0.000000\n1.000000 0.000000 0.000000\n0.000000 1.000000 0.000000\n"
+            "0.000000 0.000000 1.000000\n-0.955179 0.296021 -0.002106 0.000000\n-0.296023 -0.955180 0.001152 0.000000\n"
+            "-0.001670 0.001724 0.999997 0.000000\n3.847211 12.235314 -0.425777 1.000000\n"
+            "1.111111 2.111111 3.111 0.111\n1.222222 2.222222 3.222 0.212\n0 0 0 0\n0 0 0 0 \n"
+            "1.333333 2.333333 3.333 0.312\n0 0 0 0\n"));
+  const SampleBatch rows = all_rows(*source);
+  ASSERT_EQ(rows.size(), 3U);
+  const double expected[3][3] = {{2.156, 10.553, 2.685}, {2.017, 10.480, 2.796}, {1.877, 10.407, 2.907}};
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_NEAR(rows.x[i], expected[i][0], 5.1e-4);
+    EXPECT_NEAR(rows.y[i], expected[i][1], 5.1e-4);
+    EXPECT_NEAR(rows.z[i], expected[i][2], 5.1e-4);
+  }
+}
+
+TEST_F(PtxPoints, LineEndsOfOtherSystems) {
+  std::string text = scan(2, 2, "1 2 3 0.5 10 20 30\n0 0 0 0.5 0 0 0\n4 5 6 0.25 40 50 60\n0 0 0 0 0 0 0\n") +
+                     scan(1, 1, "7 8 9 1 70 80 90\n");
+  const SampleBatch expected = all_rows(write(text));
+  ASSERT_EQ(expected.size(), 3U);
+  for (const std::string end : {"\r\n", "\r"}) {
+    std::string other;
+    for (const char c : text) other += c == '\n' ? end : std::string(1, c);
+    for (const std::string& whole : {other, other.substr(0, other.size() - end.size())}) {  // also without the last one
+      const SampleBatch rows = all_rows(write(whole));
+      EXPECT_EQ(rows.x, expected.x);
+      EXPECT_EQ(rows.z, expected.z);
+      EXPECT_EQ(rows.attributes, expected.attributes);
+    }
+  }
+}
+
+TEST_F(PtxPoints, PosesThatScaleAndMirror) {
+  // Millimetres to metres, and x mirrored: as the matrix says, whatever the lines above it say.
+  const std::string header = "1\n2\n9 9 9\n1 0 0\n0 1 0\n0 0 1\n-0.001 0 0 0\n0 0.001 0 0\n0 0 0.001 0\n1 2 3 1\n";
+  const auto source = open_points(write(header + "1000 2000 3000 0.5\n-500 0 0 0.5\n"));
+  const SampleBatch rows = all_rows(*source);
+  EXPECT_THAT(rows.x, ElementsAre(0, 1.5));
+  EXPECT_THAT(rows.y, ElementsAre(4, 2));
+  EXPECT_THAT(rows.z, ElementsAre(6, 3));
+  ASSERT_EQ(source->info().scans.size(), 1U);
+  EXPECT_THAT(source->info().scans[0].at, ElementsAre(1, 2, 3));
+  for (const auto& [good, bad] : {std::pair{"1 2 3 1", "1 2 3 0"}, std::pair{"1 2 3 1", "nan 2 3 1"},
+                                  std::pair{"0 0.001 0 0", "0 0.001 0 1"}, std::pair{"0 0.001 0 0", "0.001 0 0 0"}}) {
+    std::string text = header;
+    text.replace(text.find(good), std::string(good).size(), bad);
+    EXPECT_THAT(test::refusal(write(text + "1 2 3 0.5\n1 2 3 0.5\n")), HasSubstr("line 7")) << bad;
+  }
+}
+
+TEST_F(PtxPoints, ScansMustAgreeAboutTheirValues) {
+  EXPECT_THAT(test::refusal(write(scan(1, 1, "1 2 3 0.5\n") + scan(1, 1, "1 2 3 0.5 10 20 30\n"))),
+              HasSubstr("line 22: 4 values expected, more stand there"));
+}
+
 TEST_F(PtxPoints, Colours) {
   const auto source = open_points(write(scan(1, 1, "1 2 3 0.5 10 20 30\n")));
   EXPECT_EQ(source->info().attributes[3], (AttributeSpec{"blue", ScalarType::uint8}));

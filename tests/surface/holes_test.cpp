@@ -67,7 +67,7 @@ TEST(Holes, OfASphereAreClosedOnTheSphere) {
 
 TEST(Holes, OfAClosedThingAreAllClosedWhereAskedFor) {
   // Too wide for the bound.
-  const Cloud cloud = pierced_sphere(8000, {{0.6, 0, 0.8}, {-0.6, 0, 0.8}}, 0.23);
+  const Cloud cloud = pierced_sphere(16000, {{0.6, 0, 0.8}, {-0.6, 0, 0.8}}, 0.165);
   SurfaceSettings s = closing(8);
   s.watertight = false;
   const Reconstruction open = test::reconstruct(cloud, s);

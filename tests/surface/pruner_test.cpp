@@ -12,6 +12,7 @@
 #include "files/temporary_folder.h"
 #include "lamina/error.h"
 #include "lamina/mesh.h"
+#include "support/heap.h"
 
 namespace lamina {
 namespace {
@@ -170,6 +171,28 @@ TEST(Pruner, TrianglesThatReachFartherBackAreRefused) {
   PruneCounts counts;
   EXPECT_THROW(prune_streamed(slabs, {2, 0}, 0, folder.path(), counts), Error);
   EXPECT_EQ(folder.entries(), 0);
+}
+
+/// Takes what stays and keeps none of it.
+class Nowhere final : public SlabSink {
+ public:
+  void write(const FinalSlab&, const VertexBatch&) override {}
+};
+
+TEST(Pruner, WhatWaitsInTheFileDoesNotWaitInMemory) {
+  if (!test::heap_is_counted()) GTEST_SKIP() << "the heap is a sanitizer's";
+  // One slab of many triangles that may still turn out to be small.
+  std::mt19937 random(1);
+  const auto slabs = random_slabs(random, 1, 3000, 60);
+  const std::size_t bytes = slabs[0].triangles.size() * sizeof(Triangle);
+  ASSERT_GT(bytes, 200'000U);
+  const test::TemporaryFolder folder;
+  Nowhere next;
+  Pruner pruner({1'000'000'000, 0}, folder.path(), next, 0);
+  const std::size_t before = test::heap_bytes();
+  pruner.add(slabs[0].vertices, slabs[0].triangles);
+  EXPECT_GE(pruner.disk_bytes(), bytes);
+  EXPECT_LT(test::heap_bytes(), before + bytes / 2);
 }
 
 TEST(Pruner, AFullDiskIsSaid) {

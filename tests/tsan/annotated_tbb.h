@@ -5,18 +5,8 @@
 // Jobs that run side by side get no order among them: their races are found. Stages of a pipeline are the exception:
 // every stage waits for all that ended before it began.
 #pragma once
-#include <tbb/blocked_range.h>
-#include <tbb/combinable.h>
-#include <tbb/enumerable_thread_specific.h>
-#include <tbb/global_control.h>
-#include <tbb/parallel_for.h>
-#include <tbb/parallel_invoke.h>
-#include <tbb/parallel_pipeline.h>
-#include <tbb/parallel_reduce.h>
-#include <tbb/parallel_sort.h>
-#include <tbb/partitioner.h>
-#include <tbb/task_arena.h>
-#include <tbb/task_group.h>
+// All of it: no header of TBB may come after the name is another's.
+#include <tbb/tbb.h>
 
 #include <algorithm>
 #include <memory>
@@ -106,9 +96,15 @@ class task_group {
  public:
   template <class Body>
   void run(Body body) {
-    auto kept = std::make_shared<Body>(std::move(body));
+    Body* const kept = new Body(std::move(body));  // the job's to delete
     __tsan_release(&order_.begun);
-    group_.run([ kept, this ]() __attribute__((no_sanitize("thread"))) { job(*kept, order_)(); });
+    group_.run([ kept, this ]() __attribute__((no_sanitize("thread"))) {
+      const auto work = [kept] {
+        const std::unique_ptr<Body> owner(kept);
+        (*owner)();
+      };
+      job(work, order_)();
+    });
   }
   auto wait() {
     return ordered(order_, [&] { return group_.wait(); });
@@ -122,7 +118,8 @@ class task_group {
 
 class task_arena {
  public:
-  explicit task_arena(int threads = ::tbb::task_arena::automatic) : arena_(threads) {}
+  static constexpr int automatic = ::tbb::task_arena::automatic;
+  explicit task_arena(int threads = automatic) : arena_(threads) {}
   template <class Body>
   auto execute(const Body& body) {
     Order order;
