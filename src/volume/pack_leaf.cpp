@@ -32,6 +32,7 @@ void put_compressed(std::string& to, const void* data, std::size_t bytes, std::s
 void halve(std::span<const float> values, std::uint16_t* out) {
   std::transform(values.begin(), values.end(), out, [](float v) { return openvdb::math::half(v).bits(); });
 }
+#ifndef __clang__  // which cannot ask for f16c before its version 19
 [[gnu::target("avx,f16c")]] void halve_wide(std::span<const float> values, std::uint16_t* out) {
   std::size_t i = 0;
   for (; i + 8 <= values.size(); i += 8) {
@@ -40,10 +41,11 @@ void halve(std::span<const float> values, std::uint16_t* out) {
   }
   halve(values.subspan(i), out + i);
 }
+#endif
 using Halve = void (*)(std::span<const float> values, std::uint16_t* out);
 Halve fastest_halve() {
   __builtin_cpu_init();
-#ifndef __clang__  // which knows no such name before its version 19
+#ifndef __clang__
   if (__builtin_cpu_supports("avx") && __builtin_cpu_supports("f16c")) return &halve_wide;
 #endif
   return &halve;
