@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <iterator>
 #include <utility>
 
 #include "project/corner_value.h"
@@ -37,7 +36,6 @@ struct Band::Found {
 Band::Band(BandSettings settings, const Lattice& lattice)
     : settings_(std::move(settings)),
       lattice_(lattice),
-      farthest_(static_cast<float>(settings_.band) - 0.5F),
       bricks_(std::clamp(settings_.rounds, 0, kMaxRounds), settings_.channels.size()) {
   settings_.rounds = std::clamp(settings_.rounds, 0, kMaxRounds);
 }
@@ -75,6 +73,7 @@ void Band::collect_level(const Window& window, std::int32_t slab) {
     if (any != 0) jobs.push_back({t.leaf, &bricks_.touch(t.block), begin, end});
   }
   const float per_voxel = 1.0F / static_cast<float>(lattice_.cell_size(level));
+  const Growth growth = growth_of(settings_);
   tbb::parallel_for(std::size_t{0}, jobs.size(), [&](std::size_t j) {
     const auto [leaf, brick, begin, end] = jobs[j];
     for (int z = begin; z < end; ++z) {
@@ -83,18 +82,19 @@ void Band::collect_level(const Window& window, std::int32_t slab) {
       if (values.count == 0) continue;
       const std::uint32_t base = leaf->value_index(z * 64, window.brick_layers(level));
       const std::uint64_t near = leaf->near.words[z];
+      LayerMasks masks(0, growth);
       for (std::uint64_t w = leaf->good.words[z] & leaf->valued.words[z]; w != 0; w &= w - 1) {
         const int bit = std::countr_zero(w), at = z * 64 + bit;
         const std::uint32_t i =
             base + static_cast<std::uint32_t>(std::popcount(near & ((std::uint64_t{1} << bit) - 1)));
-        const float d = values.channel(kDistance)[i] * per_voxel;
-        brick->known[0].set(at);
-        if (std::abs(d) < farthest_) brick->source[0].set(at);
-        brick->plane[at] =
-            Plane{values.channel(kNormalX)[i], values.channel(kNormalX + 1)[i], values.channel(kNormalX + 2)[i], d};
+        const Plane plane{values.channel(kNormalX)[i], values.channel(kNormalX + 1)[i], values.channel(kNormalX + 2)[i],
+                          values.channel(kDistance)[i] * per_voxel};
+        brick->plane[at] = plane;
+        masks.add(bit, plane);
         for (std::size_t c = 0; c < settings_.channels.size(); ++c)
           brick->extra[c * 512 + at] = values.channel(settings_.channels[c])[i];
       }
+      brick->know(z, masks);
     }
   });
 }
@@ -103,9 +103,10 @@ void Band::put(const Found& f) {
   Brick& brick = bricks_.touch(block_of(f.at));
   const int at = offset_in_block(f.at);
   if (brick.known[0].test(at)) return;
-  brick.known[0].set(at);
-  if (std::abs(f.distance) < farthest_) brick.source[0].set(at);
   brick.plane[at] = Plane{f.normal[0], f.normal[1], f.normal[2], f.distance};
+  LayerMasks masks(0, growth_of(settings_));
+  masks.add(at & 63, brick.plane[at]);
+  brick.know(at >> 6, masks);
   for (std::size_t c = 0; c < f.extra.size(); ++c) brick.extra[c * 512 + at] = f.extra[c];
 }
 
@@ -258,17 +259,17 @@ void Band::advance(bool end) {
   }
 }
 
-std::vector<std::unique_ptr<Brick>> Band::pop(bool end) {
+std::vector<Brick*> Band::pop(bool end) {
   advance(end);
-  std::vector<std::unique_ptr<Brick>> out;
+  std::vector<Brick*> out;
   // A layer's last plane is still read by the round of the plane above.
   const std::int32_t done = done_[settings_.rounds] - (settings_.rounds > 0 ? 1 : 0);
   while (!bricks_.empty() && begun_ && (end || bricks_.lowest() * 8 + 8 < done)) {
-    std::vector<std::unique_ptr<Brick>> layer = bricks_.take_lowest();
-    const auto full = std::stable_partition(layer.begin(), layer.end(), [&](const auto& b) { return all(*b).any(); });
-    std::move(layer.begin(), full, std::back_inserter(out));
+    std::vector<Brick*> layer = bricks_.take_lowest();
+    const auto full = std::stable_partition(layer.begin(), layer.end(), [](const Brick* b) { return b->active.any(); });
+    out.insert(out.end(), layer.begin(), full);
     layer.erase(layer.begin(), full);
-    bricks_.give_back(std::move(layer));
+    bricks_.give_back(layer);
   }
   return out;
 }

@@ -3,7 +3,6 @@
 #pragma once
 #include <array>
 #include <cstdint>
-#include <memory>
 #include <utility>
 #include <vector>
 
@@ -20,15 +19,20 @@ struct BandSettings {
   std::vector<int> channels;  ///< of the window (corner_block.h), beside distance and normal
 };
 
+inline Growth growth_of(const BandSettings& settings) {
+  return {static_cast<float>(settings.band), settings.rounds};
+}
+
 class Band {
  public:
   Band(BandSettings settings, const Lattice& lattice);
   /// Takes the slab's corners, slab after slab. The slabs below and above must be finished, their values still there.
   void collect(const Window& window, std::int32_t slab);
-  /// Bricks in which nothing changes any more, in canonical order (z, y, x); with `end`, all that are left.
-  std::vector<std::unique_ptr<Brick>> pop(bool end);
+  /// Bricks in which nothing changes any more, in canonical order (z, then as BrickMap has them); with `end`, all that
+  /// are left.
+  std::vector<Brick*> pop(bool end);
   /// Bricks that were popped and are done with.
-  void give_back(std::vector<std::unique_ptr<Brick>> bricks) { bricks_.give_back(std::move(bricks)); }
+  void give_back(const std::vector<Brick*>& bricks) { bricks_.give_back(bricks); }
   /// After pop(true): the memory of those given back.
   void free_spare() { bricks_.free_spare(); }
   [[nodiscard]] const BandSettings& settings() const { return settings_; }
@@ -47,7 +51,6 @@ class Band {
 
   BandSettings settings_;
   Lattice lattice_;
-  float farthest_;  ///< a step along the normal, half a voxel at least, leads out of the band from here
   BrickMap bricks_;
   std::int32_t known_end_ = 0;                       ///< planes below are collected
   std::array<std::int32_t, kMaxRounds + 1> done_{};  ///< planes below have had the round

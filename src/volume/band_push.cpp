@@ -2,6 +2,7 @@
 
 #include <immintrin.h>
 
+#include <algorithm>
 #include <bit>
 
 namespace lamina::volume {
@@ -44,30 +45,63 @@ constexpr WidePairs make_wide() {
 }
 constexpr WidePairs kWidePairs = make_wide();
 
-/// Reach with all pairs at once: the same operations in the same order.
-struct WideReach {
-  std::uint32_t pairs, behind;
-  alignas(64) std::array<float, 16> up, near;
+constexpr std::array<std::int32_t, 16> make_wide_steps() {
+  std::array<std::int32_t, 16> out{};
+  for (std::size_t i = 0; i < kPairs; ++i) out[i] = kPairSteps[i];
+  return out;
+}
+alignas(64) constexpr std::array<std::int32_t, 16> kWideSteps = make_wide_steps();
 
-  [[gnu::always_inline, gnu::target("avx512f")]] inline explicit WideReach(const Plane& plane) {
+constexpr std::size_t kFew = 32;  ///< pushers
+
+/// What pushers say to whom, one after the other.
+struct Said {
+  static constexpr std::size_t kMost = kFew * kPairs + 16;  ///< sixteen are written at once
+  std::array<std::int32_t, kMost> to, pusher;
+  std::array<float, kMost> up, weight;
+};
+
+/// Reach with all pairs at once: the same operations in the same order. First what is said, then the sums: how many
+/// there are to each pusher cannot be foretold.
+[[gnu::target("avx512f,popcnt")]] void push_few(std::span<const Pusher> pushers, std::size_t channels, Sums& sums) {
+  Said said;
+  std::array<Plane, kFew> planes;
+  std::size_t count = 0;
+  const __m512 none = _mm512_setzero_ps();
+  const __m512i steps = _mm512_load_si512(kWideSteps.data());
+  for (std::size_t n = 0; n < pushers.size(); ++n) {
+    const Pusher& p = pushers[n];
+    const Plane plane = planes[n] = p.from->plane[p.at];
     const __m512 x = _mm512_mul_ps(_mm512_set1_ps(plane[0]), _mm512_load_ps(kWidePairs.x.data()));
     const __m512 y = _mm512_mul_ps(_mm512_set1_ps(plane[1]), _mm512_load_ps(kWidePairs.y.data()));
     const __m512 z = _mm512_mul_ps(_mm512_set1_ps(plane[2]), _mm512_load_ps(kWidePairs.z.data()));
-    const __m512 u = _mm512_add_ps(_mm512_add_ps(x, y), z);
-    const __m512 left = _mm512_add_ps(_mm512_load_ps(kWidePairs.room.data()), _mm512_mul_ps(u, u));
-    _mm512_store_ps(up.data(), u);
-    _mm512_store_ps(near.data(), left);
-    pairs = _mm512_cmp_ps_mask(left, _mm512_setzero_ps(), _CMP_NLT_UQ);
-    behind = _mm512_cmp_ps_mask(u, _mm512_setzero_ps(), _CMP_LT_OQ);
-    if (!(plane[3] < 0)) behind = ~behind;
+    const __m512 up = _mm512_add_ps(_mm512_add_ps(x, y), z);
+    const __m512 near = _mm512_add_ps(_mm512_load_ps(kWidePairs.room.data()), _mm512_mul_ps(up, up));
+    std::uint32_t back = _mm512_cmp_ps_mask(up, none, _CMP_LT_OQ);
+    if (!(plane[3] < 0)) back = ~back;
+    const std::uint32_t pairs = _mm512_cmp_ps_mask(near, none, _CMP_NLT_UQ);
+    const auto before = static_cast<__mmask16>(pairs & ~back & p.beside.before);
+    const auto all = static_cast<__mmask16>((pairs & back & p.beside.behind) | before);
+    const __m512i to = _mm512_mask_sub_epi32(steps, before, _mm512_setzero_si512(), steps);
+    const __m512 square = _mm512_mul_ps(near, near);
+    _mm512_storeu_si512(&said.to[count],
+                        _mm512_maskz_compress_epi32(all, _mm512_add_epi32(to, _mm512_set1_epi32(p.here))));
+    _mm512_storeu_si512(&said.pusher[count], _mm512_set1_epi32(static_cast<std::int32_t>(n)));
+    _mm512_storeu_ps(&said.up[count], _mm512_maskz_compress_ps(all, _mm512_mask_sub_ps(up, before, none, up)));
+    _mm512_storeu_ps(&said.weight[count],
+                     _mm512_maskz_compress_ps(all, _mm512_mul_ps(_mm512_mul_ps(square, near), near)));
+    count += static_cast<std::size_t>(std::popcount(static_cast<std::uint32_t>(all)));
   }
-};
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto n = static_cast<std::size_t>(said.pusher[i]);
+    sums.add(said.to[i], said.weight[i], planes[n] + Plane{0, 0, 0, said.up[i]}, *pushers[n].from, pushers[n].at,
+             channels);
+  }
+}
 
-[[gnu::target("avx512f")]] void push_wide(std::span<const Pusher> pushers, std::size_t channels, Sums& sums) {
-  for (const Pusher& p : pushers) {
-    const Plane plane = p.from->plane[p.at];
-    add(p, plane, WideReach(plane), channels, sums);
-  }
+void push_wide(std::span<const Pusher> pushers, std::size_t channels, Sums& sums) {
+  for (std::size_t i = 0; i < pushers.size(); i += kFew)
+    push_few(pushers.subspan(i, std::min(kFew, pushers.size() - i)), channels, sums);
 }
 
 }  // namespace

@@ -123,6 +123,7 @@ class Targets {
  public:
   Targets(const BlockMask& wanted, int begin, int end) {
     for (int z = begin; z < end; ++z) {
+      if (wanted.words[z] == 0) continue;
       for (int y = 0; y < 8; ++y) {
         const std::uint64_t row = std::uint64_t{kSpread[wanted.words[z] >> (8 * y) & 0xFF]} << 6;
         if (row == 0) continue;

@@ -9,47 +9,12 @@
 
 #include "lamina/error.h"
 #include "lamina/volume_export.h"
+#include "volume/brick_sides.h"
 #include "volume/full_range.h"
 #include "volume/mask_axes.h"
 #include "volume/pack_leaf.h"
-#include "window/bits.h"
 
 namespace lamina::volume {
-namespace {
-
-/// A voxel's layer beside: one step along every axis.
-BlockMask dilated(const BlockMask& m) {
-  BlockMask out = m;
-  for (int z = 0; z < 8; ++z) {
-    const std::uint64_t w = m.words[z];
-    out.words[z] |= bits::shift_x(0, w, 0, 1) | bits::shift_x(0, w, 0, -1) | w << 8 | w >> 8;
-    if (z > 0) out.words[z] |= m.words[z - 1];
-    if (z < 7) out.words[z] |= m.words[z + 1];
-  }
-  return out;
-}
-
-/// Voxels nobody knows take the side of the nearest that somebody does, outside first.
-BlockMask inside_of(const BlockMask& negative, const BlockMask& known) {
-  BlockMask inside = negative, outside;
-  for (int z = 0; z < 8; ++z) outside.words[z] = known.words[z] & ~negative.words[z];
-  if (!inside.any()) return inside;
-  for (int step = 0; step < 24; ++step) {
-    std::uint64_t rest = 0;
-    const BlockMask more = dilated(outside), less = dilated(inside);
-    for (int z = 0; z < 8; ++z) {
-      const std::uint64_t free = ~(inside.words[z] | outside.words[z]);
-      outside.words[z] |= more.words[z] & free;
-      inside.words[z] |= less.words[z] & free & ~more.words[z];
-      rest |= free;
-    }
-    if (rest == 0) break;
-  }
-  return inside;
-}
-
-}  // namespace
-
 std::vector<ExtraGrid> resolve_grids(const std::vector<std::string>& names, const AttributeLayout& layout, double step,
                                      std::vector<int>& channels) {
   const auto red = find_attribute(layout, "red"), green = find_attribute(layout, "green"),
@@ -102,31 +67,20 @@ LeafMaker::LeafMaker(const Band& b, const GridFrame& g, const std::vector<ExtraG
   }
 }
 
-BrickLeaves LeafMaker::operator()(const Brick& brick) const {
-  BrickLeaves out;
-  const BlockMask& known = band.all(brick);
-  const auto limit = static_cast<float>(band.settings().band);
-  BlockMask active, negative;
-  for (int z = 0; z < 8; ++z)
-    for (std::uint64_t w = known.words[z]; w != 0; w &= w - 1)
-      __builtin_prefetch(&brick.plane[z * 64 + std::countr_zero(w)]);
-  for (int z = 0; z < 8; ++z) {
-    for (std::uint64_t w = known.words[z]; w != 0; w &= w - 1) {
-      const int bit = std::countr_zero(w);
-      const float d = brick.distance(static_cast<std::size_t>(z * 64 + bit));
-      active.words[z] |= std::uint64_t{std::abs(d) < limit} << bit;
-      negative.words[z] |= std::uint64_t{d < 0} << bit;
-    }
-  }
-  if (!active.any()) return out;
+void LeafMaker::operator()(const Brick& brick, BrickLeaves& out) const {
+  out.any = false;
+  if (!brick.active.any()) return;
   out.any = true;
-  LeafMasks masks{with_axes(active, axes), with_axes(inside_of(negative, known), axes)};
+  out.leaves.resize(1 + extras.size());
+  LeafMasks masks{with_axes(brick.active, axes), with_axes(inside_of(brick.negative, band.all(brick)), axes)};
   // The active voxels of the brick in the leaf's order.
   std::array<std::uint16_t, 512> order;
   std::size_t count = 0;
   for (int x = 0; x < 8; ++x) {
-    for (std::uint64_t w = masks.active.words[x]; w != 0; w &= w - 1)
-      order[count++] = voxel_at[x * 64 + std::countr_zero(w)];
+    for (std::uint64_t w = masks.active.words[x]; w != 0; w &= w - 1) {
+      order[count] = voxel_at[x * 64 + std::countr_zero(w)];
+      __builtin_prefetch(&brick.plane[order[count++]]);
+    }
   }
 
   const openvdb::Coord origin = grid.index({brick.block.x * 8, brick.block.y * 8, brick.block.z * 8});
@@ -134,11 +88,13 @@ BrickLeaves LeafMaker::operator()(const Brick& brick) const {
   const std::span<const float> scalars{values.data(), count}, vectors{values.data(), 3 * count};
   const auto voxel = static_cast<float>(grid.voxel);
   for (std::size_t i = 0; i < count; ++i) values[i] = brick.distance(order[i]) * voxel;
-  out.leaves.push_back(pack(origin, masks, scalars, 1, half));
-  out.leaves.back().faces = face_votes(masks.active, masks.inside);
+  pack(origin, masks, scalars, 1, half, out.leaves[0]);
+  out.leaves[0].faces = face_votes(masks.active, masks.inside);
 
   masks.inside = {};
-  for (const ExtraGrid& extra : extras) {
+  for (std::size_t e = 0; e < extras.size(); ++e) {
+    const ExtraGrid& extra = extras[e];
+    PackedLeaf& leaf = out.leaves[1 + e];
     const auto value = [&](std::size_t k, int at) {
       return extra.scale *
              brick.extra[static_cast<std::size_t>(extra.channels[k]) * 512 + static_cast<std::size_t>(at)];
@@ -150,7 +106,7 @@ BrickLeaves LeafMaker::operator()(const Brick& brick) const {
         const float own = brick.known[0].test(order[i]) ? std::max(0.0F, 1 - value(0, order[i])) : 0.0F;
         values[i] = weight ? own : value(0, order[i]);
       }
-      out.leaves.push_back(pack(origin, masks, scalars, 1, half));
+      pack(origin, masks, scalars, 1, half, leaf);
       continue;
     }
     for (std::size_t i = 0; i < count; ++i) {
@@ -164,9 +120,8 @@ BrickLeaves LeafMaker::operator()(const Brick& brick) const {
         for (int k = 0; k < 3; ++k) v[k] = static_cast<float>(n[k]);
       }
     }
-    out.leaves.push_back(pack(origin, masks, vectors, 3, half));
+    pack(origin, masks, vectors, 3, half, leaf);
   }
-  return out;
 }
 
 }  // namespace lamina::volume

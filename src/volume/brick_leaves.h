@@ -45,7 +45,8 @@ struct LeafMaker {
   std::array<int, 3> axes{};                ///< where the brick's axes go in its leaf (mask_axes.h)
   std::array<std::uint16_t, 512> voxel_at;  ///< of the brick, for each place of the leaf
 
-  [[nodiscard]] BrickLeaves operator()(const Brick& brick) const;
+  /// `out` may hold those of another brick, whose memory is used again.
+  void operator()(const Brick& brick, BrickLeaves& out) const;
 };
 
 }  // namespace lamina::volume

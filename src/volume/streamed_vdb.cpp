@@ -10,7 +10,10 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <memory>
+#include <numeric>
 #include <sstream>
+#include <string_view>
 #include <tuple>
 
 #include "lamina/error.h"
@@ -133,10 +136,40 @@ std::uint64_t StreamedVdb::leaves() const {
   return n;
 }
 
-std::string StreamedVdb::read(const Record& record, std::size_t bytes) const {
-  std::string out(bytes, '\0');
-  spool_.read(record.at, {reinterpret_cast<std::byte*>(out.data()), bytes});
-  return out;
+/// Where the records of the lower node (or with shift 9 of the upper node) end that begins at `begin`.
+std::size_t StreamedVdb::end_of_node(const Grid& grid, std::size_t begin, int shift) {
+  const auto& first = grid.leaves[begin].place.leaf;
+  std::size_t end = begin;
+  const auto same = [&](const LeafVotes& place) {
+    for (std::size_t k = 0; k < 3; ++k)
+      if (place.leaf[k] >> shift != first[k] >> shift) return false;
+    return true;
+  };
+  while (end < grid.leaves.size() && same(grid.leaves[end].place)) ++end;
+  return end;
+}
+
+/// Records in the file's order, out of a spool that holds runs of them in the order they came.
+template <class Visit>
+void StreamedVdb::visit_records(std::span<const Record> records, const Visit& visit) const {
+  std::vector<std::uint32_t> order(records.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::sort(order.begin(), order.end(), [&](auto a, auto b) { return records[a].at < records[b].at; });
+  std::size_t bytes = 0;
+  for (const Record& r : records) bytes += r.size;
+  const auto buffer = std::make_unique_for_overwrite<char[]>(bytes);
+  std::vector<std::size_t> places(records.size());
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < order.size();) {
+    const std::uint64_t from = records[order[i]].at;
+    const std::size_t to = at;
+    for (; i < order.size() && records[order[i]].at == from + (at - to); ++i) {
+      places[order[i]] = at;
+      at += records[order[i]].size;
+    }
+    spool_.read(from, {reinterpret_cast<std::byte*>(buffer.get() + to), at - to});
+  }
+  for (std::size_t i = 0; i < records.size(); ++i) visit(std::string_view(buffer.get() + places[i], records[i].size));
 }
 
 /// A tree's skeleton: background, nodes with the masks of their children and the values of their tiles, leaf masks.
@@ -156,18 +189,8 @@ void StreamedVdb::write_topology(std::ostream& os, const Grid& grid) const {
   const TileSigns signs(places);
   const Value inside = has_signs ? Value(-background) : background;
 
-  const auto end_of_run = [&](std::size_t begin, int shift) {
-    std::size_t end = begin;
-    const auto same = [&](std::size_t i) {
-      for (std::size_t k = 0; k < 3; ++k)
-        if (grid.leaves[i].place.leaf[k] >> shift != grid.leaves[begin].place.leaf[k] >> shift) return false;
-      return true;
-    };
-    while (end < grid.leaves.size() && same(end)) ++end;
-    return end;
-  };
   Index uppers = 0;
-  for (std::size_t i = 0; i < grid.leaves.size(); i = end_of_run(i, 9)) ++uppers;
+  for (std::size_t i = 0; i < grid.leaves.size(); i = end_of_node(grid, i, 9)) ++uppers;
 
   put(os, std::int32_t{1});  // buffers
   put(os, half ? Value(io::truncateRealToHalf(background)) : background);
@@ -175,12 +198,12 @@ void StreamedVdb::write_topology(std::ostream& os, const Grid& grid) const {
   put(os, Index{0});  // tiles of the root
   put(os, uppers);
   for (std::size_t begin = 0; begin < grid.leaves.size();) {
-    const std::size_t end = end_of_run(begin, 9);
+    const std::size_t end = end_of_node(grid, begin, 9);
     const auto& first = grid.leaves[begin].place.leaf;
     const Coord upper(first[0] >> 9, first[1] >> 9, first[2] >> 9);
     for (int k = 0; k < 3; ++k) put(os, Int32{upper[k] * kUpper * kLower * 8});
     typename Upper::NodeMaskType children;
-    for (std::size_t i = begin; i < end; i = end_of_run(i, 4)) {
+    for (std::size_t i = begin; i < end; i = end_of_node(grid, i, 4)) {
       const auto& l = grid.leaves[i].place.leaf;
       children.setOn(slot_in<Upper, kUpper>(Coord((l[0] >> 4) & 31, (l[1] >> 4) & 31, (l[2] >> 4) & 31)));
     }
@@ -198,7 +221,7 @@ void StreamedVdb::write_topology(std::ostream& os, const Grid& grid) const {
     none.save(os);
     io::writeCompressedValues(os, values.data(), Upper::NUM_VALUES, none, children, half);
     for (std::size_t i = begin; i < end;) {
-      const std::size_t last = end_of_run(i, 4);
+      const std::size_t last = end_of_node(grid, i, 4);
       const auto& l = grid.leaves[i].place.leaf;
       const std::uint8_t* const tiles = signs.inside_tiles({l[0] >> 4, l[1] >> 4, l[2] >> 4});
       typename Lower::NodeMaskType leaves;
@@ -214,7 +237,8 @@ void StreamedVdb::write_topology(std::ostream& os, const Grid& grid) const {
       no_tiles.save(os);
       io::writeCompressedValues(os, slots.data(), Lower::NUM_VALUES, no_tiles, leaves, half);
       constexpr std::size_t kMaskBytes = 64;  // a leaf's record begins with its mask
-      for (; i < last; ++i) os << read(grid.leaves[i], kMaskBytes);
+      visit_records({&grid.leaves[i], last - i}, [&](std::string_view leaf) { os << leaf.substr(0, kMaskBytes); });
+      i = last;
     }
     begin = end;
   }
@@ -222,7 +246,14 @@ void StreamedVdb::write_topology(std::ostream& os, const Grid& grid) const {
 }
 
 void StreamedVdb::write_buffers(std::ostream& os, const Grid& grid) const {
-  for (const Record& r : grid.leaves) os << read(r, r.size);
+  std::string piece;  // small writes cost the stream and the kernel more
+  for (std::size_t i = 0; i < grid.leaves.size();) {
+    const std::size_t end = end_of_node(grid, i, 4);
+    piece.clear();
+    visit_records({&grid.leaves[i], end - i}, [&](std::string_view leaf) { piece += leaf; });
+    os << piece;
+    i = end;
+  }
 }
 
 void StreamedVdb::write(std::ostream& os) {

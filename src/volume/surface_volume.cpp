@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <span>
 
 #include "lamina/error.h"
 #include "lamina/volume_points.h"
@@ -85,6 +86,7 @@ struct SurfaceVolume::Impl {
   bool half = true;
   std::vector<std::unique_ptr<StreamedVdb>> files;  ///< of a sequence; the last is being filled
   std::unique_ptr<CornerPoints> points;
+  std::vector<BrickLeaves> leaves;  ///< of the bricks at hand; their memory goes round
   VolumeExportStats stats;
   tbb::task_group tasks;  ///< grow the bands and pack leaves while the window goes on
 
@@ -160,7 +162,7 @@ void SurfaceVolume::Impl::begin_file() {
 }
 
 void SurfaceVolume::Impl::emit(LevelGrid& level, bool end) {
-  std::vector<std::unique_ptr<Brick>> bricks = level.band.pop(end);
+  std::vector<Brick*> bricks = level.band.pop(end);
   if (bricks.empty()) return;
   constexpr std::uint64_t kLeafBytes = 512 * sizeof(float) + 112;
   if (settings.split > 0 && files.back()->leaves() * kLeafBytes >= settings.split) {
@@ -169,14 +171,15 @@ void SurfaceVolume::Impl::emit(LevelGrid& level, bool end) {
     begin_file();
   }
   const LeafMaker make(level.band, level.frame, extras, frame.rotation, half);
-  std::vector<BrickLeaves> leaves(bricks.size());
-  tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t i) { leaves[i] = make(*bricks[i]); });
-  level.band.give_back(std::move(bricks));
-  for (const BrickLeaves& b : leaves) {
-    if (!b.any) continue;
-    stats.voxels += b.leaves[0].active;
-    for (std::size_t g = 0; g < b.leaves.size(); ++g) files.back()->add(level.numbers[g], b.leaves[g]);
-  }
+  if (leaves.size() < bricks.size()) leaves.resize(bricks.size());
+  const std::span<BrickLeaves> made{leaves.data(), bricks.size()};
+  tbb::parallel_for(std::size_t{0}, bricks.size(), [&](std::size_t i) { make(*bricks[i], made[i]); });
+  level.band.give_back(bricks);
+  for (const BrickLeaves& b : made)
+    if (b.any) stats.voxels += b.leaves[0].active;
+  for (std::size_t g = 0; g < level.numbers.size(); ++g)
+    for (const BrickLeaves& b : made)
+      if (b.any) files.back()->add(level.numbers[g], b.leaves[g]);
 }
 
 void SurfaceVolume::Impl::set_open(bool open) {
@@ -210,6 +213,7 @@ void SurfaceVolume::finish(bool open) {
     impl_->emit(level, true);
     level.band.free_spare();  // the tiles' signs want the room
   }
+  impl_->leaves = std::vector<BrickLeaves>();
   VolumeExportStats& stats = impl_->stats;
   if (!impl_->files.empty()) {
     impl_->set_open(open || impl_->files.size() > 1);

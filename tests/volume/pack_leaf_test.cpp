@@ -5,7 +5,10 @@
 #include <openvdb/io/Compression.h>
 #include <rapidcheck/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <sstream>
+#include <vector>
 
 namespace lamina::volume {
 namespace {
@@ -58,7 +61,8 @@ RC_GTEST_PROP(PackLeaf, IsWhatOpenVdbReadsAndVotesFor, ()) {
     }
   }
   if (values.empty()) return;
-  const PackedLeaf packed = pack(origin, masks, values, 1, half);
+  PackedLeaf packed;
+  pack(origin, masks, values, 1, half, packed);
   FloatTree::LeafNodeType back(origin, 0);
   read_back(packed, kBackground, half, back);
   for (openvdb::Index at = 0; at < 512; ++at) {
@@ -80,7 +84,8 @@ RC_GTEST_PROP(PackLeaf, HoldsVectors, (bool half)) {
     masks.active.set(at);
     for (int k = 0; k < 3; ++k) values.push_back(static_cast<float>(at - 200 * k));
   }
-  const PackedLeaf packed = pack({}, masks, values, 3, half);
+  PackedLeaf packed;
+  pack({}, masks, values, 3, half, packed);
   Vec3STree::LeafNodeType back;
   read_back(packed, openvdb::Vec3s(0), half, back);
   std::size_t next = 0;
@@ -88,6 +93,29 @@ RC_GTEST_PROP(PackLeaf, HoldsVectors, (bool half)) {
     RC_ASSERT(back.isValueOn(at) == masks.active.test(static_cast<int>(at)));
     const openvdb::Vec3s v = back.getValue(at);
     for (int k = 0; k < 3; ++k) RC_ASSERT(v[k] == (back.isValueOn(at) ? values[next++] : 0.0F));
+  }
+}
+
+TEST(PackLeaf, RoundsToSixteenBitsAsOpenVdbDoes) {
+  openvdb::initialize();
+  LeafMasks masks;
+  for (int at = 0; at < 512; ++at) masks.active.set(at);
+  // Every place between two numbers of sixteen bits, halfway included, the smallest numbers and the largest.
+  for (std::uint32_t begin = 0; begin < 0x7BFFU * 4; begin += 512 * 13) {
+    std::vector<float> values(512);
+    for (std::uint32_t i = 0; i < 512; ++i) {
+      const std::uint32_t quarter = std::min(begin + i, 0x7BFFU * 4 - 1);
+      openvdb::math::half low, high;
+      low.setBits(static_cast<std::uint16_t>(quarter / 4));
+      high.setBits(static_cast<std::uint16_t>(quarter / 4 + 1));
+      values[i] = (i % 2 == 0 ? 1.0F : -1.0F) * (low + (high - low) * static_cast<float>(quarter % 4) / 4);
+    }
+    PackedLeaf packed;
+    pack({}, masks, values, 1, true, packed);
+    FloatTree::LeafNodeType back;
+    read_back(packed, kBackground, true, back);
+    for (openvdb::Index at = 0; at < 512; ++at)
+      ASSERT_EQ(back.getValue(at), static_cast<float>(openvdb::math::half(values[at]))) << values[at];
   }
 }
 
