@@ -34,9 +34,9 @@ class Strip final : public PointSource {
 };
 
 /// Takes rows and keeps none.
-class Nowhere final : public PointsWriter {
+class NoPoints final : public PointsWriter {
  public:
-  Nowhere() : PointsWriter({.radius = "radius"}) {}
+  NoPoints() : PointsWriter({.radius = "radius"}) {}
   void append(const SampleBatch& rows) override { rows_ += rows.size(); }
   void commit() override {}
 };
@@ -45,7 +45,7 @@ class Nowhere final : public PointsWriter {
 std::size_t heap_of(std::uint64_t rows) {
   const test::TemporaryFolder folder;
   Strip source(rows);
-  Nowhere writer;
+  NoPoints writer;
   PointRadiiSettings settings;
   settings.memory = std::size_t{1} << 20;
   std::size_t most = test::heap_bytes();

@@ -12,11 +12,11 @@ namespace lamina::volume {
 namespace {
 
 /// Masks of 27 bricks, some of which are not there; few voxels are set, so that most words of the result are not full.
-struct Case {
+struct Bricks27 {
   std::vector<BlockMask> masks = std::vector<BlockMask>(27);
   Around around;
 
-  Case() {
+  Bricks27() {
     around.fill(&bits::kNoBits);
     for (std::size_t i = 0; i < 27; ++i) {
       if (*rc::gen::inRange(0, 4) == 0) continue;
@@ -40,7 +40,7 @@ struct Case {
 };
 
 RC_GTEST_PROP(Beside, AreAllThatShareACornerOrAFace, ()) {
-  const Case c;
+  const Bricks27 c;
   const BlockMask corners = beside(c.around), faces = facing(c.around);
   for (int at = 0; at < 512; ++at) {
     RC_ASSERT(corners.test(at) == c.any(at & 7, at >> 3 & 7, at >> 6, 3));
@@ -49,7 +49,7 @@ RC_GTEST_PROP(Beside, AreAllThatShareACornerOrAFace, ()) {
 }
 
 RC_GTEST_PROP(Beside, OfOneBrickReachesTheLayersBelowAndAbove, ()) {
-  Case c;
+  Bricks27 c;
   for (std::size_t i = 0; i < 27; ++i)
     if (i != 13) c.around[i] = &bits::kNoBits;
   const auto layers = beside_alone(*c.around[13]);
