@@ -162,6 +162,19 @@ TEST_F(ChunkIdentity, ChosenByTheNoise) {
   EXPECT_EQ(plan_.refit, 4) << plan_.noise;
 }
 
+TEST_F(ChunkIdentity, OfAClosedThingWithHoles) {
+  const Cloud whole = test::sphere_cloud(12000);
+  Cloud pierced;
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    const Point3 &p = whole.positions[i], &gap = whole.positions[1000 * (i / 6000)];
+    if (std::hypot(p[0] - gap[0], p[1] - gap[1], p[2] - gap[2]) > 0.1) pierced.add(p, whole.normals[i]);
+  }
+  SurfaceSettings s;
+  s.blend.reset();
+  expect_same(pierced, s, {2, 5});
+  EXPECT_EQ(plan_.blend, 1) << "half cells where things are thin, and all rims closed";
+}
+
 TEST_F(ChunkIdentity, RadiiThatTheInputGives) {
   Cloud cloud = long_cloud(4000);
   cloud.add_property("radius", ScalarType::float32, [](const Point3& p) { return 0.05 + 0.03 * std::sin(5 * p[2]); });
