@@ -153,8 +153,8 @@ TEST(Holes, AttributesAreCarriedOver) {
 RC_GTEST_PROP(Holes, RandomGapsStayManifoldAndTheSameBytes, ()) {
   std::mt19937 random(*rc::gen::arbitrary<std::uint32_t>());
   std::uniform_real_distribution<> uniform;
-  std::vector<Point3> gaps;
-  for (int i = 0; i < 5; ++i) gaps.push_back(test::random_direction(random));
+  std::vector<Point3> gaps(5);
+  for (Point3& gap : gaps) gap = test::random_direction(random);
   const Cloud cloud = pierced_sphere(1500, gaps, 0.3 + 0.25 * uniform(random));
   const test::TemporaryFolder folder;
   SurfaceSettings s = closing(*rc::gen::element(6.0, 8.0, 20.0));
