@@ -20,8 +20,8 @@ struct OpenLoop {
 
 /// Which boundary loops are closed.
 struct HoleSettings {
-  double longest =
-      8;  ///< of loops that are closed where the surface around tells how, in local influence radii; 0: none
+  /// Loops of so many local influence radii are closed where the surface around tells how; 0: none.
+  double longest = 8;
   /// Where no loop is longer than kWatertight times that, the cloud is of a closed thing: its loops are all closed,
   /// whatever lies around, by the surface of least area.
   bool watertight = false;

@@ -19,7 +19,7 @@
 namespace lamina {
 namespace {
 
-constexpr std::string_view kMagic("lamina part 2\n\0\0", 16);
+constexpr std::string_view kMagic("lamina part 3\n\0\0", 16);
 constexpr std::string_view kEnd = "complete";
 static_assert(kMagic.size() == 16 && kEnd.size() == 8);
 constexpr std::size_t kMagicName = 12;  ///< without the version

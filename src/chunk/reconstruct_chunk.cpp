@@ -7,7 +7,7 @@
 #include "chunk/part_slabs.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
-#include "surface/closing_slabs.h"
+#include "surface/choose_support.h"
 #include "surface/kept_input.h"
 
 namespace lamina {

@@ -13,7 +13,7 @@
 #include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "lamina/version.h"
-#include "surface/closing_slabs.h"
+#include "surface/choose_support.h"
 #include "surface/kept_input.h"
 
 namespace lamina {

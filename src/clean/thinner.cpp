@@ -4,6 +4,8 @@
 #include <bit>
 #include <cmath>
 
+#include "ground/cell_hash.h"
+
 namespace lamina::clean {
 namespace {
 
@@ -22,11 +24,7 @@ Thinner::Thinner(double distance)
       heads_(kFewest, kNone) {}
 
 std::size_t Thinner::place(std::int64_t x, std::int64_t y, std::int64_t z) const {
-  // Odd multipliers spread the cells; the shift brings the well mixed upper bits down.
-  const std::uint64_t mixed = static_cast<std::uint64_t>(x) * 0x9E3779B97F4A7C15ULL ^
-                              static_cast<std::uint64_t>(y) * 0xC2B2AE3D27D4EB4FULL ^
-                              static_cast<std::uint64_t>(z) * 0x165667B19E3779F9ULL;
-  return (mixed ^ mixed >> 32) & (heads_.size() - 1);
+  return cell_hash(x, y, z) & (heads_.size() - 1);
 }
 
 std::size_t Thinner::home(const Kept& k) const {

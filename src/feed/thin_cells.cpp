@@ -7,6 +7,8 @@
 #include <bit>
 #include <cstddef>
 
+#include "ground/cell_hash.h"
+
 namespace lamina {
 namespace {
 
@@ -40,11 +42,7 @@ class CellSums {
 
  private:
   [[nodiscard]] std::size_t find_slot(const Cell& cell, std::uint8_t level) const {
-    const auto word = [](std::int32_t v) { return static_cast<std::uint64_t>(static_cast<std::uint32_t>(v)); };
-    std::uint64_t hash = word(cell.x) * 0x9E3779B97F4A7C15U;
-    hash = (hash ^ word(cell.y)) * 0xC2B2AE3D27D4EB4FU;
-    hash = (hash ^ word(cell.z) ^ (std::uint64_t{level} << 32)) * 0x9E3779B97F4A7C15U;
-    std::size_t at = (hash ^ (hash >> 29)) & (slots_.size() - 1);
+    std::size_t at = cell_hash(cell.x, cell.y, cell.z + (std::int64_t{level} << 32)) & (slots_.size() - 1);
     while (slots_[at] != kNone && (entries_[slots_[at]].cell != cell || entries_[slots_[at]].level != level))
       at = (at + 1) & (slots_.size() - 1);
     return at;

@@ -128,7 +128,7 @@ constexpr std::uint64_t kRims = 100;
 bool HoleCloser::is_closed_thing(std::uint64_t vertices) const {
   std::uint64_t edges = 0;
   for (const auto& [loop, extent] : loops_) edges += extent.edges;
-  return settings_.watertight && settings_.longest > 0 && stats_.open == 0 && edges * kRims <= vertices;
+  return settings_.watertight && stats_.open == 0 && edges * kRims <= vertices;
 }
 
 void HoleCloser::fill_rest(std::vector<Filling>& fillings) const {

@@ -9,6 +9,8 @@
 #include <unordered_map>
 #include <vector>
 
+#include "ground/cell_hash.h"
+
 namespace lamina {
 namespace {
 
@@ -25,12 +27,7 @@ struct Cell {
 };
 
 struct CellHash {
-  std::size_t operator()(const Cell& c) const {
-    const auto mix = static_cast<std::uint64_t>(c.x) * 0x9E3779B97F4A7C15U ^
-                     static_cast<std::uint64_t>(c.y) * 0xC2B2AE3D27D4EB4FU ^
-                     static_cast<std::uint64_t>(c.z) * 0x165667B19E3779F9U;
-    return static_cast<std::size_t>(mix ^ mix >> 31);
-  }
+  std::size_t operator()(const Cell& c) const { return cell_hash(c.x, c.y, c.z); }
 };
 
 /// Buckets about the sample with this rank, until they are tall enough for whole neighbourhoods or many enough.

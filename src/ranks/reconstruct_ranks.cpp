@@ -16,7 +16,7 @@
 #include "ranks/read_together.h"
 #include "ranks/sum_stats.h"
 #include "ranks/write_together.h"
-#include "surface/closing_slabs.h"
+#include "surface/choose_support.h"
 #include "surface/kept_input.h"
 #include "surface/pipeline.h"
 

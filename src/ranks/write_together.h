@@ -31,9 +31,8 @@ struct Place {
 /// Error(budget) beyond the vertices that a PLY's indices can name; `name`: the mesh, for the message.
 Place find_place(std::span<const Border> parts, std::size_t rank, const std::string& name);
 
-/// Writes the file, holes closed; it appears under its name when all have
-/// written. The place is that of this rank, the holes are known to rank 0. Throws
-/// Error(empty) where no rank has a triangle: for `input` with `samples`.
+/// Writes the file, holes closed; it appears under its name when all have written. The place is that of this rank, the
+/// holes are known to rank 0. Throws Error(empty) where no rank has a triangle: for `input` with `samples`.
 Place write_together(Ranks& ranks, const SlabSpan& span, RankSlabs& part, const std::string& output,
                      const std::string& input, std::uint64_t samples, const HoleSettings& holes, HoleStats& closed,
                      const RunContext& run);

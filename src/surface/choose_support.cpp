@@ -52,10 +52,17 @@ SupportChoice choose_support(const SurfaceSettings& settings, const RadiusSurvey
   return out;
 }
 
+HoleSettings hole_settings(const SurfaceSettings& settings, const SupportChoice& support) {
+  // Free clustering joins sheets: a rim may pass through a vertex several times.
+  const double longest = settings.cluster == ClusterMode::free ? 0 : settings.close_holes;
+  return {longest, support.watertight && longest > 0};
+}
+
 std::string describe_choice(const SurfaceSettings& settings, const SurfacePlan& plan) {
   if (settings.blend) return "";
-  return fmt::format("noise {:.2g} r: chosen --blend {:g} --cell {} --refit {:g}", plan.noise, plan.blend,
-                     to_string(plan.cell), plan.refit);
+  return fmt::format("noise {:.2g} r: chosen --blend {:g} --cell {}{} --refit {:g}{}", plan.noise, plan.blend,
+                     to_string(plan.cell), plan.thin_cells ? " (half of it where things are thin)" : "", plan.refit,
+                     plan.watertight ? " --watertight yes" : "");
 }
 
 }  // namespace lamina

@@ -2,6 +2,7 @@
 #pragma once
 #include <string>
 
+#include "lamina/holes.h"
 #include "lamina/radii.h"
 #include "lamina/surface.h"
 
@@ -20,6 +21,9 @@ struct SupportChoice {
 
 /// A function of settings and survey alone, so that all parts of a job choose the same.
 SupportChoice choose_support(const SurfaceSettings& settings, const RadiusSurvey& survey);
+
+/// Which holes are closed: none with free clustering.
+HoleSettings hole_settings(const SurfaceSettings& settings, const SupportChoice& support);
 
 /// What was chosen and why, in a line for a reader; empty where the settings gave all of it.
 std::string describe_choice(const SurfaceSettings& settings, const SurfacePlan& plan);

@@ -2,11 +2,6 @@
 
 namespace lamina {
 
-HoleSettings hole_settings(const SurfaceSettings& settings, const SupportChoice& support) {
-  // Free clustering joins sheets: a rim may pass through a vertex several times.
-  return {settings.cluster == ClusterMode::free ? 0 : settings.close_holes, support.watertight};
-}
-
 void ClosingSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {
   piece_.clear();
   finder_.add(vertices, slab.triangles, piece_);

@@ -3,13 +3,9 @@
 #include "holes/hole_closer.h"
 #include "holes/rim_finder.h"
 #include "lamina/surface.h"
-#include "surface/choose_support.h"
 #include "surface/mesh_output.h"
 
 namespace lamina {
-
-/// What is asked for, where it applies.
-HoleSettings hole_settings(const SurfaceSettings& settings, const SupportChoice& support);
 
 /// Passes slabs on and watches for rims.
 class ClosingSlabs final : public SlabSink {

@@ -166,6 +166,8 @@ void check_settings(const SurfaceSettings& s) {
   require(!s.cell || s.cell->value > 0, "--cell", "positive");
   require(s.boundary >= 0, "--boundary", "0 (no limit) or positive, in influence radii");
   require(s.close_holes >= 0, "--close-holes", "0 (none) or positive, in influence radii");
+  require(!s.watertight.value_or(false) || hole_settings(s, {}).longest > 0, "--watertight",
+          "left out with --close-holes 0 and with --cluster free, which close no holes");
   require(s.chord >= 0 && s.chord <= 1, "--chord", "in 0..1");
   require(s.window >= 1 && s.window <= 1024, "--window", "in 1..1024");
   require_sane(s.clean);
@@ -258,6 +260,8 @@ Resolved plan_once(const SurfaceSettings& s, const Frame& frame, const SlabStore
   plan.blend = support.blend;
   plan.refit = support.refit;
   plan.cell = cell;
+  plan.thin_cells = support.thin_cells;
+  plan.watertight = hole_settings(s, support).watertight;
   plan.finest_cell = out.lattice.cell * frame.step;
   plan.levels = out.lattice.levels;
   plan.slab_height = out.lattice.slab_height() * frame.step;

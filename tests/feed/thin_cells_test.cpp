@@ -42,15 +42,10 @@ TEST(ThinCells, AWallOfHalfACellIsThin) {
   for (const std::uint8_t level : levels_of(wall, 1)) EXPECT_EQ(level, 0);
 }
 
-TEST(ThinCells, OneSheetIsNot) {
-  LocalSamples sheet;
-  add_sheet(200, 1, sheet);
-  for (const std::uint8_t level : levels_of(sheet, 1)) EXPECT_EQ(level, 1);
-}
-
-TEST(ThinCells, NorAreTwoThatLieThreeCellsApart) {
+TEST(ThinCells, OneSheetIsNotNorAreTwoThatLieThreeCellsApart) {
   LocalSamples wall;
   add_sheet(200, 1, wall);
+  for (const std::uint8_t level : levels_of(wall, 1)) EXPECT_EQ(level, 1);
   add_sheet(3200, -1, wall);
   for (const std::uint8_t level : levels_of(wall, 1)) EXPECT_EQ(level, 1);
 }

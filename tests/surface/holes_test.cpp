@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "lamina/chunk.h"
+#include "lamina/error.h"
 #include "surface/clouds.h"
 
 namespace lamina {
@@ -83,8 +84,15 @@ TEST(Holes, OfAClosedThingAreAllClosedWhereAskedFor) {
   s.close_holes = longest / 3.1;
   EXPECT_EQ(test::reconstruct(cloud, s).facts.boundary.size(), open.facts.boundary.size())
       << "a long rim: an open thing";
-  s.close_holes = 0;
-  EXPECT_EQ(test::reconstruct(cloud, s).facts.boundary.size(), open.facts.boundary.size());
+}
+
+TEST(Holes, CannotAllBeClosedWhereNoneAre) {
+  SurfaceSettings s = closing(0);
+  s.watertight = true;
+  EXPECT_THROW(test::reconstruct(test::sphere_cloud(500), s), Error);
+  s.close_holes = 8;
+  s.cluster = ClusterMode::free;
+  EXPECT_THROW(test::reconstruct(test::sphere_cloud(500), s), Error);
 }
 
 TEST(Holes, OfOpenThingsStayOpenWhateverIsAskedFor) {
