@@ -45,7 +45,7 @@ void clip_points(const ClipOptions& o, const RunContext& context) {
 }
 
 void clip_triangles(const ClipOptions& o, const RunContext& context) {
-  const TriangleMesh mesh = read_mesh_input(o.input, context);
+  const TriangleMesh mesh = read_mesh_input(o.input, context, o.bad);
   const TriangleMesh clipped = clip_mesh(mesh, o.region, o.keep, context);
   if (clipped.positions.empty()) nothing_left(o);
   write_mesh(clipped, o.output);
@@ -97,7 +97,7 @@ void add_clip(CLI::App& app) {
       ->type_name("inside|outside")
       ->group("Region");
   add_columns(*tool, o->columns);
-  add_bad_samples(*tool, o->bad);
+  add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);
   add_examples(*tool,

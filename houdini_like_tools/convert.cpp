@@ -115,7 +115,7 @@ void write_vertices(const ConvertOptions& o, const TriangleMesh& mesh, const Run
 }
 
 void convert_mesh(const ConvertOptions& o, const RunContext& context) {
-  const TriangleMesh mesh = read_mesh_input(o.input, context);
+  const TriangleMesh mesh = read_mesh_input(o.input, context, o.bad);
   if (o.vertices) return write_vertices(o, mesh, context);
   if (o.fog)
     throw Error(ExitCode::usage, shown_name(o.input) + ": --fog wants a level set; make a .vdb of the mesh first");
@@ -217,7 +217,7 @@ void add_convert(CLI::App& app) {
   tool->add_flag("--fog", o->fog, "Make a fog volume of a level set")->group(volume);
   tool->add_flag("--half", o->volume.half, "Store a level set or fog in 16-bit floats")->group(volume);
   add_columns(*tool, o->columns);
-  add_bad_samples(*tool, o->bad);
+  add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);
   add_examples(*tool,

@@ -21,11 +21,11 @@ void add_precision(CLI::App& app, Precision& precision) {
       ->group("Output");
 }
 
-void add_bad_samples(CLI::App& app, BadSamples& bad) {
+void add_bad_samples(CLI::App& app, BadSamples& bad, const std::string& what) {
   const std::map<std::string, BadSamples> words{{"drop", BadSamples::drop}, {"refuse", BadSamples::refuse}};
   app.add_option_function<std::string>(
          "--bad-samples", [&bad, words](const std::string& word) { bad = words.at(word); },
-         "Points that are not finite: leave out, or refuse the file [drop]")
+         what + " that are not finite: leave out, or refuse the file [drop]")
       ->check(CLI::IsMember({"drop", "refuse"}).description(""))
       ->type_name("drop|refuse")
       ->group("Input");
@@ -88,6 +88,16 @@ TriangleMesh read_mesh_input(const std::string& path, const RunContext& context,
                             bytes_text(bytes), bytes_text(kBytesPerByte * bytes), bytes_text(context.max_memory)));
   }
   return read_mesh(name, non_finite);
+}
+
+TriangleMesh read_mesh_input(const std::string& path, const RunContext& context, BadSamples bad) {
+  if (bad == BadSamples::refuse) return read_mesh_input(path, context, NonFinite::refuse);
+  TriangleMesh mesh = read_mesh_input(path, context, NonFinite::keep);
+  if (const std::size_t dropped = drop_non_finite(mesh); dropped > 0) {
+    context.warn(fmt::format("{}: {} {} not finite and left out, with the triangles there", shown_name(path),
+                             count_text(dropped), dropped == 1 ? "vertex is" : "vertices are"));
+  }
+  return mesh;
 }
 
 void add_examples(CLI::App& tool, const std::string& lines) {

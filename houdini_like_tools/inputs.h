@@ -20,8 +20,8 @@ enum class Precision { automatic, single_precision, double_precision };
 
 /// --precision auto|float|double, in the group "Output".
 void add_precision(CLI::App& app, Precision& precision);
-/// --bad-samples drop|refuse, in the group "Input".
-void add_bad_samples(CLI::App& app, BadSamples& bad);
+/// --bad-samples drop|refuse, in the group "Input"; `what` may be bad.
+void add_bad_samples(CLI::App& app, BadSamples& bad, const std::string& what = "Points");
 /// INPUT and -o, --output, both required; `formats` says what they can be.
 void add_files(CLI::App& app, std::string& input, const std::string& input_formats, std::string& output,
                const std::string& output_formats);
@@ -46,6 +46,9 @@ std::string volume_text(std::string_view verb, const VolumeEditStats& stats);
 /// context.max_memory.
 TriangleMesh read_mesh_input(const std::string& path, const RunContext& context,
                              NonFinite non_finite = NonFinite::refuse);
+
+/// The same for tools with --bad-samples: vertices that are not finite are refused, or left out, which is told.
+TriangleMesh read_mesh_input(const std::string& path, const RunContext& context, BadSamples bad);
 
 /// What a tool's help ends with: command lines that work as they stand (the tests run them).
 void add_examples(CLI::App& tool, const std::string& lines);

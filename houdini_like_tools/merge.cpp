@@ -51,7 +51,7 @@ void merge_triangles(const MergeOptions& o, const std::vector<PointInput>& input
     if (input.posed)
       throw Error(ExitCode::usage, input.path + ": is a mesh; only points are moved by a pose, see 'lamina transform'");
     names.push_back(shown_name(input.path));
-    meshes.push_back(read_mesh_input(input.path, context));
+    meshes.push_back(read_mesh_input(input.path, context, o.bad));
   }
   const TriangleMesh merged = merge_meshes(std::move(meshes), names, o.mixed);
   write_mesh(merged, o.output);
@@ -132,7 +132,7 @@ void add_merge(CLI::App& app) {
       ->type_name("refuse|fill|intersect")
       ->group("Input");
   add_columns(*tool, o->columns);
-  add_bad_samples(*tool, o->bad);
+  add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);
   add_examples(*tool,

@@ -61,7 +61,7 @@ void transform_points(const TransformOptions& o, const Eigen::Affine3d& transfor
 }
 
 void transform_triangles(const TransformOptions& o, const Eigen::Affine3d& transform, const RunContext& context) {
-  TriangleMesh mesh = read_mesh_input(o.input, context);
+  TriangleMesh mesh = read_mesh_input(o.input, context, o.bad);
   transform_mesh(mesh, transform);
   write_mesh(mesh, o.output);
   context.info(fmt::format("moved {} vertices", count_text(mesh.positions.size())));
@@ -128,7 +128,7 @@ void add_transform(CLI::App& app) {
   for (const char* other : {"--scale", "--rotate", "--translate", "--pivot"}) matrix->excludes(tool->get_option(other));
   tool->add_flag("--invert", o->invert, "Undo the transform instead")->group(group);
   add_columns(*tool, o->columns);
-  add_bad_samples(*tool, o->bad);
+  add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);
   add_examples(*tool,

@@ -1,6 +1,7 @@
 // A triangle mesh held whole in memory: for measuring, checking, scattering and rendering; never on the streamed path.
 #pragma once
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -20,7 +21,7 @@ struct TriangleMesh {
 /// What to do with vertices whose coordinates are NaN or infinite.
 enum class NonFinite {
   refuse,  ///< Error(unreadable) naming the first
-  keep,    ///< read as they stand, from PLY: for `check`, which counts them; other formats have no words for them
+  keep,    ///< read as they stand, from PLY: for those who count them, or drop_non_finite()
 };
 
 /// Reads OBJ, OFF, PLY or STL, each also as .gz, by extension and content; STL's equal positions are welded. PLY keeps
@@ -30,6 +31,10 @@ enum class NonFinite {
 /// the file, the place and what is wrong: missing, truncated, counts that lie, a face naming a vertex that is not
 /// there, a polygon of fewer than three.
 TriangleMesh read_mesh(const std::string& path, NonFinite non_finite = NonFinite::refuse);
+
+/// Leaves out vertices that are not finite, with the triangles at them; the others keep their order. Returns how many
+/// vertices went.
+std::size_t drop_non_finite(TriangleMesh& mesh);
 
 /// Writes PLY, OBJ, OFF or STL by extension; beside, then renamed. "-" is standard output, as PLY. Positions read back
 /// as the same bits (as floats from STL). Throws Error(budget) when the file cannot be written, Error(usage) for

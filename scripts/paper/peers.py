@@ -1,7 +1,8 @@
 """Other programs on the same samples, all Debian 12 packages: meshlab (with xvfb), python3-open3d, libcgal-dev, pcl-tools.
 
-Each peer is a function (samples, mesh, noisy, target) -> cost or None: `target` is the number of triangles to come close to.
-What runs a grid or an octree gets the resolution that comes closest; CGAL, which refines, triangles of a size near.
+Each peer is a function (samples, mesh, noisy, resolution) -> cost, or RunFailed: `resolution` is that of a grid, in cells
+along the diagonal, which gives about as many triangles as ours have. Octrees get the depths next to that, and CGAL, which
+refines, triangles of a size near.
 """
 import math
 import os
@@ -13,11 +14,13 @@ from paper import runs
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 CGAL_RADIUS = "1.5"  # sample spacings
-CALIBRATION = 150  # grid cells along the diagonal of the first, cheap run
+# Triangles of a grid in its squares of area, counted with MeshLab's APSS.
+GRID_TRIANGLES = 3.3
 
 
-def available(folder, program):
-    """Name, package and function of every peer that is installed; names of the others."""
+def available(folder, program, limit):
+    """Name and function of every peer that is installed, each of whose runs may take `limit` seconds; names and packages
+    of the others."""
     found, missing = {}, []
 
     def add(name, package, there, function):
@@ -28,17 +31,23 @@ def available(folder, program):
 
     meshlab = bool(shutil.which("meshlabserver") and shutil.which("xvfb-run"))
     for name, filter_name in (("MeshLab APSS", "Marching Cubes (APSS)"), ("MeshLab RIMLS", "Marching Cubes (RIMLS)")):
-        add(name, "meshlab, xvfb, xauth", meshlab, _moving_least_squares(filter_name, folder, program))
+        add(name, "meshlab, xvfb, xauth", meshlab, _moving_least_squares(filter_name, folder, limit))
     for depth in (9, 10):
-        add(f"MeshLab screened Poisson, depth {depth}", "meshlab, xvfb, xauth", meshlab, _meshlab_poisson(depth, folder))
+        add(f"MeshLab screened Poisson, depth {depth}", "meshlab, xvfb, xauth", meshlab, _meshlab_poisson(depth, folder, limit))
     open3d = subprocess.run([sys.executable, "-c", "import open3d"], capture_output=True).returncode == 0
     for depth in (9, 10):
-        add(f"Open3D Poisson, depth {depth}", "python3-open3d", open3d, _open3d(depth))
-    add("PCL Poisson, depth 9", "pcl-tools", bool(shutil.which("pcl_poisson_reconstruction")), _pcl(9, folder, program))
+        add(f"Open3D Poisson, depth {depth}", "python3-open3d", open3d, _open3d(depth, limit))
+    add("PCL Poisson, depth 9", "pcl-tools", bool(shutil.which("pcl_poisson_reconstruction")), _pcl(9, folder, program, limit))
     cgal = _build_cgal(folder)
-    add("CGAL Poisson", "libcgal-dev, g++", cgal is not None, lambda samples, mesh, noisy, target: runs.run(
-        [cgal, samples, mesh, CGAL_RADIUS]))
+    add("CGAL Poisson", "libcgal-dev, g++", cgal is not None, lambda samples, mesh, noisy, resolution: runs.run(
+        [cgal, samples, mesh, CGAL_RADIUS], limit=limit))
     return found, missing
+
+
+def grid_resolution(triangles, truth):
+    """Cells along the diagonal of a grid that gives so many triangles; `truth`: what lamina measure tells of the model."""
+    diagonal = math.dist(truth["low"], truth["high"])
+    return round(diagonal * math.sqrt(triangles / (GRID_TRIANGLES * truth["area"])))
 
 
 def _filter_script(path, name, parameters):
@@ -48,61 +57,55 @@ def _filter_script(path, name, parameters):
         f.write(f'<!DOCTYPE FilterScript>\n<FilterScript>\n <filter name="{name}">\n{lines} </filter>\n</FilterScript>\n')
 
 
-def _meshlab(samples, mesh, script):
-    return runs.run(["xvfb-run", "-a", "meshlabserver", "-i", samples, "-o", mesh, "-s", script])
+def _meshlab(samples, mesh, script, limit):
+    return runs.run(["xvfb-run", "-a", "meshlabserver", "-i", samples, "-o", mesh, "-s", script], limit=limit)
 
 
-def _moving_least_squares(name, folder, program):
+def _moving_least_squares(name, folder, limit):
     script = os.path.join(folder, "filter.mlx")
 
-    def at(resolution, samples, mesh, noisy):
-        # A support twice as wide on noise, as this program's own settings for it.
-        parameters = {"FilterScale": ("Float", 4 if noisy else 2), "ProjectionAccuracy": ("Float", 0.0001),
+    def peer(samples, mesh, noisy, resolution):
+        # With the default support, 2, cells of this size are mostly empty. Twice as wide again on noise, as this
+        # program's own settings for it.
+        parameters = {"FilterScale": ("Float", 8 if noisy else 4), "ProjectionAccuracy": ("Float", 0.0001),
                       "MaxProjectionIters": ("Int", 15), "Resolution": ("Int", resolution)}
         if "RIMLS" in name:
             parameters |= {"SigmaN": ("Float", 0.75), "MaxRefittingIters": ("Int", 3)}
         else:
             parameters |= {"SphericalParameter": ("Float", 1), "AccurateNormal": ("Bool", "true")}
         _filter_script(script, name, parameters)
-        return _meshlab(samples, mesh, script)
-
-    def peer(samples, mesh, noisy, target):
-        if at(CALIBRATION, samples, mesh, noisy) is None:
-            return None
-        triangles = runs.ask(program, "check", mesh)["triangles"]
-        return at(round(CALIBRATION * math.sqrt(target / max(1, triangles))), samples, mesh, noisy)
+        return _meshlab(samples, mesh, script, limit)
 
     return peer
 
 
-def _meshlab_poisson(depth, folder):
+def _meshlab_poisson(depth, folder, limit):
     script = os.path.join(folder, "filter.mlx")
 
-    def peer(samples, mesh, noisy, target):
+    def peer(samples, mesh, noisy, resolution):
         _filter_script(script, "Surface Reconstruction: Screened Poisson", {
             "visibleLayer": ("Bool", "false"), "depth": ("Int", depth), "fullDepth": ("Int", 5), "cgDepth": ("Int", 0),
             "scale": ("Float", 1.1), "samplesPerNode": ("Float", 3 if noisy else 1.5), "pointWeight": ("Float", 4),
             "iters": ("Int", 8), "confidence": ("Bool", "false"), "preClean": ("Bool", "false")})
-        return _meshlab(samples, mesh, script)
+        return _meshlab(samples, mesh, script, limit)
 
     return peer
 
 
-def _open3d(depth):
-    def peer(samples, mesh, noisy, target):
-        return runs.run([sys.executable, os.path.join(HERE, "open3d_poisson.py"), samples, mesh, str(depth)])
+def _open3d(depth, limit):
+    def peer(samples, mesh, noisy, resolution):
+        return runs.run([sys.executable, os.path.join(HERE, "open3d_poisson.py"), samples, mesh, str(depth)],
+                        limit=limit)
 
     return peer
 
 
-def _pcl(depth, folder, program):
-    def peer(samples, mesh, noisy, target):
+def _pcl(depth, folder, program, limit):
+    def peer(samples, mesh, noisy, resolution):
         points, vtk = os.path.join(folder, "points.pcd"), os.path.join(folder, "pcl.vtk")
-        subprocess.run([program, "convert", samples, "-o", points, "--quiet"], check=True)
+        subprocess.run([program, "convert", samples, "-o", points, "--precision", "float", "--quiet"], check=True)
         cost = runs.run(["pcl_poisson_reconstruction", points, vtk, "-depth", str(depth), "-solver_divide", "8",
-                         "-iso_divide", "8"])
-        if cost is None:
-            return None
+                         "-iso_divide", "8"], limit=limit)
         subprocess.run(["pcl_vtk2ply", vtk, mesh], check=True, capture_output=True)
         return cost
 

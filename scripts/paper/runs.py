@@ -3,13 +3,17 @@ import json
 import os
 import signal
 import subprocess
+import threading
 import time
 
-TIME_LIMIT = 1800  # seconds a peer may take
+
+class RunFailed(Exception):
+    """Why a program gave no result, in a few words for a table."""
 
 
-def run(command, environment=None, limit=TIME_LIMIT):
-    """Wall and CPU seconds and peak bytes of a command and what it starts; None when it failed or took too long."""
+def run(command, environment=None, limit=None):
+    """Wall and CPU seconds and peak bytes of a command and what it starts. RunFailed when it fails or takes more seconds
+    than the limit."""
     begin = time.monotonic()
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True,
                                env={**os.environ, **(environment or {})}, errors="replace")
@@ -18,30 +22,36 @@ def run(command, environment=None, limit=TIME_LIMIT):
     _, status, usage = os.wait4(process.pid, 0)
     watchdog.stop()
     process.returncode = os.waitstatus_to_exitcode(status)
+    if watchdog.bit:
+        raise RunFailed(f"more than {limit}")
     if process.returncode != 0:
         print(f"paper-tables: {command[0]}: exit code {process.returncode}: {errors.strip()[-300:]}")
-        return None
+        raise RunFailed("failed")
     return {"wall": time.monotonic() - begin, "cpu": usage.ru_utime + usage.ru_stime, "memory": usage.ru_maxrss * 1024}
 
 
 class _Watchdog:
-    """Kills the whole group of a process that takes too long."""
+    """Kills the whole group of a process that takes too long; `bit` tells whether it had to."""
 
     def __init__(self, process, limit):
-        import threading
-        self.timer = threading.Timer(limit, lambda: os.killpg(process.pid, signal.SIGKILL))
-        self.timer.start()
+        self.process, self.bit = process, False
+        self.timer = threading.Timer(limit, self._bite) if limit else None
+        if self.timer:
+            self.timer.start()
+
+    def _bite(self):
+        self.bit = True
+        os.killpg(self.process.pid, signal.SIGKILL)
 
     def stop(self):
-        self.timer.cancel()
+        if self.timer:
+            self.timer.cancel()
 
 
 def surface(program, cloud, mesh, options):
     """A run of lamina surface: `run` with the counts of --stats."""
     stats = mesh + ".json"
     cost = run([program, "surface", cloud, "-o", mesh, "--quiet", "--stats", stats, *options])
-    if cost is None:
-        return None
     with open(stats) as f:
         cost["stats"] = json.load(f)
     os.remove(stats)
@@ -63,6 +73,8 @@ def distances(program, mesh, true_mesh, *words):
 
 def judge(program, mesh, true_mesh):
     """Distances over the diagonal of the truth, both ways, and what kind of mesh it is."""
+    if not os.path.exists(mesh):
+        raise RunFailed("no mesh")
     distance = ask(program, "compare", mesh, true_mesh)
     check = ask(program, "check", mesh)
     measure = ask(program, "measure", mesh)

@@ -77,7 +77,7 @@ def against_peers(results):
     for model, noisy in dict.fromkeys((c["model"], c["noisy"]) for c in results):
         cases = [c for c in results if (c["model"], c["noisy"]) == (model, noisy)]
         cases.sort(key=lambda c: c["peer"])
-        rows = [[c["name"], *(cost_cells(c["cost"]) + quality_cells(c) if "triangles" in c else ["failed"] + ["-"] * 10)]
+        rows = [[c["name"], *(cost_cells(c["cost"]) + quality_cells(c) if "cost" in c else [c["failed"]] + ["-"] * 10)]
                 for c in cases]
         parts.append(f"{model}, {'noisy' if noisy else 'clean'}:\n\n" + table(["", "s", "CPU s", "MB"] + QUALITY, rows)
                      + "\n\n" + _ratios(cases))
@@ -90,13 +90,13 @@ COMPARED = {"s": lambda c: c["cost"]["wall"], "CPU s": lambda c: c["cost"]["cpu"
 
 
 def _ratios(cases):
-    peers = [c for c in cases if c["peer"] and "triangles" in c]
+    peers = [c for c in cases if c["peer"] and "cost" in c]
     if not peers:
-        return "No peer is installed."
+        return "No peer came to an end."
     best = {column: min(peers, key=of) for column, of in COMPARED.items()}
     rows = [["best peer", *(c["name"] for c in best.values())]]
     for c in cases:
-        if not c["peer"] and "triangles" in c:
+        if not c["peer"]:
             rows.append([c["name"], *(f"{of(c) / of(best[column]):.2f}" for column, of in COMPARED.items())])
     return "Over the best peer of each column; below 1 the peer loses:\n\n" + table(["", *COMPARED], rows)
 

@@ -8,8 +8,8 @@
 #include <limits>
 
 #include "lamina/error.h"
-#include "meshes/ply_header.h"
 #include "meshes/readers.h"
+#include "points/ply_header.h"
 
 namespace lamina::meshes {
 namespace {
@@ -176,11 +176,11 @@ class BodyReader {
     for (const PlyProperty& p : e.properties) skip(p);
   }
   void skip(const PlyProperty& p) {
-    if (!p.count_type) {
+    if (!p.list_count) {
       values_.next(p.type);
       return;
     }
-    const double n = values_.next(*p.count_type);
+    const double n = values_.next(*p.list_count);
     for (double i = 0; i < n; ++i) values_.next(p.type);
   }
 
@@ -199,7 +199,7 @@ class BodyReader {
         target[i] = is(x) ? 0 : is(y) ? 1 : 2;
       } else if (normals && (is(nx) || is(ny) || is(nz))) {
         target[i] = is(nx) ? 3 : is(ny) ? 4 : 5;
-      } else if (!e.properties[i].count_type) {
+      } else if (!e.properties[i].list_count) {
         target[i] = 6 + static_cast<int>(mesh_.layout.size());
         mesh_.layout.push_back({e.properties[i].name, e.properties[i].type});
       }
@@ -229,7 +229,7 @@ class BodyReader {
   void faces(const PlyElement& e) {
     auto list = e.find("vertex_indices");
     if (!list) list = e.find("vertex_index");
-    if (!list || !e.properties[*list].count_type) fail("its faces have no list vertex_indices");
+    if (!list || !e.properties[*list].list_count) fail("its faces have no list vertex_indices");
     mesh_.triangles.reserve(believable(e.count));
     for (; row_ < e.count; ++row_)
       for (std::size_t i = 0; i < e.properties.size(); ++i) {
@@ -241,7 +241,7 @@ class BodyReader {
   }
 
   void polygon(const PlyProperty& p) {
-    const double n = values_.next(*p.count_type);
+    const double n = values_.next(*p.list_count);
     if (n < 3) fail(fmt::format("face {} has {} corners; a polygon needs three", row_, n));
     const std::uint32_t first = index(p), second = index(p);
     std::uint32_t last = second;
@@ -270,13 +270,11 @@ class BodyReader {
 }  // namespace
 
 TriangleMesh read_ply(FileBuffer& file, const std::string& path) {
-  std::istream in(&file);
-  const PlyHeader header = read_ply_header(in, path);
+  const PlyHeader header = read_ply_header(file, path);
   if (std::none_of(header.elements.begin(), header.elements.end(), [](const auto& e) { return e.name == "vertex"; }))
     throw Error(ExitCode::unreadable, fmt::format("{}: has no element vertex", path));
-  if (header.encoding == PlyEncoding::ascii)
-    return BodyReader<AsciiValues>(AsciiValues(file), header, file, path).read();
-  const bool swap = (header.encoding == PlyEncoding::big) == (std::endian::native == std::endian::little);
+  if (header.format == PlyFormat::ascii) return BodyReader<AsciiValues>(AsciiValues(file), header, file, path).read();
+  const bool swap = (header.format == PlyFormat::big_endian) == (std::endian::native == std::endian::little);
   return BodyReader<BinaryValues>(BinaryValues(file, swap), header, file, path).read();
 }
 

@@ -46,8 +46,12 @@ TriangleMesh read_mesh(const std::string& path, NonFinite non_finite) {
   for (std::size_t i = 0; i < mesh.positions.size(); ++i)
     for (const double c : mesh.positions[i])
       if (!std::isfinite(c))
-        throw Error(ExitCode::unreadable,
-                    fmt::format("{}: vertex {} has a coordinate that is not finite; clean the mesh first", path, i));
+        throw Error(
+            ExitCode::unreadable,
+            fmt::format(
+                "{0}: vertex {1} has a coordinate that is not finite; 'lamina convert {0} -o mesh.ply' leaves it "
+                "out",
+                path, i));
   return mesh;
 }
 

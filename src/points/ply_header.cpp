@@ -13,6 +13,16 @@ namespace {
 
 constexpr std::size_t kLongestHeader = 1 << 20;
 
+/// The line's next word, taken from it; empty at its end.
+std::string_view take_word(std::string_view& line) {
+  constexpr std::string_view kSpace = " \t\r\n\v\f";
+  const std::size_t begin = std::min(line.find_first_not_of(kSpace), line.size());
+  const std::size_t end = std::min(line.find_first_of(kSpace, begin), line.size());
+  const std::string_view found = line.substr(begin, end - begin);
+  line.remove_prefix(end);
+  return found;
+}
+
 /// Walks the lines of a header; its errors name the line.
 class PlyHeaderParser {
  public:
@@ -28,7 +38,7 @@ class PlyHeaderParser {
     while (next_line()) {
       const std::string_view keyword = word();
       if (header_.lines == 1) {
-        if (keyword != "ply") fail("'ply' expected");
+        if (keyword != "ply") fail("'ply' expected: not a PLY file");
       } else if (keyword == "format") {
         format();
       } else if (keyword == "element") {
@@ -62,15 +72,7 @@ class PlyHeaderParser {
     return true;
   }
 
-  /// The line's next word, empty at its end.
-  std::string_view word() {
-    constexpr std::string_view kSpace = " \t\r\v\f";
-    const std::size_t begin = std::min(line_.find_first_not_of(kSpace), line_.size());
-    const std::size_t end = std::min(line_.find_first_of(kSpace, begin), line_.size());
-    const std::string_view found = line_.substr(begin, end - begin);
-    line_.remove_prefix(end);
-    return found;
-  }
+  std::string_view word() { return take_word(line_); }
 
   std::string_view needed_word(std::string_view what) {
     const std::string_view found = word();
@@ -84,6 +86,7 @@ class PlyHeaderParser {
   }
 
   void format() {
+    if (has_format_) fail("a second format line");
     const std::string_view encoding = needed_word("a format");
     if (encoding == "ascii") {
       header_.format = PlyFormat::ascii;
@@ -111,6 +114,9 @@ class PlyHeaderParser {
                        quoted_word(count)));
     }
     end_of_line();
+    const auto is_same = [&](const PlyElement& other) { return other.name == element.name; };
+    if (std::any_of(header_.elements.begin(), header_.elements.end(), is_same))
+      fail(fmt::format("element {} is there already", quoted_word(element.name)));
     header_.elements.push_back(std::move(element));
   }
 
@@ -159,6 +165,12 @@ std::size_t PlyElement::row_bytes() const {
   return bytes;
 }
 
+std::optional<std::size_t> PlyElement::find(std::string_view property) const {
+  for (std::size_t i = 0; i < properties.size(); ++i)
+    if (properties[i].name == property) return i;
+  return std::nullopt;
+}
+
 PlyHeader parse_ply_header(std::string_view text, const std::string& name) {
   return PlyHeaderParser(text, name).parse();
 }
@@ -167,6 +179,24 @@ PlyHeader read_ply_header(const InputFile& file) {
   std::string text(static_cast<std::size_t>(std::min<std::uint64_t>(file.bytes, kLongestHeader)), '\0');
   text.resize(file.read(0, text.data(), text.size()));
   return parse_ply_header(text, file.name);
+}
+
+PlyHeader read_ply_header(std::streambuf& stream, const std::string& name) {
+  std::string text;
+  char line_end = '\n';
+  std::size_t line = 0;  // where it begins
+  while (text.size() < kLongestHeader) {
+    const int c = stream.sbumpc();
+    if (c == std::streambuf::traits_type::eof()) break;
+    text.push_back(static_cast<char>(c));
+    // The first line tells how lines end, as above.
+    if (line == 0 && c == '\r' && stream.sgetc() != '\n') line_end = '\r';
+    if (c != line_end) continue;
+    std::string_view words = std::string_view(text).substr(line);
+    if (take_word(words) == "end_header") break;
+    line = text.size();
+  }
+  return parse_ply_header(text, name);
 }
 
 }  // namespace lamina

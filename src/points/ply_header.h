@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <optional>
+#include <streambuf>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -24,6 +25,7 @@ struct PlyElement {
   std::uint64_t count = 0;
   std::vector<PlyProperty> properties;
 
+  [[nodiscard]] std::optional<std::size_t> find(std::string_view property) const;  ///< the first of that name
   [[nodiscard]] bool has_list() const;
   [[nodiscard]] std::size_t row_bytes() const;  ///< in a binary file; only of elements without lists
 };
@@ -39,6 +41,9 @@ struct PlyHeader {
 /// Reads the header from the beginning of the file; it must end within the first megabyte.
 /// Throws Error(unreadable) naming file and line. Counts are as promised: nothing is checked against the file's size.
 PlyHeader read_ply_header(const InputFile& file);
+
+/// The same from a stream, of which nothing beyond the header is taken.
+PlyHeader read_ply_header(std::streambuf& stream, const std::string& name);
 
 /// The same from text that holds the whole header.
 PlyHeader parse_ply_header(std::string_view text, const std::string& name);

@@ -18,7 +18,6 @@ std::size_t vertex_element(const PlyHeader& header, const std::string& name) {
   std::string others;
   for (std::size_t i = 0; i < header.elements.size(); ++i) {
     if (header.elements[i].name == "vertex") {
-      if (found != header.elements.size()) unreadable(name, "the header has two elements 'vertex'");
       found = i;
     } else if (i < 8) {
       others += (others.empty() ? "" : ", ") + quoted_word(header.elements[i].name);

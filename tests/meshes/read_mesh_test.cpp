@@ -157,6 +157,24 @@ TEST(ReadMesh, NonFiniteVerticesAreRefusedUnlessAskedFor) {
   EXPECT_TRUE(std::isnan(read_mesh(path, NonFinite::keep).positions[1][1]));
 }
 
+TEST(DropNonFinite, LeavesTheRestAsItIs) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  TriangleMesh mesh;
+  mesh.positions = {{0, 0, 0}, {0, nan, 0}, {1, 0, 0}, {0, 0, -1 / 0.0}, {1, 1, 0}, {0, 1, 0}};
+  mesh.normals = {{0, 0, 1}, {}, {0, 0, 2}, {}, {0, 0, 3}, {0, 0, 4}};
+  mesh.layout = {{"grey", ScalarType::uint8}};
+  mesh.attributes = {{1, 0, 2, 0, 3, 4}};
+  mesh.triangles = {{0, 2, 4}, {0, 1, 2}, {0, 4, 5}, {3, 4, 5}};
+  EXPECT_EQ(drop_non_finite(mesh), 2);
+  EXPECT_EQ(mesh.positions, (std::vector<std::array<double, 3>>{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}));
+  EXPECT_EQ(mesh.normals, (std::vector<std::array<float, 3>>{{0, 0, 1}, {0, 0, 2}, {0, 0, 3}, {0, 0, 4}}));
+  EXPECT_EQ(mesh.attributes[0], (std::vector<float>{1, 2, 3, 4}));
+  EXPECT_EQ(mesh.triangles, (std::vector<std::array<std::uint32_t, 3>>{{0, 1, 2}, {0, 2, 3}}));
+  const TriangleMesh whole = mesh;
+  EXPECT_EQ(drop_non_finite(mesh), 0);
+  EXPECT_EQ(mesh.triangles, whole.triangles);
+}
+
 TEST(ReadMesh, BadFilesAreNamed) {
   const ScratchFolder folder;
   const auto bad = [&](const std::string& name, const std::string& bytes, const std::vector<std::string>& words) {
@@ -173,9 +191,11 @@ TEST(ReadMesh, BadFilesAreNamed) {
   bad("e.xyz", "1 2 3\n", {"unknown mesh format \".xyz\""});
   bad("e.vdb", " BDV", {"is a volume", "lamina convert"});
   bad("a.ply", "plx\n", {"not a PLY file"});
-  bad("b.ply", "ply\nformat ascii 1.0\nelement vertex -3\n", {"line 3", "\"-3\""});
-  bad("b2.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty floot x\n", {"line 4", "\"floot\""});
-  bad("c.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n", {"ends inside its header"});
+  bad("b.ply", "ply\nformat ascii 1.0\nelement vertex -3\n", {"line 3", "'-3'"});
+  bad("b2.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty floot x\n", {"line 4", "'floot'"});
+  bad("c.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n", {"the header is cut short"});
+  bad("c2.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nelement vertex 0\nend_header\n1\n",
+      {"line 5", "element 'vertex' is there already"});
   bad("d.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n", {"no x y z"});
   const std::string ascii = kAsciiPly;
   bad("f.ply", ascii.substr(0, ascii.size() - 4), {"tail 0 of the 1", "cut short"});

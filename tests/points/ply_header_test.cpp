@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <sstream>
+
 #include "files/temporary_folder.h"
 #include "lamina/error.h"
 #include "lamina/points.h"
@@ -51,11 +53,24 @@ TEST(PlyHeader, LinesMayEndInCarriageReturnAlone) {
   EXPECT_EQ(header.line_end, '\r');
 }
 
+TEST(PlyHeader, OfAStreamLeavesTheDataThere) {
+  for (const std::string end : {"\n", "\r\n", "\r"}) {
+    std::string text;
+    for (const char* line : {"ply", "comment end_header", "format ascii 1.0", " end_header "}) text += line + end;
+    std::stringbuf stream(text + "1 end_header" + end);
+    EXPECT_EQ(read_ply_header(stream, "a.ply").lines, 4);
+    EXPECT_EQ(stream.sbumpc(), '1');
+  }
+}
+
 TEST(PlyHeader, ErrorsNameFileAndLine) {
   const std::string start = "ply\nformat ascii 1.0\n";
   EXPECT_THAT(refused_header("ply\nformat utf8 1.0\n"), HasSubstr("a.ply, line 2: format 'utf8' is not supported"));
   EXPECT_THAT(refused_header("ply\nformat ascii 2.0\n"), HasSubstr("a.ply, line 2: PLY version '2.0'"));
   EXPECT_THAT(refused_header("ply\nformat ascii\n"), HasSubstr("a version expected"));
+  EXPECT_THAT(refused_header(start + start.substr(4)), HasSubstr("a.ply, line 3: a second format line"));
+  EXPECT_THAT(refused_header(start + "element vertex 1\nproperty float x\nelement vertex 2\n"),
+              HasSubstr("a.ply, line 5: element 'vertex' is there already"));
   EXPECT_THAT(refused_header("ply\nelement vertex 0\nend_header\n"),
               HasSubstr("a.ply, line 3: the header ends without a format"));
   EXPECT_THAT(refused_header(start + "element vertex -1\n"),
