@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "lamina/info.h"
 #include "lamina/measure.h"
@@ -41,6 +42,22 @@ TEST_F(ConvertTool, MeshesChangeTheirFormat) {
   ASSERT_EQ(run_lamina({"convert", mesh_, "--vertices", "-o", out_}).code, 0);
   EXPECT_EQ(content_of(out_), FileContent::points);
   EXPECT_EQ(read_points(out_).size(), read_mesh(mesh_).positions.size());
+}
+
+TEST_F(ConvertTool, VerticesThatAreNotFiniteAreLeftOutOfMeshes) {
+  TriangleMesh mesh = read_mesh(mesh_);
+  const std::size_t vertices = mesh.positions.size();
+  mesh.positions[3][1] = std::nan("");
+  const std::string bad = folder_ / "bad.ply";
+  write_mesh(mesh, bad);
+  const auto refused = run_lamina({"compare", bad, mesh_});
+  EXPECT_EQ(refused.code, 3);
+  EXPECT_THAT(refused.err, HasSubstr("'lamina convert " + bad + " -o mesh.ply' leaves it out"));
+  const auto converted = run_lamina({"convert", bad, "-o", out_});
+  EXPECT_EQ(converted.code, 0);
+  EXPECT_THAT(converted.err, HasSubstr("1 vertex is not finite and left out"));
+  EXPECT_EQ(read_mesh(out_).positions.size(), vertices - 1);
+  EXPECT_EQ(run_lamina({"convert", bad, "--bad-samples", "refuse", "-o", out_}).code, 3);
 }
 
 TEST_F(ConvertTool, AMeshComesBackFromItsLevelSet) {
