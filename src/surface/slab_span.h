@@ -18,9 +18,9 @@ struct SlabSpan {
 /// Slabs a cell can be touched from: three cells of the coarsest level, each a slab high.
 inline constexpr std::int32_t kReachSlabs = 3;
 
-/// All slabs that can hold surface.
+/// All slabs that can hold surface, and one that holds the upper corners of their cells.
 inline SlabSpan all_slabs(const Lattice& lattice, const Extent& extent) {
-  return {lattice.slab_of(extent.z_min) - kReachSlabs, lattice.slab_of(extent.z_max) + kReachSlabs + 1};
+  return {lattice.slab_of(extent.z_min) - kReachSlabs, lattice.slab_of(extent.z_max) + kReachSlabs + 2};
 }
 
 /// The slabs each stage works on so that the finished slabs of a span, and the numbers of those just below it, are the

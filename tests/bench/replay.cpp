@@ -10,11 +10,10 @@
 #include "project/finish.h"
 #include "refine/refine.h"
 #include "surface/final_vertices.h"
+#include "surface/slab_span.h"
 
 namespace lamina::bench {
 namespace {
-
-constexpr std::int32_t kReachSlabs = 2;  // as in the job
 
 FeedSettings all_cached(FeedSettings settings) {
   settings.cache_bytes = std::numeric_limits<std::size_t>::max();
@@ -31,8 +30,8 @@ Replay::Replay(const Scene& scene, const ProjectSettings& settings, const Kernel
             false),
       window_(scene.resolved.lattice, static_cast<int>(scene.attributes()), scene.ingested->extent),
       projector_(settings, kernel),
-      first_(scene.resolved.lattice.slab_of(scene.ingested->extent.z_min) - kReachSlabs),
-      last_(scene.resolved.lattice.slab_of(scene.ingested->extent.z_max) + kReachSlabs) {}
+      first_(all_slabs(scene.resolved.lattice, scene.ingested->extent).begin),
+      last_(all_slabs(scene.resolved.lattice, scene.ingested->extent).end - 1) {}
 
 void Replay::mark(const ActiveBucket& bucket) {
   constexpr std::size_t kPiece = 4096;

@@ -65,9 +65,9 @@ RC_GTEST_PROP(SurfaceFuzz, SomeBytesAnywhere, (unsigned seed)) {
   static const Cloud cloud = small_cloud();
   std::string bytes = test::ply_bytes(test::ply_model(cloud), static_cast<PlyFormat>(pick(random, 3)));
   const bool header = pick(random, 2) == 0;
-  const std::size_t within = header ? 300 : bytes.size();
   const unsigned changes = 1 + pick(random, 20);
   for (unsigned i = 0; i < changes; ++i) {
+    const std::size_t within = header ? 300 : bytes.size();
     const std::size_t at = pick(random, within);
     switch (pick(random, 4)) {
       case 0:
@@ -132,8 +132,7 @@ RC_GTEST_PROP(SurfaceFuzz, WildNumbers, (unsigned seed)) {
 }
 
 // Shapes no surface comes from, or only a bad one: lines, few places, volumes, contradicting normals.
-RC_GTEST_PROP(SurfaceFuzz, ShapesThatAreNoSurfaces, (unsigned seed)) {
-  std::mt19937 random(seed);
+Cloud shape_that_is_no_surface(std::mt19937& random) {
   const unsigned dimensions = pick(random, 4);
   const unsigned places = pick(random, 3) == 0 ? 1 + pick(random, 5) : 1u << 30;
   const bool honest = pick(random, 2) == 0;
@@ -148,10 +147,25 @@ RC_GTEST_PROP(SurfaceFuzz, ShapesThatAreNoSurfaces, (unsigned seed)) {
     p = turn * p;
     cloud.add({p[0], p[1], p[2]}, honest ? test::Point3{0, 0, 1} : test::random_direction(random));
   }
+  return cloud;
+}
+
+RC_GTEST_PROP(SurfaceFuzz, ShapesThatAreNoSurfaces, (unsigned seed)) {
+  std::mt19937 random(seed);
+  const Cloud cloud = shape_that_is_no_surface(random);
   SurfaceSettings s;
   s.cluster = static_cast<ClusterMode>(pick(random, 3));
   s.blend = 1 + pick(random, 3);
   expect_mesh_or_error(test::ply_bytes(test::ply_model(cloud), PlyFormat::little_endian), s);
+}
+
+// Values as far above the highest sample as cells reach: these cells have upper corners, too.
+TEST(SurfaceFuzz, SurfaceInTheLastCells) {
+  std::mt19937 random(253987912);
+  SurfaceSettings s;
+  const Cloud cloud = shape_that_is_no_surface(random);
+  s.blend = 3;
+  EXPECT_TRUE(test::reconstruct(cloud, s).facts.is_manifold());
 }
 
 }  // namespace
