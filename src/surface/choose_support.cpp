@@ -33,7 +33,7 @@ SupportChoice choose_support(const SurfaceSettings& settings, const RadiusSurvey
     out.cell = {kCell, Length::Unit::sample_radius};
     out.refit = 4;
     if (!settings.cell) out.band = 1.25F;
-    out.good_reach = 0.3F;
+    out.good_reach = 0.2F;
   } else if (survey.high < kEven * survey.low) {
     out.blend = 1;
     out.cell = {kCell, Length::Unit::sample_radius};
