@@ -3,6 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "project/shared_corners.h"
+
 namespace lamina {
 namespace {
 
@@ -42,7 +44,8 @@ bool has_values(const Window& window, int level, const Place& p) {
 bool corner_value(const Window& window, int level, const Cell& corner, CornerValue& out, float* attributes) {
   const Place here = place_of(window, level, corner);
   if (here.block->shared.test(here.offset)) {
-    return corner_value(window, level - 1, {corner.x * 2, corner.y * 2, corner.z * 2}, out, attributes);
+    const FinerCorner finer = finer_corner(window, level, corner);
+    return corner_value(window, finer.level, finer.corner, out, attributes);
   }
   for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] = 0;
   if (here.block->good.test(here.offset) && has_values(window, level, here)) {

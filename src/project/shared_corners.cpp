@@ -15,9 +15,20 @@ bool allocate_values(const Window& window, int level, Projected& points, int beg
   return true;
 }
 
+FinerCorner finer_corner(const Window& window, int level, const Cell& corner) {
+  FinerCorner out{level, corner, nullptr, 0};
+  do {
+    --out.level;
+    out.corner = {out.corner.x * 2, out.corner.y * 2, out.corner.z * 2};
+    out.block = window.probe(out.level, block_of(out.corner));
+    out.offset = offset_in_block(out.corner);
+  } while (out.level > 0 && (out.block == nullptr || !out.block->corners.test(out.offset)));
+  return out;
+}
+
 FinerCorner finer_corner(const Window& window, int level, const Tile& tile, int z, int bit) {
-  const Cell fine{(tile.block.x * 8 + (bit & 7)) * 2, (tile.block.y * 8 + (bit >> 3)) * 2, (tile.block.z * 8 + z) * 2};
-  return {window.probe(level - 1, block_of(fine)), offset_in_block(fine)};
+  return finer_corner(window, level,
+                      {tile.block.x * 8 + (bit & 7), tile.block.y * 8 + (bit >> 3), tile.block.z * 8 + z});
 }
 
 void take_shared(const Window& window, int level, const Tile& tile, int z) {
@@ -32,9 +43,9 @@ void take_shared(const Window& window, int level, const Tile& tile, int z) {
   }
 }
 
-void copy_value(const Window& window, int level, const FinerCorner& from, CornerValues& to, std::uint32_t at) {
-  const CornerValues& source = from.block->values[window.brick_of(level - 1, from.offset >> 6)];
-  const std::uint32_t i = from.block->value_index(from.offset, window.brick_layers(level - 1));
+void copy_value(const Window& window, const FinerCorner& from, CornerValues& to, std::uint32_t at) {
+  const CornerValues& source = from.block->values[window.brick_of(from.level, from.offset >> 6)];
+  const std::uint32_t i = from.block->value_index(from.offset, window.brick_layers(from.level));
   std::copy_n(source.of(i), window.channels(), to.of(at));
 }
 
@@ -45,7 +56,7 @@ void copy_shared(Window& window, int level, const Tile& tile, int begin, int end
     take_shared(window, level, tile, z);
     for (std::uint64_t w = leaf.shared.words[z] & leaf.seen.words[z]; w != 0; w &= w - 1) {
       const int bit = std::countr_zero(w);
-      copy_value(window, level, finer_corner(window, level, tile, z, bit), values,
+      copy_value(window, finer_corner(window, level, tile, z, bit), values,
                  leaf.value_index(z * 64 + bit, window.brick_layers(level)));
     }
   }

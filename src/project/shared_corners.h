@@ -8,20 +8,24 @@ namespace lamina {
 /// none.
 bool allocate_values(const Window& window, int level, Projected& points, int begin, int end);
 
-/// A corner as the next finer level has it.
+/// A shared corner where it counts: in the next finer level that holds it. Levels in between need not: a leaf cell may
+/// lie beside one that is subdivided twice there.
 struct FinerCorner {
+  int level;
+  Cell corner;
   const CornerBlock* block;
   int offset;
 };
+FinerCorner finer_corner(const Window& window, int level, const Cell& corner);
 /// Of the tile's shared corner at `bit` of layer z.
 FinerCorner finer_corner(const Window& window, int level, const Tile& tile, int z, int bit);
 
 /// Takes over `seen`, `good` and the signs of a layer's shared corners that are near.
 void take_shared(const Window& window, int level, const Tile& tile, int z);
 /// Copies the finer level's values to place `at` of the coarser one's.
-void copy_value(const Window& window, int level, const FinerCorner& from, CornerValues& to, std::uint32_t at);
+void copy_value(const Window& window, const FinerCorner& from, CornerValues& to, std::uint32_t at);
 
-/// Takes over what the next finer level has for the tile's shared corners in layers [begin, end).
+/// Takes over what finer levels have for the tile's shared corners in layers [begin, end).
 void copy_shared(Window& window, int level, const Tile& tile, int begin, int end);
 
 }  // namespace lamina

@@ -124,7 +124,7 @@ void store_values(Window& window, int level, const Work& work, const std::vector
     for (std::uint64_t w = points.seen.words[z]; w != 0; w &= w - 1, ++at) {
       const int bit = std::countr_zero(w);
       if (((shared >> bit) & 1U) != 0) {
-        copy_value(window, level, finer_corner(window, level, work.tile, z, bit), values, at);
+        copy_value(window, finer_corner(window, level, work.tile, z, bit), values, at);
         continue;
       }
       const std::size_t query = numbers[static_cast<std::size_t>(z * 64 + bit)];

@@ -65,39 +65,39 @@ TEST(CornerValue, OwnOrExtendedTheSameFromEveryLevel) {
     std::size_t none = 0;
     for (int level = 0; level < scene.lattice.levels; ++level) {
       const auto values = own_values(s.window, level, s.first, s.end);
-      for_set(
-          s.window, level, s.first, s.end, &CornerBlock::corners,
-          [&](int, const Cell& c, const CornerBlock& leaf, int offset) {
-            const CornerValue untouched{-7, {-8, -9, -10}, -11, -12};
-            CornerValue value = untouched;
-            std::vector<float> attributes(static_cast<std::size_t>(s.window.attributes()), -1);
-            const bool found = corner_value(s.window, level, c, value, attributes.data());
-            const std::vector<float> channels = channels_of(value, attributes);
-            CornerValue bare = untouched;
-            ASSERT_EQ(corner_value(s.window, level, c, bare, nullptr), found);
-            ASSERT_EQ(channels_of(bare, {}), channels_of(value, {}));
-            if (!found) {
-              ASSERT_EQ(channels_of(value, {}), channels_of(untouched, {}));
-            }
-            if (leaf.shared.test(offset)) {
-              CornerValue finer = untouched;
-              std::vector<float> of_finer(attributes.size(), -1);
-              ASSERT_EQ(corner_value(s.window, level - 1, {c.x * 2, c.y * 2, c.z * 2}, finer, of_finer.data()), found);
-              const std::vector<float> other = channels_of(finer, of_finer);
-              for (std::size_t k = 0; k < other.size(); ++k) {
-                ASSERT_EQ(std::bit_cast<std::uint32_t>(other[k]), std::bit_cast<std::uint32_t>(channels[k]));
-              }
-              ++shared;
-              return;
-            }
-            const Truth truth = truth_of(values, c, scene.lattice.cell_size(level), s.window.channels());
-            ASSERT_EQ(found, truth.found);
-            (truth.own ? own : found ? extended : none) += 1;
-            for (std::size_t k = 0; found && k < channels.size(); ++k) {
-              ASSERT_NEAR(channels[k], truth.channels[k], truth.error[k])
-                  << "channel " << k << " level " << level << " " << c.x << " " << c.y << " " << c.z;
-            }
-          });
+      for_set(s.window, level, s.first, s.end, &CornerBlock::corners,
+              [&](int, const Cell& c, const CornerBlock& leaf, int offset) {
+                const CornerValue untouched{-7, {-8, -9, -10}, -11, -12};
+                CornerValue value = untouched;
+                std::vector<float> attributes(static_cast<std::size_t>(s.window.attributes()), -1);
+                const bool found = corner_value(s.window, level, c, value, attributes.data());
+                const std::vector<float> channels = channels_of(value, attributes);
+                CornerValue bare = untouched;
+                ASSERT_EQ(corner_value(s.window, level, c, bare, nullptr), found);
+                ASSERT_EQ(channels_of(bare, {}), channels_of(value, {}));
+                if (!found) {
+                  ASSERT_EQ(channels_of(value, {}), channels_of(untouched, {}));
+                }
+                if (leaf.shared.test(offset)) {
+                  CornerValue finer = untouched;
+                  std::vector<float> of_finer(attributes.size(), -1);
+                  const HeldCorner held = held_finer(s.window, level, c);
+                  ASSERT_EQ(corner_value(s.window, held.level, held.corner, finer, of_finer.data()), found);
+                  const std::vector<float> other = channels_of(finer, of_finer);
+                  for (std::size_t k = 0; k < other.size(); ++k) {
+                    ASSERT_EQ(std::bit_cast<std::uint32_t>(other[k]), std::bit_cast<std::uint32_t>(channels[k]));
+                  }
+                  ++shared;
+                  return;
+                }
+                const Truth truth = truth_of(values, c, scene.lattice.cell_size(level), s.window.channels());
+                ASSERT_EQ(found, truth.found);
+                (truth.own ? own : found ? extended : none) += 1;
+                for (std::size_t k = 0; found && k < channels.size(); ++k) {
+                  ASSERT_NEAR(channels[k], truth.channels[k], truth.error[k])
+                      << "channel " << k << " level " << level << " " << c.x << " " << c.y << " " << c.z;
+                }
+              });
       ASSERT_FALSE(HasFatalFailure());
     }
     EXPECT_GT(own, 100U);

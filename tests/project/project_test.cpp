@@ -140,8 +140,9 @@ void expect_truth(const Scene& scene, Share& share) {
       int from = level;
       Cell fine = c;
       while (corner && from > 0 && s.window.probe(from, block_of(fine))->shared.test(offset_in_block(fine))) {
-        fine = {fine.x * 2, fine.y * 2, fine.z * 2};
-        --from;
+        const HeldCorner held = held_finer(s.window, from, fine);
+        fine = held.corner;
+        from = held.level;
       }
       const double cell = scene.lattice.cell_size(level);
       const Vec3 at{(c.x + shift) * cell, (c.y + shift) * cell, (c.z + shift) * cell};

@@ -89,10 +89,16 @@ class OctreeTruth {
   void find_near(int level) {
     Level& here = levels[static_cast<std::size_t>(level)];
     for (const Cell& corner : here.corners) {
-      const Cell fine{corner.x * 2, corner.y * 2, corner.z * 2};
-      if (level > 0 && levels[static_cast<std::size_t>(level) - 1].corners.contains(fine)) {
+      // The next finer level that holds it tells; those in between need not hold it.
+      Cell fine = corner;
+      int finer = level - 1;
+      for (; finer >= 0; --finer) {
+        fine = {fine.x * 2, fine.y * 2, fine.z * 2};
+        if (levels[static_cast<std::size_t>(finer)].corners.contains(fine)) break;
+      }
+      if (finer >= 0) {
         here.shared.insert(corner);
-        if (levels[static_cast<std::size_t>(level) - 1].near.contains(fine)) here.near.insert(corner);
+        if (levels[static_cast<std::size_t>(finer)].near.contains(fine)) here.near.insert(corner);
         continue;
       }
       bool near = std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {

@@ -30,6 +30,21 @@ std::set<Cell> set_cells(const Window& window, int level, std::int32_t first, st
   return out;
 }
 
+/// A shared corner in the next finer level that holds it.
+struct HeldCorner {
+  int level;
+  Cell corner;
+  const CornerBlock* block;
+};
+inline HeldCorner held_finer(const Window& window, int level, const Cell& corner) {
+  for (Cell c = corner; level-- > 0;) {
+    c = {c.x * 2, c.y * 2, c.z * 2};
+    const CornerBlock* block = window.probe(level, block_of(c));
+    if (block != nullptr && block->corners.test(offset_in_block(c))) return {level, c, block};
+  }
+  return {};
+}
+
 inline void append_bits(const Window& window, int level, const Block& b, const Projected& points,
                         std::vector<std::uint64_t>& out) {
   for (const BlockMask* m : {&points.near, &points.seen, &points.good}) {

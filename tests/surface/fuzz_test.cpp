@@ -102,8 +102,7 @@ double wild(std::mt19937& random) {
   return std::ldexp(std::normal_distribution<>()(random), static_cast<int>(pick(random, 200)) - 100);
 }
 
-// Well-formed files with samples that make no sense. Of radii that differ a millionfold from neighbour to neighbour one
-// cloud in a hundred still comes out with an edge of three triangles.
+// Well-formed files with samples that make no sense.
 RC_GTEST_PROP(SurfaceFuzz, WildNumbers, (unsigned seed)) {
   std::mt19937 random(seed);
   Cloud cloud = test::sphere_cloud(50 + pick(random, 100));
@@ -128,7 +127,7 @@ RC_GTEST_PROP(SurfaceFuzz, WildNumbers, (unsigned seed)) {
   s.levels = pick(random, 2) == 0 ? 0 : 1 + static_cast<int>(pick(random, 5));
   s.boundary = pick(random, 3) == 0 ? 0.5 : 0;
   s.density = 2 + pick(random, 30);
-  expect_mesh_or_error(test::ply_bytes(test::ply_model(cloud), PlyFormat::little_endian), s, false);
+  expect_mesh_or_error(test::ply_bytes(test::ply_model(cloud), PlyFormat::little_endian), s);
 }
 
 // Shapes no surface comes from, or only a bad one: lines, few places, volumes, contradicting normals.
@@ -156,6 +155,31 @@ RC_GTEST_PROP(SurfaceFuzz, ShapesThatAreNoSurfaces, (unsigned seed)) {
   SurfaceSettings s;
   s.cluster = static_cast<ClusterMode>(pick(random, 3));
   s.blend = 1 + pick(random, 3);
+  expect_mesh_or_error(test::ply_bytes(test::ply_model(cloud), PlyFormat::little_endian), s);
+}
+
+// The same with all that is done beside the plain way, and a cell or support of any size.
+RC_GTEST_PROP(SurfaceFuzz, BadShapesWithAnySettings, (unsigned seed)) {
+  std::mt19937 random(seed);
+  const Cloud cloud =
+      pick(random, 3) == 0 ? test::sphere_cloud(50 + pick(random, 500)) : shape_that_is_no_surface(random);
+  const auto maybe = [&](auto value, auto otherwise) { return pick(random, 3) == 0 ? value : otherwise; };
+  SurfaceSettings s;
+  s.blend = maybe(std::optional<double>(), std::optional<double>(0.5 + 0.1 * pick(random, 40)));
+  if (pick(random, 3) == 0) s.cell = Length{0.3 + 0.1 * pick(random, 15), Length::Unit::influence_radius};
+  if (pick(random, 3) == 0) s.refit = pick(random, 9);
+  s.cluster = static_cast<ClusterMode>(pick(random, 3));
+  s.close_holes = s.cluster == ClusterMode::free ? 0 : maybe(40.0, 8.0);
+  if (s.close_holes > 0 && pick(random, 2) == 0) s.watertight = pick(random, 3) > 0;
+  s.steps = static_cast<int>(pick(random, 5));
+  s.diffuse = maybe(true, false);
+  s.fit = static_cast<FitMode>(pick(random, 2));
+  s.levels = static_cast<int>(pick(random, 5));
+  s.density = 2 + pick(random, 30);
+  s.chord = maybe(1.0, 0.2);
+  s.window = 1 + static_cast<int>(pick(random, 4));
+  s.vertex_curvature = maybe(true, false);
+  s.prune_triangles = maybe(5, 0);
   expect_mesh_or_error(test::ply_bytes(test::ply_model(cloud), PlyFormat::little_endian), s);
 }
 
