@@ -62,7 +62,8 @@ void look_at_vertices(Work& w, MeshMeasures& m) {
     if (w.used[v] == 0) continue;
     const Vec3& p = w.mesh.positions[v];
     if (!std::isfinite(p[0] + p[1] + p[2]))
-      throw Error(ExitCode::unreadable, fmt::format("measure: vertex {} is not finite; drop_non_finite() leaves it out", v));
+      throw Error(ExitCode::unreadable,
+                  fmt::format("measure: vertex {} is not finite; drop_non_finite() leaves it out", v));
     ++m.vertices;
     widen(m.low, m.high, p);
     if (w.components.find(v) != v) continue;
