@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <atomic>
 
+#include "window/finer_corner.h"
+
 namespace lamina {
 namespace {
 
@@ -39,18 +41,15 @@ void reach_ends(const TileView& tile, int z, const std::array<std::uint64_t, 3>&
   if (accepted[2] != 0) reach_layer(tile.neighbour(0, 0, (z + 1) >> 3), (z + 1) & 7);
 }
 
-/// The finest level that holds a corner of `level`. Levels in between need not hold it: a leaf cell may lie beside one
-/// that is subdivided twice there.
+/// In the finest level that holds the corner of `level`.
 void mark_finest(Window& window, int level, Cell corner) {
-  CornerBlock* holder = window.probe(level, block_of(corner));
-  int offset = offset_in_block(corner);
-  while (level-- > 0) {
-    corner = {corner.x * 2, corner.y * 2, corner.z * 2};
-    CornerBlock* block = window.probe(level, block_of(corner));
-    if (block == nullptr || !block->corners.test(offset_in_block(corner))) continue;
-    holder = block;
-    offset = offset_in_block(corner);
+  for (FinerCorner finer = finer_corner(window, level, corner); finer.block != nullptr;
+       finer = finer_corner(window, level, corner)) {
+    level = finer.level;
+    corner = finer.corner;
   }
+  CornerBlock* holder = window.probe(level, block_of(corner));
+  const int offset = offset_in_block(corner);
   reach_layer(holder, offset >> 6);
   set_shared(holder->surface.words[offset >> 6], std::uint64_t{1} << (offset & 63));
 }

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-#include "project/shared_corners.h"
+#include "window/finer_corner.h"
 
 namespace lamina {
 namespace {

@@ -15,17 +15,6 @@ bool allocate_values(const Window& window, int level, Projected& points, int beg
   return true;
 }
 
-FinerCorner finer_corner(const Window& window, int level, const Cell& corner) {
-  FinerCorner out{level, corner, nullptr, 0};
-  do {
-    --out.level;
-    out.corner = {out.corner.x * 2, out.corner.y * 2, out.corner.z * 2};
-    out.block = window.probe(out.level, block_of(out.corner));
-    out.offset = offset_in_block(out.corner);
-  } while (out.level > 0 && (out.block == nullptr || !out.block->corners.test(out.offset)));
-  return out;
-}
-
 FinerCorner finer_corner(const Window& window, int level, const Tile& tile, int z, int bit) {
   return finer_corner(window, level,
                       {tile.block.x * 8 + (bit & 7), tile.block.y * 8 + (bit >> 3), tile.block.z * 8 + z});

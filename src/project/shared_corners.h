@@ -1,6 +1,6 @@
 // Values of corners that several levels hold.
 #pragma once
-#include "window/window.h"
+#include "window/finer_corner.h"
 
 namespace lamina {
 
@@ -8,16 +8,7 @@ namespace lamina {
 /// none.
 bool allocate_values(const Window& window, int level, Projected& points, int begin, int end);
 
-/// A shared corner where it counts: in the next finer level that holds it. Levels in between need not: a leaf cell may
-/// lie beside one that is subdivided twice there.
-struct FinerCorner {
-  int level;
-  Cell corner;
-  const CornerBlock* block;
-  int offset;
-};
-FinerCorner finer_corner(const Window& window, int level, const Cell& corner);
-/// Of the tile's shared corner at `bit` of layer z.
+/// The tile's shared corner at `bit` of layer z, where it counts.
 FinerCorner finer_corner(const Window& window, int level, const Tile& tile, int z, int bit);
 
 /// Takes over `seen`, `good` and the signs of a layer's shared corners that are near.

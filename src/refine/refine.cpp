@@ -14,6 +14,7 @@
 
 #include "lamina/floor_divide.h"
 #include "window/bits.h"
+#include "window/finer_corner.h"
 
 namespace lamina {
 namespace {
@@ -295,8 +296,7 @@ class BlockMarks {
   std::array<std::uint16_t, kSide * kSide> corners_{};
 };
 
-/// Corners that a level holds which is finer by two or more, and none in between: where a leaf cell lies beside one
-/// that is subdivided twice.
+/// Takes over corners that a level holds which is finer by two or more, and none in between.
 void share_across_levels(const Window& window, int level, const Tile& t, int begin, int end) {
   std::array<std::uint64_t, 8> beside{};
   bits::dilate_layers<0, 1>(gather(*t.leaf, &CornerBlock::split, 0), begin, end, &beside[begin]);
@@ -305,16 +305,12 @@ void share_across_levels(const Window& window, int level, const Tile& t, int beg
     for (std::uint64_t w = unshared; w != 0; w &= w - 1) {
       const int bit = std::countr_zero(w);
       const std::uint64_t one = w & (~w + 1);
-      Cell c{t.block.x * 16 + 2 * (bit & 7), t.block.y * 16 + 2 * (bit >> 3), t.block.z * 16 + 2 * z};
-      for (int finer = level - 2; finer >= 0; --finer) {
-        c = {c.x * 2, c.y * 2, c.z * 2};
-        const CornerBlock* block = window.probe(finer, block_of(c));
-        if (block == nullptr || !block->corners.test(offset_in_block(c))) continue;
-        t.leaf->shared.words[z] |= one;
-        t.leaf->near.words[z] &= ~one;
-        if (block->near.test(offset_in_block(c))) t.leaf->near.words[z] |= one;
-        break;
-      }
+      const FinerCorner finer =
+          finer_corner(window, level, {t.block.x * 8 + (bit & 7), t.block.y * 8 + (bit >> 3), t.block.z * 8 + z});
+      if (finer.block == nullptr) continue;
+      t.leaf->shared.words[z] |= one;
+      t.leaf->near.words[z] &= ~one;
+      if (finer.block->near.test(finer.offset)) t.leaf->near.words[z] |= one;
     }
   }
 }
