@@ -6,14 +6,12 @@
 #include <cstring>
 #include <filesystem>
 
+#include "files/read_bytes.h"
 #include "lamina/error.h"
 
 namespace lamina::meshes {
-namespace {
-constexpr unsigned kBufferBytes = 1u << 18;
-}
 
-FileBuffer::FileBuffer(const std::string& path) : path_(path), buffer_(kBufferBytes) {
+FileBuffer::FileBuffer(const std::string& path) : path_(path), buffer_(kReadBytes) {
   std::error_code ec;
   if (std::filesystem::is_directory(path, ec))
     throw Error(ExitCode::unreadable, fmt::format("{}: is a directory, not a mesh file", path));
@@ -21,7 +19,7 @@ FileBuffer::FileBuffer(const std::string& path) : path_(path), buffer_(kBufferBy
   file_ = gzopen(opened.c_str(), "rb");
   if (file_ == nullptr)
     throw Error(ExitCode::unreadable, fmt::format("{}: cannot be opened: {}", path, std::strerror(errno)));
-  gzbuffer(file_, kBufferBytes);
+  gzbuffer(file_, kReadBytes);
   compressed_ = gzdirect(file_) == 0;
   const auto size = std::filesystem::file_size(opened, ec);
   disk_bytes_ = ec ? 0 : size;
@@ -39,7 +37,7 @@ void FileBuffer::require_sound() const {
 
 FileBuffer::int_type FileBuffer::underflow() {
   if (gptr() < egptr()) return traits_type::to_int_type(*gptr());
-  const int got = gzread(file_, buffer_.data(), kBufferBytes);
+  const int got = gzread(file_, buffer_.data(), kReadBytes);
   int code = Z_OK;
   const char* message = gzerror(file_, &code);
   if (got < 0 || code == Z_BUF_ERROR || code == Z_DATA_ERROR)

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 
+#include "files/read_bytes.h"
 #include "lamina/error.h"
 #include "meshes/readers.h"
 #include "points/ply_header.h"
@@ -17,7 +18,7 @@ namespace {
 /// Buffered bytes of the body; the values' decoders sit on top.
 class Bytes {
  public:
-  explicit Bytes(FileBuffer& file) : file_(file), buffer_(std::size_t{1} << 18) {}
+  explicit Bytes(FileBuffer& file) : file_(file), buffer_(kReadBytes) {}
 
   /// `n` contiguous bytes, nullptr when the file ends before.
   const char* take(std::size_t n) {

@@ -5,15 +5,13 @@
 #include <algorithm>
 #include <memory>
 
+#include "files/read_bytes.h"
 #include "lamina/error.h"
 #include "points/ply_columns.h"
 
 namespace lamina {
 namespace {
 
-/// Bytes read from the file at once: they stay in the second-level cache until converted, and unlike a mapping they do
-/// not count as resident memory afterwards.
-constexpr std::size_t kReadBytes = 128 << 10;
 /// Bytes converted column by column at once: they stay in the first-level cache across the columns.
 constexpr std::size_t kConvertBytes = 12 << 10;
 
@@ -38,6 +36,7 @@ void convert(const BinaryRows& layout, const std::vector<PointColumn>& columns, 
 
 void read_binary_rows(const InputFile& file, const BinaryRows& rows, const std::vector<PointColumn>& columns,
                       std::uint64_t first, std::size_t count, const std::vector<ColumnTarget>& targets) {
+  // Read, not mapped: mapped bytes count as resident memory afterwards.
   const std::size_t block = std::max<std::size_t>(1, kReadBytes / rows.stride);
   const auto buffer = std::make_unique_for_overwrite<std::byte[]>(std::min(block, count) * rows.stride);
   for (std::size_t done = 0; done < count; done += block) {
