@@ -17,6 +17,11 @@ TriangleMesh read_by_format(meshes::FileBuffer& file, const std::string& path) {
   magic.resize(static_cast<std::size_t>(in.gcount()));
   file.require_sound();
   if (magic.empty()) throw Error(ExitCode::unreadable, fmt::format("{}: is empty", path));
+  // OpenMesh's readers would take the first line for something else.
+  if (magic.starts_with("\xEF\xBB\xBF")) {
+    throw Error(ExitCode::unreadable,
+                fmt::format("{}: begins with a byte order mark; save it without: tail -c +4 FILE > OTHER", path));
+  }
   in.clear();
   in.seekg(0);
   const std::string format = meshes::format_name(path);

@@ -4,13 +4,14 @@
 
 #include <algorithm>
 #include <cstring>
+#include <string_view>
 
+#include "files/read_bytes.h"
 #include "lamina/error.h"
 
 namespace lamina {
 namespace {
 
-constexpr std::size_t kBufferBytes = 256 << 10;
 constexpr std::size_t kLongestLine = 64 << 20;
 
 bool is_blank(std::string_view line) {
@@ -24,7 +25,7 @@ LineReader::LineReader(const InputFile& file, std::uint64_t offset, std::uint64_
       offset_(offset),
       line_(lines),
       line_end_(line_end),
-      buffer_(static_cast<std::size_t>(std::min<std::uint64_t>(kBufferBytes, file.bytes + 1))) {}
+      buffer_(static_cast<std::size_t>(std::min<std::uint64_t>(kReadBytes, file.bytes + 1))) {}
 
 bool LineReader::next(std::string_view& line) {
   while (next_of_any_kind(line)) {
@@ -71,6 +72,7 @@ bool LineReader::refill() {
     buffer_.resize(buffer_.size() * 2);
   }
   const std::size_t got = file_->read(offset_, buffer_.data() + end_, buffer_.size() - end_);
+  if (offset_ == 0 && std::string_view(buffer_.data(), got).starts_with(kByteOrderMark)) begin_ = kByteOrderMark.size();
   offset_ += got;
   end_ += got;
   return got > 0;

@@ -8,9 +8,13 @@
 
 namespace lamina {
 
+/// What editors of some systems put before text in UTF-8.
+inline constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
+
 class LineReader {
  public:
-  /// Begins at `offset`, after `lines` lines; lines end with `line_end`.
+  /// Begins at `offset`, after `lines` lines; lines end with `line_end`. A byte order mark at the file's
+  /// beginning is no part of the first.
   LineReader(const InputFile& file, std::uint64_t offset, std::uint64_t lines, char line_end);
 
   /// The next line that is not blank, without its end; valid until the next call. False at the end of the file.

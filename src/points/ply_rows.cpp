@@ -33,7 +33,8 @@ std::size_t vertex_element(const PlyHeader& header, const std::string& name) {
 void require_scalars(const PlyElement& vertices, const std::string& name) {
   for (const PlyProperty& property : vertices.properties) {
     if (property.list_count) {
-      unreadable(name, fmt::format("property {} of the vertices is a list; points with lists are not read: remove it",
+      unreadable(name, fmt::format("property {} of the vertices is a list; points with lists are not read; write the "
+                                   "file again without it (CloudCompare and MeshLab do)",
                                    quoted_word(property.name)));
     }
   }
@@ -52,6 +53,7 @@ PlyRows understand_vertices(const PlyHeader& header, const std::string& path, co
     rows.columns.push_back({property.name, property.type, rows.stride});
     rows.stride += static_cast<std::size_t>(byte_size(property.type));
   }
+  use_usual_names(rows.columns);
   give_roles(rows.columns, rows.info, name, "property");
   // Stanford's range images are seen along z.
   const auto is_grid = [](const PlyElement& element) { return element.name == "range_grid"; };

@@ -50,6 +50,25 @@ std::string usual_name(std::string_view name) {
   return known == kAliases.end() ? lower : std::string(known->second);
 }
 
+void use_usual_names(std::vector<PointColumn>& columns) {
+  constexpr std::array<std::array<std::string_view, 3>, 3> kTriples{
+      {{"x", "y", "z"}, {"nx", "ny", "nz"}, {"red", "green", "blue"}}};
+  for (const auto& triple : kTriples) {
+    const auto known = [&](std::string_view name) {
+      return std::find(triple.begin(), triple.end(), name) != triple.end();
+    };
+    if (std::any_of(columns.begin(), columns.end(), [&](const PointColumn& c) { return known(c.name); })) continue;
+    const auto is_one = [&](std::string_view name) {
+      return std::count_if(columns.begin(), columns.end(),
+                           [&](const PointColumn& c) { return usual_name(c.name) == name; }) == 1;
+    };
+    if (!std::all_of(triple.begin(), triple.end(), is_one)) continue;
+    for (PointColumn& column : columns) {
+      if (known(usual_name(column.name))) column.name = usual_name(column.name);
+    }
+  }
+}
+
 bool has_column(const std::vector<PointColumn>& columns, std::string_view name) {
   return std::any_of(columns.begin(), columns.end(), [&](const PointColumn& c) { return c.name == name; });
 }

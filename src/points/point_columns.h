@@ -26,6 +26,9 @@ struct PointColumn {
 void give_roles(std::vector<PointColumn>& columns, PointSourceInfo& info, const std::string& file,
                 std::string_view noun);
 
+/// Positions, normals and colours that are there by other names only (`normal_x normal_y normal_z`) get the usual ones.
+void use_usual_names(std::vector<PointColumn>& columns);
+
 /// Whether one of the columns has the name.
 bool has_column(const std::vector<PointColumn>& columns, std::string_view name);
 

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -17,12 +18,27 @@ ValueRange range_of() {
   return {static_cast<double>(std::numeric_limits<T>::min()), static_cast<double>(std::numeric_limits<T>::max()), true};
 }
 
+constexpr char kQuote = '"';
+
 const char* skip_blanks(const char* p, const char* end) {
   while (p != end && is_space(*p)) ++p;
   return p;
 }
 
+/// A number alone or in quotes; returns where it ends, null when it is none.
+const char* parse_word(const char* p, const char* end, double& value) {
+  if (*p != kQuote) return parse_number(p, end, value);
+  const char* stop = parse_number(skip_blanks(p + 1, end), end, value);
+  if (stop != nullptr) stop = skip_blanks(stop, end);
+  return stop == nullptr || stop == end || *stop != kQuote ? nullptr : stop + 1;
+}
+
+/// A quoted word may hold separators.
 const char* end_of_word(const char* p, const char* end, char separator) {
+  if (p != end && *p == kQuote) {
+    const char* closing = std::find(p + 1, end, kQuote);
+    p = closing == end ? end : closing + 1;
+  }
   while (p != end && *p != separator && !(separator == kBlanks && is_space(*p))) ++p;
   return p;
 }
@@ -37,7 +53,8 @@ void split_line(std::string_view line, char separator, std::vector<std::string_v
     const char* stop = end_of_word(p, end, separator);
     const char* last = stop;
     while (last != p && is_space(last[-1])) --last;
-    words.emplace_back(p, static_cast<std::size_t>(last - p));
+    const bool quoted = last - p >= 2 && *p == kQuote && last[-1] == kQuote;
+    words.emplace_back(quoted ? p + 1 : p, static_cast<std::size_t>(last - p - (quoted ? 2 : 0)));
     p = stop;
     if (separator != kBlanks && p != end && ++p == end) words.emplace_back(p, 0);
   }
@@ -83,17 +100,19 @@ void RowParser::parse(const InputFile& file, std::string_view line, std::uint64_
   };
   const char* p = line.data();
   const char* const end = p + line.size();
+  bool more = false;  // a separator stands before, so that there is a value even if it is empty
   for (std::size_t c = 0; c < targets.size(); ++c) {
     p = skip_blanks(p, end);
-    if (p == end) {
+    const bool wanted = targets[c].wide != nullptr || targets[c].narrow != nullptr;
+    if (p == end && (wanted || !more)) {
       fail(fmt::format("{} values expected, only {} stand there ({} is missing)", targets.size(), c,
                        quoted_word(columns_[c].name)));
     }
-    if (targets[c].wide == nullptr && targets[c].narrow == nullptr) {
+    if (!wanted) {
       p = end_of_word(p, end, separator_);
     } else {
       double value = 0;
-      const char* stop = parse_number(p, end, value);
+      const char* stop = parse_word(p, end, value);
       if (stop == nullptr || (stop != end && !is_space(*stop) && *stop != separator_)) {
         fail(fmt::format("{} is no number ({} expected)", word(p, end_of_word(p, end, separator_)),
                          quoted_word(columns_[c].name)));
@@ -112,7 +131,8 @@ void RowParser::parse(const InputFile& file, std::string_view line, std::uint64_
     }
     if (separator_ != kBlanks) {
       p = skip_blanks(p, end);
-      if (p != end && *p == separator_) {
+      more = p != end && *p == separator_;
+      if (more) {
         ++p;
       } else if (p != end) {
         fail(fmt::format("{} stands where a '{}' should", word(p, end_of_word(p, end, kBlanks)), separator_));

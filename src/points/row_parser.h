@@ -11,7 +11,7 @@ namespace lamina {
 /// How the numbers of a line are kept apart: blanks, or one mark with blanks around it.
 inline constexpr char kBlanks = ' ';
 
-/// Cuts a line at its separators; blanks around words are no part of them. With a mark, words may be empty.
+/// Cuts a line at its separators; blanks and quotes around words are no part of them. With a mark, words may be empty.
 void split_line(std::string_view line, char separator, std::vector<std::string_view>& words);
 
 /// Values that a column can hold, by its type: integers within their range, anything otherwise. Colours given as floats

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "lamina/error.h"
+#include "points/line_reader.h"
 #include "points/number.h"
 #include "points/point_columns.h"
 
@@ -26,6 +27,10 @@ constexpr std::array kSignatures{
               "pdal translate FILE.e57 FILE.las"},
     Signature{"PK\x03\x04"sv, "is a zip archive; unpack it"},
     Signature{"\x28\xb5\x2f\xfd"sv, "is compressed with zstd; unpack it, or pipe it in: zstdcat FILE | lamina ... -"},
+    Signature{"\xFF\xFE", "is text in UTF-16; save it as UTF-8: iconv -f UTF-16 -t UTF-8 FILE > OTHER"},
+    Signature{"\xFE\xFF", "is text in UTF-16; save it as UTF-8: iconv -f UTF-16 -t UTF-8 FILE > OTHER"},
+    Signature{"\xEF\xBB\xBFply",
+              "begins with a byte order mark before 'ply'; save it without: tail -c +4 FILE > OTHER"},
     Signature{"OFF", "looks like an OFF mesh; give a point cloud, for example as PLY"},
     Signature{"COFF", "looks like an OFF mesh; give a point cloud, for example as PLY"},
     Signature{"NOFF", "looks like an OFF mesh; give a point cloud, for example as PLY"},
@@ -78,7 +83,7 @@ class Lines {
 
  private:
   static void split(std::string_view line, std::vector<std::string_view>& words) {
-    constexpr std::string_view kBetween = " \t\v\f,;";
+    constexpr std::string_view kBetween = " \t\v\f,;\"";
     words.clear();
     for (std::size_t at = 0; words.size() < 256;) {
       at = line.find_first_not_of(kBetween, at);
@@ -184,16 +189,17 @@ PointFormat detect_format(std::string_view start, const std::string& name) {
   const bool refused = std::any_of(kSignatures.begin(), kSignatures.end(),
                                    [&](const Signature& s) { return start.starts_with(s.start); });
   if (!refused && !start.empty() && start.find('\0') == std::string_view::npos) {
+    const std::string_view text = start.substr(start.starts_with(kByteOrderMark) ? kByteOrderMark.size() : 0);
     if (is_pcd(start)) return PointFormat::pcd;
-    if (is_ptx(start)) return PointFormat::ptx;
-    Lines lines(start);
+    if (is_ptx(text)) return PointFormat::ptx;
+    Lines lines(text);
     std::vector<std::string_view> words;
     const bool something = lines.next(words);
     if (something && is_obj_keyword(words[0])) return PointFormat::obj;
-    if (is_columns(start)) return PointFormat::text;
+    if (is_columns(text)) return PointFormat::text;
     const std::string ending = ending_of(name);
     if (ending == ".obj") return PointFormat::obj;
-    if (is_one_of(kTextEndings, ending) && !is_scan_list(start)) return PointFormat::text;
+    if (is_one_of(kTextEndings, ending) && !is_scan_list(text)) return PointFormat::text;
   } else if (!refused && is_pcd(start.substr(0, std::min(start.find('\0'), start.size())))) {
     return PointFormat::pcd;
   }

@@ -139,12 +139,13 @@ void require_columns(const std::string& told) {
 
 TextLayout understand_text(const InputFile& file, char line_end, const std::string& told, PointSourceInfo& info) {
   const std::vector<Told> wanted = told.empty() ? std::vector<Told>{} : parse_told(told);
-  const TextSample sample = sample_text(file, line_end);
+  TextSample sample = sample_text(file, line_end);
+  const std::size_t named = wanted.empty() ? sample.names.size() : wanted.size();
+  if (sample.ends_open && named != sample.columns) --sample.columns;
   if (sample.columns < 3) {
     throw Error(ExitCode::unreadable, fmt::format("{}: {} on a row; points need x y z", file.name,
                                                   sample.columns == 1 ? "one value" : "two values"));
   }
-  const std::size_t named = wanted.empty() ? sample.names.size() : wanted.size();
   if (named != 0 && named != sample.columns) {
     throw Error(wanted.empty() ? ExitCode::unreadable : ExitCode::usage,
                 fmt::format("{}: {} columns are named{}, the rows have {}; name all of them, - for those to skip",
@@ -159,8 +160,12 @@ TextLayout understand_text(const InputFile& file, char line_end, const std::stri
   for (std::size_t c = 0; c < sample.columns; ++c) {
     PointColumn column;
     column.name = guessed ? guesses[c] : !wanted.empty() ? wanted[c].name : sample.names[c];
-    const bool skip = column.name == kSkip || (wanted.empty() && sample.is_word[c] && c >= 3);
-    if (skip) column.role = Role::skipped;
+    const bool axis = column.name == "x" || column.name == "y" || column.name == "z";
+    const bool words = wanted.empty() && sample.is_word[c] && !axis;
+    if (words || column.name == kSkip) column.role = Role::skipped;
+    if (words && !guessed)
+      info.remarks.push_back(fmt::format("{}: column {} is left out: it holds words, or nothing in places", file.name,
+                                         quoted_word(column.name)));
     layout.columns.push_back(std::move(column));
   }
   const ScalarType colours = colour_type(sample, layout.columns);

@@ -35,17 +35,19 @@ std::string_view without_mark(std::string_view line) {
   return at == std::string_view::npos ? std::string_view{} : line.substr(at);
 }
 
-/// A line of names has x, y and z among them; the separator is its own.
+/// A line of names has x, y and z among them; the separator is its own. With any but blanks names may be of more words.
 std::vector<std::string> names_on(std::string_view line) {
-  const char separator = line.find(';') != line.npos ? ';' : line.find(',') != line.npos ? ',' : kBlanks;
   std::vector<std::string_view> words;
-  split_line(without_mark(line), separator, words);
-  std::vector<std::string> names;
-  names.reserve(words.size());
-  for (const std::string_view word : words) names.push_back(usual_name(word));
-  const auto has = [&](const char* name) { return std::find(names.begin(), names.end(), name) != names.end(); };
-  if (!has("x") || !has("y") || !has("z")) names.clear();
-  return names;
+  for (const char separator : {';', ',', '\t', kBlanks}) {
+    split_line(without_mark(line), separator, words);
+    while (!words.empty() && words.back().empty()) words.pop_back();
+    std::vector<std::string> names;
+    names.reserve(words.size());
+    for (const std::string_view word : words) names.push_back(usual_name(word));
+    const auto has = [&](const char* name) { return std::find(names.begin(), names.end(), name) != names.end(); };
+    if (has("x") && has("y") && has("z")) return names;
+  }
+  return {};
 }
 
 bool is_number(std::string_view word, double& value) {
@@ -96,14 +98,17 @@ char separator_of(const InputFile& file, const std::vector<Row>& rows) {
   bool lone_blank = false;
   for (const Row& row : rows) {
     const std::string_view line = row.text;
+    bool quoted = false;
     for (std::size_t i = 0; i < line.size(); ++i) {
+      quoted = quoted != (line[i] == '"');
+      if (quoted) continue;
       const char before = i == 0 ? ' ' : line[i - 1];
       const char after = i + 1 == line.size() ? ' ' : line[i + 1];
       semicolon = semicolon || line[i] == ';';
       comma = comma || line[i] == ',';
-      comma_in_number = comma_in_number || (line[i] == ',' && !is_space(before) && !is_space(after));
-      const auto inside = [](char c) { return !is_space(c) && c != ',' && c != ';'; };
-      lone_blank = lone_blank || (is_space(line[i]) && inside(before) && inside(after));
+      const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+      comma_in_number = comma_in_number || (line[i] == ',' && is_digit(before) && is_digit(after));
+      lone_blank = lone_blank || (is_space(line[i]) && is_digit(before) && (is_digit(after) || after == '-'));
     }
     if (comma_in_number && (semicolon || lone_blank)) {
       fail(file, row.line, "the commas look like decimal commas; write numbers with a decimal point");
@@ -173,6 +178,7 @@ TextSample sample_text(const InputFile& file, char line_end) {
   require_numbers(file, rows.front());
   sample.separator = separator_of(file, rows);
   std::vector<std::string_view> words;
+  sample.ends_open = true;
   for (const Row& row : rows) {
     split_line(row.text, sample.separator, words);
     if (sample.columns == 0) {
@@ -188,6 +194,7 @@ TextSample sample_text(const InputFile& file, char line_end) {
                        rows.front().line));
     }
     take_row(words, sample);
+    sample.ends_open = sample.ends_open && words.back().empty();
   }
   if (file.bytes > 8 * kOtherBytes) {
     take_others(file, line_end, file.bytes / 2, sample);

@@ -11,8 +11,9 @@ namespace lamina {
 
 struct TextSample {
   char separator = ' ';
-  bool counted = false;                     ///< the first line that is no comment is a lone number
-  std::uint64_t top_lines = 0;              ///< lines up to and with the line of names
+  bool ends_open = false;       ///< the last value of every row is empty: may be none, but a separator behind the last
+  bool counted = false;         ///< the first line that is no comment is a lone number
+  std::uint64_t top_lines = 0;  ///< lines up to and with the line of names
   std::vector<std::string> names;           ///< of a header line, usual_name()s; empty when there is none
   std::size_t columns = 0;                  ///< words on every row
   std::vector<std::vector<double>> values;  ///< rows looked at; NaN where no number stands

@@ -212,13 +212,13 @@ std::string name_of(const PointSourceInfo& source) {
 }  // namespace
 
 void require_samples(const PointSourceInfo& source) {
+  if (source.count == 0) throw Error(ExitCode::empty, fmt::format("{}: the file holds no points", name_of(source)));
   if (!source.has_normals) {
     throw Error(ExitCode::unreadable,
                 fmt::format("{}: no normals (properties nx ny nz); --normals auto finds and orients them, see also "
                             "`lamina normal`",
                             name_of(source)));
   }
-  if (source.count == 0) throw Error(ExitCode::empty, fmt::format("{}: the file holds no points", name_of(source)));
 }
 
 void judge(const Census& c, const PointSourceInfo& source, BadSamples bad, const RunContext& run) {
@@ -235,6 +235,11 @@ void judge(const Census& c, const PointSourceInfo& source, BadSamples bad, const
   if (c.usable == 0 && c.clipped > 0)
     throw Error(ExitCode::empty,
                 fmt::format("{}: none of its {} samples lies in the box to clip to", path, source.count));
+  if (c.rejected[static_cast<int>(Defect::normal)] == source.count)
+    throw Error(ExitCode::empty,
+                fmt::format("{}: none of its {} samples has a normal that is not zero; --normals auto finds and "
+                            "orients them, see also `lamina normal`",
+                            path, source.count));
   if (c.usable == 0)
     throw Error(ExitCode::empty, fmt::format("{}: none of its {} samples is usable", path, source.count));
   if (source.has_quality && !(c.max_quality > 0)) {

@@ -188,6 +188,10 @@ TEST(ReadMesh, BadFilesAreNamed) {
   expect_error(ExitCode::unreadable, [&] { read_mesh(folder.file("none.ply")); }, {"none.ply", "No such file"});
   expect_error(ExitCode::unreadable, [&] { read_mesh(folder.file("")); }, {"is a directory"});
   bad("e.ply", "", {"is empty"});
+  bad("e.obj",
+      "\xEF\xBB\xBF"
+      "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\n",
+      {"byte order mark", "tail -c +4"});
   bad("e.xyz", "1 2 3\n", {"unknown mesh format \".xyz\""});
   bad("e.vdb", " BDV", {"is a volume", "lamina convert"});
   bad("a.ply", "plx\n", {"not a PLY file"});

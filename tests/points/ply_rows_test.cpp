@@ -58,6 +58,30 @@ TEST(PlyRows, AlternativeNamesServeWhenAlone) {
   EXPECT_TRUE(rows.info.attributes.empty());
 }
 
+TEST(PlyRows, OtherProgramsNamesOfTriplesAreUnderstood) {
+  const PlyRows rows = understand_vertices(
+      header_with(
+          "property float X\nproperty float Y\nproperty float Z\nproperty float NormalX\nproperty float normaly\n"
+          "property float normal_z\nproperty uchar diffuse_red\nproperty uchar diffuse_green\n"
+          "property uchar diffuse_blue\nproperty float I\n"),
+      "a", "a");
+  EXPECT_TRUE(rows.info.has_normals);
+  EXPECT_EQ(rows.columns[2].role, Role::z);
+  EXPECT_EQ(rows.columns[4].role, Role::ny);
+  EXPECT_EQ(rows.info.attributes, (AttributeLayout{{"red", ScalarType::uint8},
+                                                   {"green", ScalarType::uint8},
+                                                   {"blue", ScalarType::uint8},
+                                                   {"I", ScalarType::float32}}));
+  // Not where the usual names are there as well, and not one or two of three.
+  const PlyRows both = understand_vertices(
+      header_with(kXyz + "property float nx\nproperty float ny\nproperty float nz\nproperty float normal_x\n"
+                         "property float normal_y\nproperty float normal_z\nproperty uchar r\nproperty uchar g\n"),
+      "a", "a");
+  EXPECT_TRUE(both.info.has_normals);
+  EXPECT_EQ(both.info.attributes[0].name, "normal_x");
+  EXPECT_EQ(both.info.attributes[3].name, "r");
+}
+
 TEST(PlyRows, RefusesWhatMakesNoPoints) {
   EXPECT_THAT(refused_rows(header_with("property float x\nproperty float y\n")),
               HasSubstr("no property 'z'; points need x y z"));

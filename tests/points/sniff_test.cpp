@@ -38,7 +38,10 @@ TEST(Sniff, KnowsFormatsByTheirContentWhateverTheEnding) {
   EXPECT_EQ(detect_format("# Blender\n\nmtllib a.mtl\n", "a"), PointFormat::obj);
   EXPECT_EQ(detect_format("v 1 2 3\r\n", "a"), PointFormat::obj);
   for (const auto text : {"0.1 -2e3 4\n1 2 3\n"sv, "# by hand\n1,2,3,4\n"sv, "2\n1 2 3\n4 5 6\n"sv, "1;2;3"sv,
-                          "//X Y Z R G B\n1 2 3 4 5 6\n"sv, "\"X\",\"Y\",\"Z\"\n"sv, "0\n"sv, "  1\t2 nan\r"sv}) {
+                          "//X Y Z R G B\n1 2 3 4 5 6\n"sv, "\"X\",\"Y\",\"Z\"\n"sv, "0\n"sv, "  1\t2 nan\r"sv,
+                          "\xEF\xBB\xBF"
+                          "1 2 3\n"sv,
+                          "\"1\",\"2\",\"3\"\n"sv}) {
     EXPECT_EQ(detect_format(text, "a.las"), PointFormat::text) << text;
   }
   const std::string ptx =
@@ -60,6 +63,10 @@ TEST(Sniff, NamesWhatItLooksLikeAndTheRemedy) {
   EXPECT_THAT(refused_format(laz), HasSubstr("laszip -i"));
   EXPECT_THAT(refused_format("ASTM-E57\1"), HasSubstr("CloudCompare"));
   EXPECT_THAT(refused_format("version https://git-lfs.github.com/spec/v1"), HasSubstr("git lfs pull"));
+  EXPECT_THAT(refused_format("\xFF\xFE"
+                             "1\0 \0"sv),
+              HasSubstr("iconv -f UTF-16"));
+  EXPECT_THAT(refused_format("\xEF\xBB\xBFply\n"), HasSubstr("byte order mark"));
   EXPECT_THAT(refused_format("OFF\n3 1 0\n"), HasSubstr("OFF mesh"));
   EXPECT_THAT(refused_format("camera 0 0 0 0 0 0 1\nbmesh a.ply 0 0 0 0 0 0 1\n"), HasSubstr("list of scans"));
 }

@@ -31,9 +31,15 @@ class TextPoints : public ::testing::Test {
 };
 
 TEST_F(TextPoints, PositionsAloneInAnyDress) {
-  for (const char* text :
-       {"1 2 3\n4 5 6\n", "1 2 3\r\n4 5 6", "1\t2\t3\r4\t5\t6\r", "1,2,3\n4,5,6\n", "1, 2, 3\n4,5 ,6\n",
-        "1;2;3\n4; 5;6\n", "# x\n\n1 2 3\n// y\n4 5 6\n#", "2\n1 2 3\n4 5 6\n", "+1 2e0 3.\n 4 5 6 \n"}) {
+  for (const char* text : {"1 2 3\n4 5 6\n", "1 2 3\r\n4 5 6", "1\t2\t3\r4\t5\t6\r", "1,2,3\n4,5,6\n",
+                           "1, 2, 3\n4,5 ,6\n", "1;2;3\n4; 5;6\n", "# x\n\n1 2 3\n// y\n4 5 6\n#",
+                           "\xEF\xBB\xBF"
+                           "1 2 3\n4 5 6\n",
+                           "\xEF\xBB\xBF"
+                           "2\n1 2 3\n4 5 6\n",
+                           "1,2,3,\n4,5,6,\n", "x,y,z\n1,2,3,\n4,5,6,\n", "x,y,z,\n1,2,3\n4,5,6\n",
+                           "\"1\",\"2\",\"3\"\n\"4\", \" 5 \" ,6\n", "\"1\" \"2\" \"3\"\n4 5 6", "1D0 2 3\n4 .5D+1 6\n",
+                           "2\n1 2 3\n4 5 6\n", "+1 2e0 3.\n 4 5 6 \n"}) {
     const auto source = open(text);
     EXPECT_EQ(source->info().count, 2) << text;
     EXPECT_TRUE(source->info().random_access);
@@ -61,6 +67,24 @@ TEST_F(TextPoints, AHeaderLineNamesColumns) {
     EXPECT_THAT(rows.attributes[3], ElementsAre(5));
   }
   EXPECT_THAT(refusal("x y z a\n1 2 3\n"), HasSubstr("4 columns are named in its header line, the rows have 3"));
+}
+
+TEST_F(TextPoints, NamesMayBeOfMoreWordsBetweenTabs) {
+  const auto source = open("//X\tY\tZ\tScalar field\tNx\tNy\tNz\n1\t2\t3\t7\t0\t0\t1\n");
+  EXPECT_THAT(test::attribute_names(source->info()), ElementsAre("scalar_field"));
+  EXPECT_THAT(all_rows(*source).nz, ElementsAre(1));
+}
+
+TEST_F(TextPoints, WordsAndEmptyPlacesAreLeftOutAndSaidSo) {
+  const auto source = open("name,x,y,z,class,i,note\nP1,1,2,3,my class,5,\n\"P2, new\",4,5,6,\"a; b\",6,\n");
+  EXPECT_THAT(test::attribute_names(source->info()), ElementsAre("intensity"));
+  const SampleBatch rows = all_rows(*source);
+  EXPECT_THAT(rows.x, ElementsAre(1, 4));
+  EXPECT_THAT(rows.attributes[0], ElementsAre(5, 6));
+  ASSERT_EQ(source->info().remarks.size(), 3);
+  EXPECT_THAT(source->info().remarks[0], HasSubstr("column 'name' is left out"));
+  EXPECT_THAT(source->info().remarks[1], HasSubstr("column 'class' is left out"));
+  EXPECT_THAT(source->info().remarks[2], HasSubstr("column 'note' is left out"));
 }
 
 TEST_F(TextPoints, TheUserKnowsBest) {
@@ -151,6 +175,8 @@ TEST_F(TextPoints, RefusalsNameTheLineAndTheRemedy) {
   EXPECT_THAT(refusal("# a\n\nhello, world\n"), HasSubstr("line 3: 'hello, world' is no row of numbers"));
   EXPECT_THAT(refusal("1 2 3\n4 five 6\n"), HasSubstr("line 2: 'five' is no number ('y' expected)"));
   EXPECT_THAT(refusal("1,2,3\n4,,6\n"), HasSubstr("line 2: '' is no number ('y' expected)"));
+  EXPECT_THAT(refusal("1,2,3\n4,\"5,6\n"), HasSubstr("line 2: 2 values, but 3 on line 1"));
+  EXPECT_THAT(refusal("x,y,z,i\n1,2,3,4\n4,5,6,\n", "x,y,z,i"), HasSubstr("line 3: 4 values expected, only 3"));
   std::string late;
   for (int i = 0; i < 5000; ++i) late += i == 4321 ? "1 2 3 4\n" : "1 2 3\n";
   EXPECT_THAT(refusal(late), HasSubstr("line 4322: 3 values expected, more stand there, from '4' on"));
