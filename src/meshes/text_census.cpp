@@ -58,7 +58,10 @@ void require_face(std::string_view text, const std::string& path, std::uint64_t 
       if (!there && part != 1)
         refuse("a face's corner is VERTEX, VERTEX/TEXTURE/NORMAL or VERTEX//NORMAL, whole numbers");
       if (there) text.remove_prefix(static_cast<std::size_t>(end - text.data()));
-      if (part == 2 && (number < 1 || static_cast<std::uint64_t>(number) > normals))
+      // From the first on, or from the last one back.
+      const std::uint64_t place =
+          number < 0 ? ~static_cast<std::uint64_t>(number) + 1 : static_cast<std::uint64_t>(number);
+      if (part == 2 && (place < 1 || place > normals))
         refuse(fmt::format("the face names normal {} but there are {} before it", number, normals));
       if (text.empty() || text.front() != '/') break;
       if (part < 2) text.remove_prefix(1);

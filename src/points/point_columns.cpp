@@ -31,10 +31,29 @@ constexpr std::array kAliases{std::pair{"r"sv, "red"sv},
                               std::pair{"normalx"sv, "nx"sv},
                               std::pair{"normaly"sv, "ny"sv},
                               std::pair{"normalz"sv, "nz"sv},
+                              std::pair{"normals:0"sv, "nx"sv},
+                              std::pair{"normals:1"sv, "ny"sv},
+                              std::pair{"normals:2"sv, "nz"sv},
+                              std::pair{"n.x"sv, "nx"sv},
+                              std::pair{"n.y"sv, "ny"sv},
+                              std::pair{"n.z"sv, "nz"sv},
                               std::pair{"i"sv, "intensity"sv},
                               std::pair{"scalar_intensity"sv, "intensity"sv},
                               std::pair{"reflectance"sv, "intensity"sv},
                               std::pair{"remission"sv, "intensity"sv}};
+
+/// What positions are called where nothing is called x, y and z: by surveyors, in tables of Houdini and ParaView.
+constexpr std::array kPlaces{std::pair{"easting"sv, "x"sv},   std::pair{"northing"sv, "y"sv},
+                             std::pair{"elevation"sv, "z"sv}, std::pair{"height"sv, "z"sv},
+                             std::pair{"p.x"sv, "x"sv},       std::pair{"p.y"sv, "y"sv},
+                             std::pair{"p.z"sv, "z"sv},       std::pair{"points:0"sv, "x"sv},
+                             std::pair{"points:1"sv, "y"sv},  std::pair{"points:2"sv, "z"sv}};
+
+template <class Names>
+std::string renamed(const Names& names, std::string name) {
+  const auto known = std::find_if(names.begin(), names.end(), [&](const auto& a) { return a.first == name; });
+  return known == names.end() ? name : std::string(known->second);
+}
 
 }  // namespace
 
@@ -46,8 +65,17 @@ std::string usual_name(std::string_view name) {
   for (const char c : name.substr(0, 256)) {
     lower += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c > ' ' && c <= '~' ? c : '_';
   }
-  const auto known = std::find_if(kAliases.begin(), kAliases.end(), [&](const auto& a) { return a.first == lower; });
-  return known == kAliases.end() ? lower : std::string(known->second);
+  return renamed(kAliases, std::move(lower));
+}
+
+std::vector<std::string> names_with_positions(const std::vector<std::string_view>& words) {
+  std::vector<std::string> names(words.size());
+  std::transform(words.begin(), words.end(), names.begin(), usual_name);
+  const auto has = [&](std::string_view name) { return std::find(names.begin(), names.end(), name) != names.end(); };
+  const auto has_all = [&] { return has("x") && has("y") && has("z"); };
+  if (has_all()) return names;
+  for (std::string& name : names) name = renamed(kPlaces, std::move(name));
+  return has_all() ? names : std::vector<std::string>{};
 }
 
 void use_usual_names(std::vector<PointColumn>& columns) {

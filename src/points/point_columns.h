@@ -36,6 +36,10 @@ bool has_column(const std::vector<PointColumn>& columns, std::string_view name);
 /// `diffuse_red` are red, `normal_x` and `NormalX` nx, `i` and `scalar_intensity` intensity, and so on.
 std::string usual_name(std::string_view name);
 
+/// The usual names of a line's words if x, y and z are among them, and otherwise none. Where nothing is called x, y and
+/// z, `easting northing elevation`, `P.x P.y P.z` and `Points:0 Points:1 Points:2` are.
+std::vector<std::string> names_with_positions(const std::vector<std::string_view>& words);
+
 /// The array a column is read into; at most one is set.
 struct ColumnTarget {
   double* wide = nullptr;

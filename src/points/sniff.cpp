@@ -106,14 +106,9 @@ std::size_t numbers_in_front(const std::vector<std::string_view>& words) {
   return static_cast<std::size_t>(std::find_if_not(words.begin(), words.end(), is_number) - words.begin());
 }
 
-bool names_positions(const std::vector<std::string_view>& words) {
-  const auto names = [&](std::string_view wanted) {
-    return std::any_of(words.begin(), words.end(), [&](std::string_view w) {
-      while (w.starts_with('#') || w.starts_with('/')) w.remove_prefix(1);
-      return usual_name(w) == wanted;
-    });
-  };
-  return names("x") && names("y") && names("z");
+bool names_positions(std::vector<std::string_view> words) {
+  for (std::string_view& word : words) word.remove_prefix(std::min(word.find_first_not_of("#/"), word.size()));
+  return !names_with_positions(words).empty();
 }
 
 /// Two counts, the scanner's place and axes, and a matrix.

@@ -162,8 +162,8 @@ TextLayout understand_text(const InputFile& file, char line_end, const std::stri
     column.name = guessed ? guesses[c] : !wanted.empty() ? wanted[c].name : sample.names[c];
     const bool axis = column.name == "x" || column.name == "y" || column.name == "z";
     const bool words = wanted.empty() && sample.is_word[c] && !axis;
-    if (words || column.name == kSkip) column.role = Role::skipped;
-    if (words && !guessed)
+    if (words || column.name == kSkip || column.name.empty()) column.role = Role::skipped;
+    if (words && !guessed && !column.name.empty())
       info.remarks.push_back(fmt::format("{}: column {} is left out: it holds words, or nothing in places", file.name,
                                          quoted_word(column.name)));
     layout.columns.push_back(std::move(column));

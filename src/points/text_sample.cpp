@@ -41,11 +41,7 @@ std::vector<std::string> names_on(std::string_view line) {
   for (const char separator : {';', ',', '\t', kBlanks}) {
     split_line(without_mark(line), separator, words);
     while (!words.empty() && words.back().empty()) words.pop_back();
-    std::vector<std::string> names;
-    names.reserve(words.size());
-    for (const std::string_view word : words) names.push_back(usual_name(word));
-    const auto has = [&](const char* name) { return std::find(names.begin(), names.end(), name) != names.end(); };
-    if (has("x") && has("y") && has("z")) return names;
+    if (std::vector<std::string> names = names_with_positions(words); !names.empty()) return names;
   }
   return {};
 }

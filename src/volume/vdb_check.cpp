@@ -125,7 +125,10 @@ bool check_metadata(Walker& w) {
     if (known != sizes.end() && known->second != bytes)
       wrong(fmt::format("metadata {} of type {} has {} bytes", name, type, bytes));
     if (bytes > w.left()) wrong(fmt::format("metadata {} of {} bytes does not fit into it", name, bytes));
-    if (name == "is_saved_as_half_float" && type == "bool")
+    constexpr std::string_view kHalf = "is_saved_as_half_float";
+    // Of any other type it would hold whenever there is something in it.
+    if (name == kHalf && type != "bool") wrong(fmt::format("metadata {} is of type {}", name, type));
+    if (name == kHalf)
       half = w.number<std::uint8_t>() != 0;
     else if (type == "__delayedload")
       check_leaf_table(w, bytes);

@@ -114,6 +114,12 @@ TEST(ReadMesh, ObjKeepsDoublesColoursNormalsAndRelativeIndices) {
   EXPECT_EQ(m.layout[0], (AttributeSpec{"red", ScalarType::uint8}));
   EXPECT_EQ(m.attributes[0][0], 255);
   EXPECT_EQ(m.normals[3][2], 1);
+  const TriangleMesh two =
+      read_mesh(folder.write("b.obj",
+                             "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 1 0 0\nvn 0 1 0\nvn 0 0 1\nf -3//-3 -2//-2 -1//-1\n"
+                             "v 0 0 5\nv 1 0 5\nv 0 1 5\nvn -1 0 0\nvn 0 -1 0\nvn 0 0 -1\nf -3//-3 -2//-2 -1//-1\n"));
+  EXPECT_EQ(two.normals[2][2], 1);
+  EXPECT_EQ(two.normals[3][0], -1);
 }
 
 TEST(ReadMesh, OffWithCommentsColoursAndNormals) {

@@ -75,6 +75,21 @@ TEST_F(TextPoints, NamesMayBeOfMoreWordsBetweenTabs) {
   EXPECT_THAT(all_rows(*source).nz, ElementsAre(1));
 }
 
+TEST_F(TextPoints, PositionsMayHaveNamesOfOtherTrades) {
+  for (const char* names : {"id,Easting,Northing,Elevation,Nx,Ny,Nz", "ptnum,P.x,P.y,P.z,N.x,N.y,N.z",
+                            ",\"Points:0\",\"Points:1\",\"Points:2\",\"Normals:0\",\"Normals:1\",\"Normals:2\""}) {
+    const auto source = open(fmt::format("{}\n7,1,2,3,0,0,1\n", names));
+    const SampleBatch rows = all_rows(*source);
+    EXPECT_THAT(rows.z, ElementsAre(3)) << names;
+    EXPECT_THAT(rows.nz, ElementsAre(1)) << names;
+    // The column without a name, as tables of data frames begin with, is left out without a word.
+    EXPECT_EQ(source->info().attributes.size(), names[0] == ',' ? 0 : 1);
+    EXPECT_THAT(source->info().remarks, IsEmpty());
+  }
+  // Beside x, y and z they are attributes.
+  EXPECT_THAT(test::attribute_names(open("x y z elevation\n1 2 3 4\n")->info()), ElementsAre("elevation"));
+}
+
 TEST_F(TextPoints, WordsAndEmptyPlacesAreLeftOutAndSaidSo) {
   const auto source = open("name,x,y,z,class,i,note\nP1,1,2,3,my class,5,\n\"P2, new\",4,5,6,\"a; b\",6,\n");
   EXPECT_THAT(test::attribute_names(source->info()), ElementsAre("intensity"));

@@ -108,5 +108,14 @@ TEST_F(DamagedVdb, IsNotBelievedAboutItsLengths) {
   EXPECT_NE(read(bytes), "");
 }
 
+TEST_F(DamagedVdb, IsNotBelievedAboutItsPrecision) {
+  // OpenVDB asks such an entry of any type whether it holds.
+  std::string bytes = every_kind(false);
+  const std::size_t name = bytes.find("is_saved_as_half_float");
+  ASSERT_NE(name, std::string::npos);
+  bytes.replace(bytes.find("bool", name), 4, "int3");
+  EXPECT_THAT(read(bytes), HasSubstr("is_saved_as_half_float is of type int3"));
+}
+
 }  // namespace
 }  // namespace lamina::volume
