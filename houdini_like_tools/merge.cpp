@@ -13,6 +13,7 @@
 #include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "lamina/volume_merge.h"
+#include "mesh_name.h"
 #include "text.h"
 #include "tool.h"
 
@@ -72,6 +73,7 @@ void merge_grids(const MergeOptions& o, const std::vector<PointInput>& inputs, c
 }
 
 void merge_chunks(const MergeOptions& o, const RunContext& context) {
+  require_ply_name(o.output);
   const MergedParts merged = merge_parts(o.inputs, o.output, context);
   context.info(fmt::format("{} vertices, {} triangles of {} parts", count_text(merged.vertices),
                            count_text(merged.triangles), merged.parts));

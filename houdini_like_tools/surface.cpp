@@ -12,6 +12,7 @@
 #include "console.h"
 #include "inputs.h"
 #include "lamina/error.h"
+#include "mesh_name.h"
 #include "model.h"
 #include "normal_options.h"
 #include "result_file.h"
@@ -59,6 +60,7 @@ void run_surface(const SurfaceOptions& o) {
   for (auto name = o.inputs.begin() + 1; name != o.inputs.end(); ++name)
     settings.more_inputs.push_back(pipe_name(*name));
   settings.output = pipe_name(settings.output);
+  if (!o.parts.chunked) require_ply_name(settings.output);
   if (o.stats == "-" && settings.output == "-") {
     throw Error(ExitCode::usage, "--stats and --output both name standard output; give one of them a file");
   }
@@ -131,8 +133,9 @@ void add_surface(CLI::App& app) {
           "folders, patterns or scan lists (.conf) are one cloud; FILE@POSE.txt moves a file by the 4x4 matrix "
           "in POSE.txt; - or stdin.ply for standard input")
       ->required();
-  auto* output =
-      tool->add_option("-o,--output", s.output, "mesh to write: binary PLY; - or stdout.ply for standard output");
+  auto* output = tool->add_option(
+      "-o,--output", s.output,
+      "mesh to write: binary PLY, named .ply; - or stdout.ply for standard output (| lamina convert - -o mesh.obj)");
 
   const std::string samples = "Samples";
   tool->add_option("--columns", s.columns,

@@ -48,6 +48,7 @@ TEST_F(PartsTool, TasksAsJsonSayWhatComesAfterWhat) {
 TEST_F(PartsTool, AMissingPartIsNamed) {
   const std::string part = folder_ / "two.lmesh";
   ASSERT_EQ(run_lamina({"surface", store_, "--chunk", "2/2", "-o", part}).code, 0);
+  EXPECT_EQ(run_lamina({"merge", part, "-o", folder_ / "mesh.stl"}).code, 2);
   const Outcome outcome = run_lamina({"merge", part, "-o", mesh_});
   EXPECT_EQ(outcome.code, 3);
   EXPECT_THAT(outcome.err, HasSubstr("chunk 1 of 2 is missing"));

@@ -253,6 +253,9 @@ TEST_F(SurfaceTool, BadInputExitsAsDocumented) {
   expect_failure(run_lamina({"surface", cloud_, "-o", folder_ / "no/mesh.ply"}), 4, {"no/mesh.ply", "does not exist"});
   expect_failure(run_lamina({"surface", cloud_, "-o", tmp_}), 4, {tmp_, "directory"});
   expect_failure(run_lamina({"surface", cloud_, "-o", cloud_}), 2, {cloud_, "input and output"});
+  expect_failure(run_lamina({"surface", cloud_, "-o", folder_ / "mesh.OBJ"}), 2, {"mesh.OBJ", "| lamina convert - -o"});
+  expect_failure(run_lamina({"surface", cloud_, "-o", folder_ / "mesh.ply.gz"}), 2, {"mesh.ply.gz", "| gzip"});
+  expect_failure(run_lamina({"surface", cloud_, "-o", folder_ / "mesh.vdb"}), 2, {"mesh.vdb", "--vdb"});
   expect_failure(run({"--max-memory", "1M", "--quiet"}), 4, {cloud_, "--max-memory allows 1 MB"});
   expect_failure(run_shell("lamina surface " + quoted(cloud_) + " -q -o - >/dev/full"), 4,
                  {"standard output", "No space left"});
