@@ -12,6 +12,7 @@
 #include "lamina/error.h"
 #include "lamina/volume_edit.h"
 #include "numbers.h"
+#include "output_name.h"
 #include "text.h"
 #include "tool.h"
 
@@ -54,6 +55,7 @@ void clip_triangles(const ClipOptions& o, const RunContext& context) {
 }
 
 void clip_grids(const ClipOptions& o, const RunContext& context) {
+  require_volume_name(o.output);
   const VolumeEditStats stats = clip_volume(o.input, o.region, o.keep, o.output, context);
   context.info(volume_text("kept", stats));
 }

@@ -13,7 +13,7 @@
 #include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "lamina/volume_merge.h"
-#include "mesh_name.h"
+#include "output_name.h"
 #include "text.h"
 #include "tool.h"
 
@@ -66,6 +66,7 @@ void merge_grids(const MergeOptions& o, const std::vector<PointInput>& inputs, c
     if (input.posed) throw Error(ExitCode::usage, input.path + ": is a volume; only points are moved by a pose");
     names.push_back(input.path);
   }
+  require_volume_name(o.output);
   const VolumeMergeStats stats = merge_volumes(names, o.output, context);
   const std::string points = stats.points > 0 ? ", " + count_text(stats.points) + " points" : std::string();
   context.info(
@@ -73,7 +74,7 @@ void merge_grids(const MergeOptions& o, const std::vector<PointInput>& inputs, c
 }
 
 void merge_chunks(const MergeOptions& o, const RunContext& context) {
-  require_ply_name(o.output);
+  require_mesh_name(o.output);
   const MergedParts merged = merge_parts(o.inputs, o.output, context);
   context.info(fmt::format("{} vertices, {} triangles of {} parts", count_text(merged.vertices),
                            count_text(merged.triangles), merged.parts));

@@ -11,6 +11,7 @@
 #include "inputs.h"
 #include "model.h"
 #include "numbers.h"
+#include "output_name.h"
 #include "tool.h"
 
 namespace lamina::tools {
@@ -135,6 +136,7 @@ void check_together(const RenderOptions& o) {
     throw CLI::ValidationError("--paint", "and --colour exclude each other");
   if (o.settings.frames > 1 && o.output == "-")
     throw CLI::ValidationError("--frames", "several pictures do not go to standard output; name a file");
+  require_picture_name(o.output);
 }
 
 }  // namespace

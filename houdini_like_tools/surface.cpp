@@ -12,9 +12,9 @@
 #include "console.h"
 #include "inputs.h"
 #include "lamina/error.h"
-#include "mesh_name.h"
 #include "model.h"
 #include "normal_options.h"
+#include "output_name.h"
 #include "result_file.h"
 #include "surface_fit.h"
 #include "surface_holes.h"
@@ -60,7 +60,7 @@ void run_surface(const SurfaceOptions& o) {
   for (auto name = o.inputs.begin() + 1; name != o.inputs.end(); ++name)
     settings.more_inputs.push_back(pipe_name(*name));
   settings.output = pipe_name(settings.output);
-  if (!o.parts.chunked) require_ply_name(settings.output);
+  if (!o.parts.chunked) require_mesh_name(settings.output);
   if (o.stats == "-" && settings.output == "-") {
     throw Error(ExitCode::usage, "--stats and --output both name standard output; give one of them a file");
   }
@@ -70,6 +70,7 @@ void run_surface(const SurfaceOptions& o) {
     throw Error(ExitCode::usage, "--preview draws a mesh, --chunk makes only a part of one");
   if (!o.preview.empty() && o.preview == settings.output)
     throw Error(ExitCode::usage, "--preview and --output name the same file");
+  require_picture_name(o.preview);
   if (!o.preview.empty() && !settings.dry_run && launch().rank == 0)
     ResultFile(o.preview);  // refuses what cannot be written, before the work
   RunContext context = make_context(o.run);

@@ -11,6 +11,7 @@
 #include "lamina/error.h"
 #include "lamina/volume_edit.h"
 #include "numbers.h"
+#include "output_name.h"
 #include "text.h"
 #include "tool.h"
 
@@ -68,6 +69,7 @@ void transform_triangles(const TransformOptions& o, const Eigen::Affine3d& trans
 }
 
 void transform_grids(const TransformOptions& o, const Eigen::Affine3d& transform, const RunContext& context) {
+  require_volume_name(o.output);
   context.info(volume_text("moved", transform_volume(o.input, transform, o.output, context)));
 }
 

@@ -9,6 +9,7 @@
 #include "console.h"
 #include "inputs.h"
 #include "lamina/error.h"
+#include "output_name.h"
 #include "text.h"
 #include "tool.h"
 
@@ -22,6 +23,7 @@ struct VolumeOptions {
 };
 
 void run_volume(const VolumeOptions& o) {
+  require_volume_name(o.output);
   const RunContext context = make_context(o.run);
   const TriangleMesh mesh = read_mesh_input(o.mesh, context);
   VolumeStats stats;

@@ -97,6 +97,7 @@ TEST_F(RenderTool, WritesTheFramesOfATurn) {
     EXPECT_EQ(test::read_text(folder_ / name).substr(1, 3), "PNG");
   EXPECT_FALSE(std::filesystem::exists(picture_));
   EXPECT_EQ(run_lamina({"render", mesh_, "-o", "-", "--frames", "3"}).code, 2);
+  EXPECT_EQ(run_lamina({"render", mesh_, "-o", mesh_}).code, 2) << "a picture called mesh";
 }
 
 TEST_F(RenderTool, PaintsDistancesAndAttributes) {

@@ -38,6 +38,7 @@ TEST_F(VolumeTool, AnswersMistakesWithTheirCodes) {
   EXPECT_EQ(run_lamina({"volume", mesh_, "-o", volume_, "--voxel", "-1"}).code, 2);
   EXPECT_EQ(run_lamina({"volume", mesh_, "-o", volume_, "--sign", "maybe"}).code, 2);
   EXPECT_EQ(run_lamina({"volume", mesh_}).code, 2);
+  EXPECT_EQ(run_lamina({"volume", mesh_, "-o", mesh_}).code, 2) << "a volume called mesh";
   EXPECT_EQ(run_lamina({"volume", folder_ / "none.obj", "-o", volume_}).code, 3);
   EXPECT_EQ(run_lamina({"volume", mesh_, "-o", folder_ / "no/such.vdb"}).code, 4);
   EXPECT_FALSE(std::filesystem::exists(volume_));
