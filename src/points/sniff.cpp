@@ -21,6 +21,9 @@ struct Signature {
   std::string_view what;
 };
 
+constexpr std::string_view kOff =
+    "looks like an OFF mesh; its vertices as points: lamina convert FILE --vertices -o points.ply";
+
 constexpr std::array kSignatures{
     Signature{"ASTM-E57",
               "is an E57 file, which is not read; convert it: CloudCompare -O FILE -C_EXPORT_FMT PLY -SAVE_CLOUDS, or "
@@ -31,10 +34,10 @@ constexpr std::array kSignatures{
     Signature{"\xFE\xFF", "is text in UTF-16; save it as UTF-8: iconv -f UTF-16 -t UTF-8 FILE > OTHER"},
     Signature{"\xEF\xBB\xBFply",
               "begins with a byte order mark before 'ply'; save it without: tail -c +4 FILE > OTHER"},
-    Signature{"OFF", "looks like an OFF mesh; give a point cloud, for example as PLY"},
-    Signature{"COFF", "looks like an OFF mesh; give a point cloud, for example as PLY"},
-    Signature{"NOFF", "looks like an OFF mesh; give a point cloud, for example as PLY"},
-    Signature{"solid ", "looks like an STL mesh; give a point cloud, for example as PLY"},
+    Signature{"OFF", kOff},
+    Signature{"COFF", kOff},
+    Signature{"NOFF", kOff},
+    Signature{"solid ", "looks like an STL mesh; samples of it: lamina scatter FILE -o points.ply"},
     Signature{"version https://git-lfs", "is a Git LFS pointer, not the file itself; fetch it with: git lfs pull"},
     Signature{"<!DOCTYPE", "is a web page (a download that went wrong?)"},
     Signature{"<html", "is a web page (a download that went wrong?)"},

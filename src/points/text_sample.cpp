@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <initializer_list>
 #include <limits>
 #include <string_view>
 
@@ -122,6 +123,14 @@ void require_numbers(const InputFile& file, const Row& row) {
   split_line(line, kBlanks, words);
   double ignored = 0;
   if (std::count_if(words.begin(), words.end(), [&](std::string_view w) { return is_number(w, ignored); }) >= 3) return;
+  const auto has = [&](std::initializer_list<std::string_view> names) {
+    return std::any_of(words.begin(), words.end(), [&](std::string_view word) {
+      return std::find(names.begin(), names.end(), usual_name(word)) != names.end();
+    });
+  };
+  if (has({"lat", "latitude"}) && has({"lon", "long", "longitude"}))
+    fail(file, row.line,
+         "longitude and latitude are degrees; project them to metres first, for example with PDAL or QGIS");
   fail(file, row.line, fmt::format("{} is no row of numbers; points need x y z", quoted_word(row.text)));
 }
 

@@ -89,17 +89,19 @@ void read_positions(const Leaf& leaf, const AttributeArray& array, const math::T
   read_as<Vec3s>(array, count, put) || read_as<Vec3d>(array, count, put);
 }
 
-/// Offsets that point outside of their arrays would read what is not there.
-void check_leaf(const Leaf& leaf, const std::string& path) {
+/// Offsets that point outside of their arrays would read what is not there. An array of one value for all takes no room
+/// in the file, whatever number of points it promises: `most` bounds that.
+void check_leaf(const Leaf& leaf, std::uint64_t most, const std::string& path) {
   Index from = 0;
   for (Index v = 0; v < Leaf::SIZE; ++v) {
     const Index to = leaf.getValue(v);
     if (to < from) throw Error(ExitCode::unreadable, path + ": the points grid's offsets are not in order");
     from = to;
   }
+  if (from > most) throw Error(ExitCode::unreadable, path + ": the points grid promises more points than it can hold");
   for (std::size_t a = 0; a < leaf.attributeSet().size(); ++a) {
-    if (leaf.constAttributeArray(a).size() < from && leaf.constAttributeArray(a).stride() == 1 &&
-        !leaf.constAttributeArray(a).isUniform())
+    const AttributeArray& array = leaf.constAttributeArray(a);
+    if ((array.size() < from && array.stride() == 1) || (array.dataSize() < from && !array.isUniform()))
       throw Error(ExitCode::unreadable, path + ": the points grid's arrays are shorter than its offsets say");
   }
 }
@@ -167,9 +169,10 @@ PointVolume read_point_volume(const std::string& path, const std::string& name) 
   PointVolume out;
   const auto first = grid->tree().cbeginLeaf();
   if (!first) refuse("holds no points");
+  constexpr std::uint64_t kMostPerByte = 64;
   const std::vector<Target> targets = plan(*grid, *first, out);
   for (auto leaf = grid->tree().cbeginLeaf(); leaf; ++leaf) {
-    check_leaf(*leaf, path);
+    check_leaf(*leaf, kMostPerByte * file.bytes - out.points.samples.size(), path);
     const std::size_t at = leaf->attributeSet().find("P");
     if (at == points::AttributeSet::INVALID_POS) refuse("has no positions (P)");
     const AttributeArray& positions = leaf->constAttributeArray(at);

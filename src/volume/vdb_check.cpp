@@ -1,142 +1,20 @@
 #include "volume/vdb_check.h"
 
-#include <blosc.h>
 #include <fmt/format.h>
 
 #include <array>
 #include <bit>
 #include <cstdint>
 #include <map>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "volume/vdb_points_check.h"
+#include "volume/vdb_walker.h"
+
 namespace lamina::volume {
 namespace {
-
-[[noreturn]] void wrong(const std::string& what) {
-  throw std::runtime_error(what);
-}
-
-/// Reads forward, never past the end.
-class Walker {
- public:
-  explicit Walker(std::istream& file) : file_(file) {
-    file_.seekg(0, std::ios::end);
-    left_ = static_cast<std::uint64_t>(file_.tellg());
-    size_ = left_;
-    file_.seekg(0);
-  }
-  void skip(std::uint64_t bytes) {
-    take(bytes);
-    // Seeking throws the stream's buffer away.
-    std::array<char, 4096> unused;
-    if (bytes <= unused.size())
-      file_.read(unused.data(), static_cast<std::streamsize>(bytes));
-    else
-      file_.seekg(static_cast<std::streamoff>(bytes), std::ios::cur);
-  }
-  void read(void* to, std::uint64_t bytes) {
-    take(bytes);
-    file_.read(static_cast<char*>(to), static_cast<std::streamsize>(bytes));
-  }
-  template <class T>
-  T number() {
-    T value{};
-    read(&value, sizeof value);
-    return value;
-  }
-  std::string text() {
-    const auto length = number<std::uint32_t>();
-    constexpr std::uint32_t kLongest = 1 << 24;
-    if (length > kLongest || length > left_) wrong(fmt::format("a text of {} bytes does not fit into it", length));
-    std::string out(length, '\0');
-    read(out.data(), length);
-    return out;
-  }
-  void go_to(std::int64_t place) {
-    const std::uint64_t here = size_ - left_;
-    if (place < 0 || static_cast<std::uint64_t>(place) < here || static_cast<std::uint64_t>(place) > size_)
-      wrong("a grid ends outside of it");
-    left_ = size_ - static_cast<std::uint64_t>(place);
-    file_.seekg(place);
-  }
-  [[nodiscard]] std::uint64_t left() const { return left_; }
-
- private:
-  void take(std::uint64_t bytes) {
-    if (bytes > left_) throw std::ios::failure("the end");
-    left_ -= bytes;
-  }
-  std::istream& file_;
-  std::uint64_t left_ = 0, size_ = 0;
-};
-
-/// A compressed piece of so many bytes; returns the size of what is in it.
-std::uint64_t check_blosc(Walker& w, std::uint64_t bytes) {
-  if (bytes > w.left()) throw std::ios::failure("the end");
-  if (bytes < BLOSC_MIN_HEADER_LENGTH) wrong("a compressed piece is too short");
-  std::vector<char> chunk(bytes);
-  w.read(chunk.data(), bytes);
-  std::size_t unpacked = 0;
-  if (blosc_cbuffer_validate(chunk.data(), bytes, &unpacked) != 0) wrong("a compressed piece is damaged");
-  return unpacked;
-}
-
-/// One of the table's two arrays, compressed where its size is not 0.
-void check_leaf_array(Walker& w, std::uint32_t packed, std::uint64_t bytes) {
-  if (packed == 0) return w.skip(bytes);
-  constexpr std::uint64_t kPadded = 128;  // shorter ones are filled up before they are compressed
-  const std::uint64_t unpacked = check_blosc(w, packed);
-  if (unpacked != bytes && (bytes > kPadded || unpacked != kPadded)) wrong("a table of leaves is damaged");
-}
-
-/// What each leaf is like, for readers that load it later: one byte of each, and where told eight more. OpenVDB goes by
-/// what is inside, not by the length before it, and asks for memory by the number of leaves, each of which takes a byte
-/// of the file at least.
-void check_leaf_table(Walker& w, std::uint64_t bytes) {
-  if (bytes == 0) return;
-  constexpr std::uint32_t kNone = 0xffffffff;
-  const std::uint64_t before = w.left();
-  const auto leaves = w.number<std::uint32_t>();
-  if (leaves > w.left()) wrong("a table of leaves does not fit into it");
-  check_leaf_array(w, w.number<std::uint32_t>(), leaves);
-  const auto packed = w.number<std::uint32_t>();
-  if (packed != kNone) check_leaf_array(w, packed, 8 * std::uint64_t{leaves});
-  const std::uint64_t walked = before - w.left();
-  if (walked > bytes) wrong("a table of leaves is longer than it says");
-  w.skip(bytes - walked);
-}
-
-/// OpenVDB reads metadata by its type, whatever length stands before it. Returns whether it says that values are saved
-/// with 16 bits.
-bool check_metadata(Walker& w) {
-  static const std::map<std::string, std::uint32_t, std::less<>> sizes{
-      {"bool", 1},   {"double", 8}, {"float", 4},  {"int32", 4},  {"int64", 8},  {"vec2d", 16},
-      {"vec2i", 8},  {"vec2s", 8},  {"vec3d", 24}, {"vec3i", 12}, {"vec3s", 12}, {"vec4d", 32},
-      {"vec4i", 16}, {"vec4s", 16}, {"mat4s", 64}, {"mat4d", 128}};
-  bool half = false;
-  const auto count = w.number<std::uint32_t>();
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const std::string name = w.text(), type = w.text();
-    const auto bytes = w.number<std::uint32_t>();
-    const auto known = sizes.find(type);
-    if (known != sizes.end() && known->second != bytes)
-      wrong(fmt::format("metadata {} of type {} has {} bytes", name, type, bytes));
-    if (bytes > w.left()) wrong(fmt::format("metadata {} of {} bytes does not fit into it", name, bytes));
-    constexpr std::string_view kHalf = "is_saved_as_half_float";
-    // Of any other type it would hold whenever there is something in it.
-    if (name == kHalf && type != "bool") wrong(fmt::format("metadata {} is of type {}", name, type));
-    if (name == kHalf)
-      half = w.number<std::uint8_t>() != 0;
-    else if (type == "__delayedload")
-      check_leaf_table(w, bytes);
-    else
-      w.skip(bytes);
-  }
-  return half;
-}
 
 void check_transform(Walker& w, int depth = 0) {
   constexpr std::uint64_t kVector = 3 * sizeof(double), kMatrix = 16 * sizeof(double);
@@ -159,7 +37,7 @@ void check_transform(Walker& w, int depth = 0) {
 
 /// What a tree's values are.
 struct ValueKind {
-  enum class Leaves { values, bits, masks, unknown };
+  enum class Leaves { values, bits, masks, points };
   std::uint32_t bytes = 0, half = 0;  ///< `half`: of a value saved with 16 bits, 0 where that is not possible
   Leaves leaves = Leaves::values;
 };
@@ -176,7 +54,7 @@ const ValueKind* kind_of(std::string_view tree) {
       {"Tree_int64_5_4_3", {8, 0}},
       {"Tree_bool_5_4_3", {1, 0, Leaves::bits}},
       {"Tree_mask_5_4_3", {1, 0, Leaves::masks}},
-      {"Tree_ptdataidx32_5_4_3", {4, 0, Leaves::unknown}},
+      {"Tree_ptdataidx32_5_4_3", {4, 0, Leaves::points}},
   };
   const auto found = kinds.find(tree);
   return found == kinds.end() ? nullptr : &found->second;
@@ -190,19 +68,22 @@ class TreeWalk {
       : w_(walker), kind_(kind), compression_(compression), stored_(as_half && kind.half > 0 ? kind.half : kind.bytes) {
     half_ = as_half && kind.half > 0;
   }
-  void run() {
-    const bool buffers = kind_.leaves != ValueKind::Leaves::unknown;
+  /// Returns the number of leaves, whose buffers it has passed if it knows them.
+  std::uint64_t run() {
+    const bool buffers = kind_.leaves != ValueKind::Leaves::points;
     w_.skip(sizeof(std::int32_t) + kind_.bytes);  // buffers, background
     const auto tiles = w_.number<std::uint32_t>(), children = w_.number<std::uint32_t>();
     for (std::uint32_t i = 0; i < tiles; ++i) {
       w_.skip(3 * sizeof(std::int32_t) + kind_.bytes);
       if (w_.number<std::uint8_t>() > 1) wrong("a tile is neither active nor inactive");
     }
+    std::uint64_t all = 0;
     std::vector<std::vector<std::uint64_t>> leaves;  // masks, eight words each, by upper node
     for (std::uint32_t i = 0; i < children; ++i) {
       w_.skip(3 * sizeof(std::int32_t));
       for (std::uint64_t lower = node<32>(); lower > 0; --lower) {
         const std::uint64_t count = node<16>();
+        all += count;
         if (!buffers) {
           w_.skip(count * kMaskBytes);
           continue;
@@ -215,6 +96,7 @@ class TreeWalk {
     }
     for (const auto& masks : leaves)
       for (std::size_t at = 0; at < masks.size(); at += 8) leaf(&masks[at]);
+    return all;
   }
 
  private:
@@ -290,7 +172,9 @@ class TreeWalk {
 
 void check_vdb(std::istream& file) {
   Walker w(file);
-  w.skip(8 + 3 * sizeof(std::uint32_t));  // magic number, versions
+  w.skip(8);  // magic number
+  const auto version = w.number<std::uint32_t>();
+  w.skip(2 * sizeof(std::uint32_t));
   const bool offsets = w.number<char>() != 0;
   w.skip(36);  // tag
   check_metadata(w);
@@ -311,8 +195,11 @@ void check_vdb(std::istream& file) {
     if (half_type != half) wrong("it contradicts itself about the precision of a grid");
     if (type == "Tree_string_5_4_3") wrong("it holds a grid of texts");
     const ValueKind* const kind = kind_of(type);
-    if (kind != nullptr) TreeWalk(w, *kind, compression, half).run();
-    if (kind != nullptr && kind->leaves != ValueKind::Leaves::unknown) continue;
+    if (kind != nullptr) {
+      const std::uint64_t leaves = TreeWalk(w, *kind, compression, half).run();
+      if (kind->leaves == ValueKind::Leaves::points) check_points(w, leaves, version);
+      continue;
+    }
     if (!offsets) break;
     w.go_to(places[2]);
   }

@@ -4,10 +4,18 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "harness.h"
+#include "lamina/volume_points.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace lamina;
   const InputFile file = fuzz::as_file(data, size);
-  return fuzz::run([&] { volume::read_vdb(fmt::format("/proc/self/fd/{}", file.file.get())); });
+  const std::string path = fmt::format("/proc/self/fd/{}", file.file.get());
+  return fuzz::run([&] {
+    const auto grids = volume::read_vdb(path).grids;
+    const auto is_points = [](const auto& grid) { return volume::kind_of(*grid) == "points"; };
+    if (std::any_of(grids.begin(), grids.end(), is_points)) read_point_volume(path);
+  });
 }

@@ -188,6 +188,8 @@ TEST_F(TextPoints, RefusalsNameTheLineAndTheRemedy) {
   EXPECT_THAT(refusal("1,5 2,5 3,5\n"), HasSubstr("decimal commas"));
   EXPECT_THAT(refusal("1 2 3\n4 5\n"), HasSubstr("line 2: 2 values, but 3 on line 1"));
   EXPECT_THAT(refusal("# a\n\nhello, world\n"), HasSubstr("line 3: 'hello, world' is no row of numbers"));
+  EXPECT_THAT(refusal("Longitude,Latitude,Height\n-80.1,43.2,300\n"),
+              HasSubstr("line 1: longitude and latitude are deg"));
   EXPECT_THAT(refusal("1 2 3\n4 five 6\n"), HasSubstr("line 2: 'five' is no number ('y' expected)"));
   EXPECT_THAT(refusal("1,2,3\n4,,6\n"), HasSubstr("line 2: '' is no number ('y' expected)"));
   EXPECT_THAT(refusal("1,2,3\n4,\"5,6\n"), HasSubstr("line 2: 2 values, but 3 on line 1"));

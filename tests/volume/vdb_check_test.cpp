@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <openvdb/points/PointAttribute.h>
+#include <openvdb/points/PointConversion.h>
+#include <openvdb/points/PointGroup.h>
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include <fstream>
@@ -9,6 +12,7 @@
 #include <sstream>
 
 #include "lamina/error.h"
+#include "lamina/volume_points.h"
 #include "support/program.h"
 #include "volume/vdb_bytes.h"
 #include "volume/vdb_file.h"
@@ -46,6 +50,33 @@ std::string every_kind(bool half) {
   return vdb_bytes({grids.begin(), grids.end()});
 }
 
+/// Points as other programs write them: packed positions, a group, texts, arrays of one value and of three.
+std::string packed_points(int count) {
+  using namespace openvdb;
+  initialize();
+  std::vector<Vec3f> places;
+  for (int i = 0; i < count; ++i) places.emplace_back(0.01F * float(i), 0.3F * float(i % 7), float(i % 40));
+  const points::PointAttributeVector<Vec3f> wrapped(places);
+  const auto transform = math::Transform::createLinearTransform(0.5);
+  auto grid = points::createPointDataGrid<points::FixedPointCodec<false>, points::PointDataGrid>(places, *transform);
+  grid->setName("points");
+  auto& tree = grid->tree();
+  points::appendAttribute<float, points::TruncateCodec>(tree, "heat", 0.5F);
+  points::appendAttribute<Vec3f, points::UnitVecCodec>(tree, "N", Vec3f(0, 0, 1));
+  points::appendAttribute<float>(tree, "three", 1.0F, 3);
+  points::appendAttribute<Name, points::StringCodec<false>>(tree, "who");
+  points::appendGroup(tree, "some");
+  for (auto leaf = tree.beginLeaf(); leaf; ++leaf) {
+    points::AttributeWriteHandle<float> heat(leaf->attributeArray("heat"));
+    points::AttributeWriteHandle<float> three(leaf->attributeArray("three"));
+    for (Index i = 0; i < leaf->getLastValue(); ++i) {
+      heat.set(i, float(i));
+      three.set(i, i % 3, float(i));
+    }
+  }
+  return vdb_bytes({grid});
+}
+
 void check(const std::string& bytes) {
   std::istringstream stream(bytes);
   stream.exceptions(std::ios::failbit | std::ios::badbit | std::ios::eofbit);
@@ -54,6 +85,7 @@ void check(const std::string& bytes) {
 
 TEST(VdbCheck, TakesEveryKindOfGrid) {
   for (const bool half : {false, true}) EXPECT_NO_THROW(check(every_kind(half)));
+  for (const int count : {1, 30, 20'000, 400'000}) EXPECT_NO_THROW(check(packed_points(count))) << count;
 }
 
 TEST(VdbCheck, SeesWhereAFileEndsTooEarly) {
@@ -61,6 +93,9 @@ TEST(VdbCheck, SeesWhereAFileEndsTooEarly) {
   for (std::size_t size = 0; size < bytes.size(); size += 389)
     EXPECT_THROW(check(bytes.substr(0, size)), std::exception) << size;
   EXPECT_THROW(check(bytes.substr(0, bytes.size() - 1)), std::ios::failure);
+  const std::string points = packed_points(500);
+  for (std::size_t size = 0; size < points.size(); size += 29)
+    EXPECT_THROW(check(points.substr(0, size)), std::exception) << size;
 }
 
 class DamagedVdb : public ::testing::Test {
@@ -70,13 +105,14 @@ class DamagedVdb : public ::testing::Test {
     const std::string path = folder_ / "damaged.vdb";
     std::ofstream(path, std::ios::binary) << bytes;
     try {
-      read_vdb(path);
+      points_ ? read_point_volume(path).points.samples.size() : read_vdb(path).grids.size();
     } catch (const Error& e) {
       EXPECT_EQ(e.code(), ExitCode::unreadable);
       return e.what();
     }
     return {};
   }
+  bool points_ = false;
   test::TemporaryFolder folder_;
 };
 
@@ -93,6 +129,21 @@ TEST_F(DamagedVdb, IsReadOrRefusedWithOneLine) {
     refused += what.empty() ? 0 : 1;
   }
   EXPECT_GT(refused, 20);
+}
+
+TEST_F(DamagedVdb, OfPointsIsReadOrRefusedWithOneLine) {
+  points_ = true;
+  const std::string whole = packed_points(30);
+  EXPECT_EQ(read(whole), "");
+  std::mt19937 random(8);
+  for (int i = 0; i < 1000; ++i) {
+    std::string bytes = whole;
+    // The attributes are at the end.
+    const std::size_t from = i % 2 == 0 ? 0 : bytes.size() / 2;
+    for (int k = 0; k < 1 + i % 3; ++k)
+      bytes[from + random() % (bytes.size() - from)] ^= static_cast<char>(1 << random() % 8);
+    EXPECT_EQ(read(bytes).find('\n'), std::string::npos);
+  }
 }
 
 TEST_F(DamagedVdb, IsNotBelievedAboutItsLengths) {
