@@ -71,7 +71,11 @@ class TreeWalk {
   /// Returns the number of leaves, whose buffers it has passed if it knows them.
   std::uint64_t run() {
     const bool buffers = kind_.leaves != ValueKind::Leaves::points;
-    w_.skip(sizeof(std::int32_t) + kind_.bytes);  // buffers, background
+    w_.skip(sizeof(std::int32_t));  // buffers
+    if (buffers)
+      w_.skip(kind_.bytes);  // background
+    else if (w_.number<std::uint32_t>() != 0)
+      wrong("its points have a background");
     const auto tiles = w_.number<std::uint32_t>(), children = w_.number<std::uint32_t>();
     for (std::uint32_t i = 0; i < tiles; ++i) {
       w_.skip(3 * sizeof(std::int32_t) + kind_.bytes);
