@@ -31,13 +31,34 @@ void Walker::go_to(std::int64_t place) {
   file_.seekg(place);
 }
 
-std::uint64_t check_blosc(Walker& w, std::uint64_t bytes) {
+namespace {
+
+/// The piece, and in `unpacked` the size of what is in it.
+std::vector<char> read_blosc(Walker& w, std::uint64_t bytes, std::size_t& unpacked) {
   if (bytes > w.left()) throw std::ios::failure("the end");
   if (bytes < BLOSC_MIN_HEADER_LENGTH) wrong("a compressed piece is too short");
   std::vector<char> chunk(bytes);
   w.read(chunk.data(), bytes);
-  std::size_t unpacked = 0;
   if (blosc_cbuffer_validate(chunk.data(), bytes, &unpacked) != 0) wrong("a compressed piece is damaged");
+  return chunk;
+}
+
+}  // namespace
+
+std::uint64_t check_blosc(Walker& w, std::uint64_t bytes) {
+  std::size_t unpacked = 0;
+  read_blosc(w, bytes, unpacked);
+  return unpacked;
+}
+
+std::uint64_t unpack_blosc(Walker& w, std::uint64_t bytes) {
+  constexpr std::uint64_t kMostPerByte = 2048;  // no compressor of Blosc's is that good
+  std::size_t unpacked = 0;
+  const std::vector<char> chunk = read_blosc(w, bytes, unpacked);
+  if (unpacked > kMostPerByte * bytes) wrong("a compressed piece claims to hold too much");
+  std::vector<char> values(unpacked);
+  const int got = blosc_decompress_ctx(chunk.data(), values.data(), values.size(), 1);
+  if (got < 0 || static_cast<std::size_t>(got) != unpacked) wrong("a compressed piece is damaged");
   return unpacked;
 }
 

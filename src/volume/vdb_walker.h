@@ -53,6 +53,8 @@ class Walker {
 
 /// A compressed piece of so many bytes, which must be sound; returns the size of what is in it.
 std::uint64_t check_blosc(Walker& w, std::uint64_t bytes);
+/// The same for a piece that is unpacked to see whether it can be.
+std::uint64_t unpack_blosc(Walker& w, std::uint64_t bytes);
 
 /// OpenVDB reads metadata by its type, whatever length stands before it. Returns whether it says that values are saved
 /// with 16 bits.
