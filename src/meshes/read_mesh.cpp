@@ -6,6 +6,7 @@
 #include "lamina/mesh.h"
 #include "meshes/format_name.h"
 #include "meshes/readers.h"
+#include "points/line_reader.h"
 
 namespace lamina {
 namespace {
@@ -18,7 +19,7 @@ TriangleMesh read_by_format(meshes::FileBuffer& file, const std::string& path) {
   file.require_sound();
   if (magic.empty()) throw Error(ExitCode::unreadable, fmt::format("{}: is empty", path));
   // OpenMesh's readers would take the first line for something else.
-  if (magic.starts_with("\xEF\xBB\xBF")) {
+  if (magic.starts_with(kByteOrderMark)) {
     throw Error(ExitCode::unreadable,
                 fmt::format("{}: begins with a byte order mark; save it without: tail -c +4 FILE > OTHER", path));
   }

@@ -23,24 +23,20 @@ struct Array {
   bool uniform = false, paged = false;
 };
 
-/// Of the attributes that a leaf has.
-struct Descriptor {
-  std::vector<std::uint32_t> value_bytes;
-};
-
 std::uint32_t bytes_of_value(const std::string& type, const std::string& codec) {
   if (!AttributeArray::isRegistered({type, codec})) wrong(fmt::format("its points have values of type {}", type));
   return AttributeArray::create({type, codec}, 1, 1)->storageTypeSize();
 }
 
-Descriptor check_descriptor(Walker& w) {
-  Descriptor out;
+/// Returns what a value of each attribute takes.
+std::vector<std::uint32_t> check_descriptor(Walker& w) {
+  std::vector<std::uint32_t> out;
   const auto count = w.number<std::uint64_t>();
   // Two empty texts each at least.
   if (count > w.left() / 8) wrong("a list of attributes does not fit into it");
   for (std::uint64_t i = 0; i < count; ++i) {
     const std::string type = w.text(), codec = w.text();
-    out.value_bytes.push_back(bytes_of_value(type, codec));
+    out.push_back(bytes_of_value(type, codec));
   }
   std::set<std::uint64_t> places;
   std::set<std::string> names;
@@ -114,19 +110,14 @@ std::vector<Page> check_page_sizes(Walker& w, const std::vector<std::vector<Arra
 
 void check_page(Walker& w, const Page& page) {
   if (page.packed < 0) return w.skip(static_cast<std::uint64_t>(page.bytes));
-  constexpr std::uint64_t kPadded = 128;
   const std::uint64_t unpacked = unpack_blosc(w, static_cast<std::uint64_t>(page.packed));
-  const auto bytes = static_cast<std::uint64_t>(page.bytes);
-  if (unpacked != bytes && (bytes > kPadded || unpacked != kPadded)) wrong("a page of points is damaged");
+  if (!holds(unpacked, static_cast<std::uint64_t>(page.bytes))) wrong("a page of points is damaged");
 }
 
 /// An array that lies in the file by itself.
 void check_single(Walker& w, const Array& array) {
   if (!array.uniform && w.number<std::uint8_t>() == 1) {
-    constexpr std::uint64_t kPadded = 128;
-    const std::uint64_t unpacked = unpack_blosc(w, array.bytes);
-    if (unpacked != array.expected && (array.expected > kPadded || unpacked != kPadded))
-      wrong("an array of points is damaged");
+    if (!holds(unpack_blosc(w, array.bytes), array.expected)) wrong("an array of points is damaged");
     return;
   }
   if (array.bytes != array.expected) wrong("an array of points has a wrong size");
@@ -145,13 +136,13 @@ void check_voxels(Walker& w) {
 
 std::vector<std::vector<Array>> check_arrays(Walker& w, std::uint64_t leaves) {
   std::vector<std::vector<Array>> out;
-  Descriptor descriptor;
+  std::vector<std::uint32_t> value_bytes;
   bool shared = false;  // by all leaves from the first on that says so
   for (std::uint64_t leaf = 0; leaf < leaves; ++leaf) {
     if (!shared) {
       const auto header = w.number<std::uint8_t>();
       if (header > 3) wrong("a leaf of points is of no known kind");
-      descriptor = check_descriptor(w);
+      value_bytes = check_descriptor(w);
       shared = (header & 1U) != 0;
       if ((header & 2U) != 0) {
         const auto more = w.number<std::uint64_t>();
@@ -160,7 +151,7 @@ std::vector<std::vector<Array>> check_arrays(Walker& w, std::uint64_t leaves) {
       }
     }
     std::vector<Array>& arrays = out.emplace_back();
-    for (const std::uint32_t bytes : descriptor.value_bytes) arrays.push_back(check_array(w, bytes));
+    for (const std::uint32_t bytes : value_bytes) arrays.push_back(check_array(w, bytes));
   }
   return out;
 }

@@ -51,6 +51,11 @@ std::uint64_t check_blosc(Walker& w, std::uint64_t bytes) {
   return unpacked;
 }
 
+bool holds(std::uint64_t unpacked, std::uint64_t bytes) {
+  constexpr std::uint64_t kPadded = 128;
+  return unpacked == bytes || (bytes <= kPadded && unpacked == kPadded);
+}
+
 std::uint64_t unpack_blosc(Walker& w, std::uint64_t bytes) {
   constexpr std::uint64_t kMostPerByte = 2048;  // no compressor of Blosc's is that good
   std::size_t unpacked = 0;
@@ -67,9 +72,7 @@ namespace {
 /// One of the table's two arrays, compressed where its size is not 0.
 void check_leaf_array(Walker& w, std::uint32_t packed, std::uint64_t bytes) {
   if (packed == 0) return w.skip(bytes);
-  constexpr std::uint64_t kPadded = 128;  // shorter ones are filled up before they are compressed
-  const std::uint64_t unpacked = check_blosc(w, packed);
-  if (unpacked != bytes && (bytes > kPadded || unpacked != kPadded)) wrong("a table of leaves is damaged");
+  if (!holds(check_blosc(w, packed), bytes)) wrong("a table of leaves is damaged");
 }
 
 /// What each leaf is like, for readers that load it later: one byte of each, and where told eight more. OpenVDB goes by

@@ -55,6 +55,8 @@ class Walker {
 std::uint64_t check_blosc(Walker& w, std::uint64_t bytes);
 /// The same for a piece that is unpacked to see whether it can be.
 std::uint64_t unpack_blosc(Walker& w, std::uint64_t bytes);
+/// Whether a piece of so many bytes is that of an array: short ones are filled up before they are compressed.
+bool holds(std::uint64_t unpacked, std::uint64_t bytes);
 
 /// OpenVDB reads metadata by its type, whatever length stands before it. Returns whether it says that values are saved
 /// with 16 bits.
