@@ -145,7 +145,7 @@ class BodyReader {
         else if (e.name == "face")
           faces(e);
         else
-          for (; row_ < e.count; ++row_) skip_row(e);
+          skip_rows(e);
       } catch (const EndOfFile&) {
         file_.require_sound();
         fail(fmt::format("ends in {} {} of the {} its header promises: the file is cut short", e.name, row_, e.count));
@@ -173,8 +173,11 @@ class BodyReader {
     return static_cast<std::size_t>(std::min(count, most));
   }
 
-  void skip_row(const PlyElement& e) {
-    for (const PlyProperty& p : e.properties) skip(p);
+  void skip_rows(const PlyElement& e) {
+    // Rows without properties take no bytes: the file's end would never stop us.
+    if (e.properties.empty()) return;
+    for (; row_ < e.count; ++row_)
+      for (const PlyProperty& p : e.properties) skip(p);
   }
   void skip(const PlyProperty& p) {
     if (!p.list_count) {

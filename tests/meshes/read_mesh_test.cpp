@@ -51,6 +51,15 @@ std::string binary_triangle(bool big, std::uint32_t last_index = 2) {
   return b;
 }
 
+TEST(ReadMesh, PlyWithMoreEmptyRowsThanCanBeCounted) {
+  const ScratchFolder folder;
+  std::string text = kAsciiPly;
+  text.insert(text.find("element vertex"), "element nothing 18446744073709551615\n");
+  const TriangleMesh m = read_mesh(folder.write("a.ply", text));
+  EXPECT_EQ(m.positions.size(), 4u);
+  EXPECT_EQ(m.triangles.size(), 3u);
+}
+
 TEST(ReadMesh, AsciiPlyWithForeignElementsAndLists) {
   const ScratchFolder folder;
   const TriangleMesh m = read_mesh(folder.write("a.ply", kAsciiPly));
