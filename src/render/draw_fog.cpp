@@ -1,4 +1,3 @@
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/RayIntersector.h>
 
@@ -10,6 +9,7 @@
 #include "render/ray_field.h"
 #include "render/shade.h"
 #include "volume/fog_data.h"
+#include "volume/grids.h"
 
 namespace lamina::render_detail {
 namespace {

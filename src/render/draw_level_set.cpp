@@ -1,4 +1,3 @@
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 #include <openvdb/tools/RayIntersector.h>
 
@@ -9,6 +8,7 @@
 #include "render/grid_colours.h"
 #include "render/ray_field.h"
 #include "render/shade.h"
+#include "volume/grids.h"
 #include "volume/level_set_data.h"
 #include "volume/vdb_file.h"
 

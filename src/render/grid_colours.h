@@ -1,10 +1,10 @@
 // The colours of a .vdb beside its level set or fog.
 #pragma once
-#include <openvdb/openvdb.h>
 
 #include <optional>
 
 #include "render/shade.h"
+#include "volume/grids.h"
 
 namespace lamina::render_detail {
 

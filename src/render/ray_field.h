@@ -1,10 +1,10 @@
 // The rays of a picture through a grid, in the grid's index space.
 #pragma once
-#include <openvdb/openvdb.h>
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include "render/view.h"
+#include "volume/grids.h"
 
 namespace lamina::render_detail {
 

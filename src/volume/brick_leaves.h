@@ -1,6 +1,5 @@
 // From bricks of the band to the leaves of the grids.
 #pragma once
-#include <openvdb/openvdb.h>
 
 #include <array>
 #include <string>
@@ -10,6 +9,7 @@
 #include "lamina/frame.h"
 #include "volume/band.h"
 #include "volume/grid_frame.h"
+#include "volume/grids.h"
 #include "volume/streamed_vdb.h"
 
 namespace lamina::volume {

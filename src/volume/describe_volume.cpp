@@ -1,11 +1,11 @@
 #include "lamina/volume_info.h"
 
 #include <openvdb/points/PointCount.h>
-#include <openvdb/points/PointDataGrid.h>
 
 #include <algorithm>
 #include <map>
 
+#include "volume/point_grids.h"
 #include "volume/vdb_file.h"
 
 namespace lamina {

@@ -1,13 +1,13 @@
 #include "volume/edited_grids.h"
 
 #include <fmt/format.h>
-#include <openvdb/points/PointDataGrid.h>
 
 #include <utility>
 
 #include "lamina/error.h"
 #include "lamina/volume_points.h"
 #include "meshes/with_threads.h"
+#include "volume/point_grids.h"
 #include "volume/points_grid.h"
 #include "volume/vdb_file.h"
 

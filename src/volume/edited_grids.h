@@ -1,6 +1,5 @@
 // What clipping and transforming volumes have in common: grids in, grids out, points by themselves.
 #pragma once
-#include <openvdb/openvdb.h>
 
 #include <functional>
 #include <string>
@@ -8,6 +7,7 @@
 #include "lamina/run.h"
 #include "lamina/sample.h"
 #include "lamina/volume_edit.h"
+#include "volume/grids.h"
 
 namespace lamina::volume {
 

@@ -1,8 +1,8 @@
 // What a FogVolume holds.
 #pragma once
-#include <openvdb/openvdb.h>
 
 #include "lamina/volume_fog.h"
+#include "volume/grids.h"
 
 namespace lamina {
 

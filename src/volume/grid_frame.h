@@ -1,11 +1,11 @@
 // From the lattice of a run to the index space of its grids.
 #pragma once
-#include <openvdb/openvdb.h>
 
 #include <array>
 
 #include "lamina/frame.h"
 #include "lamina/lattice.h"
+#include "volume/grids.h"
 
 namespace lamina::volume {
 

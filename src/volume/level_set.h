@@ -1,10 +1,10 @@
 // The band of distances around a mesh, and the colours in it.
 #pragma once
-#include <openvdb/openvdb.h>
 
 #include "lamina/mesh.h"
 #include "lamina/run.h"
 #include "measure/triangle_bvh.h"
+#include "volume/grids.h"
 
 namespace lamina::volume {
 

@@ -1,8 +1,8 @@
 // What a LevelSet holds.
 #pragma once
-#include <openvdb/openvdb.h>
 
 #include "lamina/volume_level_set.h"
+#include "volume/grids.h"
 
 namespace lamina {
 

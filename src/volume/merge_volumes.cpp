@@ -1,7 +1,6 @@
 #include "lamina/volume_merge.h"
 
 #include <fmt/format.h>
-#include <openvdb/points/PointDataGrid.h>
 #include <openvdb/tools/Composite.h>
 
 #include <algorithm>
@@ -11,6 +10,7 @@
 #include "lamina/error.h"
 #include "lamina/volume_points.h"
 #include "meshes/with_threads.h"
+#include "volume/point_grids.h"
 #include "volume/points_grid.h"
 #include "volume/sign_tiles.h"
 #include "volume/vdb_file.h"

@@ -1,6 +1,6 @@
 // What lies behind an open surface, where nothing is known.
 #pragma once
-#include <openvdb/openvdb.h>
+#include "volume/grids.h"
 
 namespace lamina::volume {
 

@@ -1,7 +1,5 @@
 // Building the leaves of an OpenVDB points grid from plain arrays.
 #pragma once
-#include <openvdb/openvdb.h>
-#include <openvdb/points/PointDataGrid.h>
 
 #include <array>
 #include <cstdint>
@@ -10,6 +8,7 @@
 #include <vector>
 
 #include "lamina/volume_points.h"
+#include "volume/point_grids.h"
 
 namespace lamina::volume {
 

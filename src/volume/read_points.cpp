@@ -1,5 +1,4 @@
 #include <fmt/format.h>
-#include <openvdb/points/PointDataGrid.h>
 
 #include <algorithm>
 #include <cmath>
@@ -8,6 +7,7 @@
 #include "attributes/ply_type.h"
 #include "lamina/error.h"
 #include "volume/full_range.h"
+#include "volume/point_grids.h"
 #include "volume/points_grid.h"
 #include "volume/vdb_file.h"
 

@@ -1,6 +1,6 @@
 // Sides of the tiles of an open level set.
 #pragma once
-#include <openvdb/openvdb.h>
+#include "volume/grids.h"
 
 namespace lamina::volume {
 

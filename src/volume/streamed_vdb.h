@@ -1,6 +1,5 @@
 // A .vdb file written leaf by leaf, in any order: OpenVDB's own writer wants the whole tree in memory.
 #pragma once
-#include <openvdb/openvdb.h>
 
 #include <cstdint>
 #include <span>
@@ -9,6 +8,7 @@
 
 #include "files/staged_file.h"
 #include "slab_store/temp_file.h"
+#include "volume/grids.h"
 #include "volume/tile_signs.h"
 
 namespace lamina::volume {

@@ -1,8 +1,9 @@
 // OpenVDB's file format, made in memory.
 #pragma once
-#include <openvdb/openvdb.h>
 
 #include <string>
+
+#include "volume/grids.h"
 
 namespace lamina::volume {
 

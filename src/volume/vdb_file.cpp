@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <openvdb/io/Stream.h>
-#include <openvdb/points/PointDataGrid.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -13,6 +12,7 @@
 #include "lamina/error.h"
 #include "lamina/version.h"
 #include "meshes/output_file.h"
+#include "volume/point_grids.h"
 #include "volume/vdb_bytes.h"
 #include "volume/vdb_check.h"
 

@@ -1,10 +1,11 @@
 // Whole .vdb files in memory.
 #pragma once
-#include <openvdb/openvdb.h>
 
 #include <array>
 #include <functional>
 #include <string>
+
+#include "volume/grids.h"
 
 namespace lamina::volume {
 

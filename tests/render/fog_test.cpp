@@ -1,7 +1,6 @@
 // Fogs drawn by rays, against what a block of even density must let through.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 
 #include <cmath>
 
@@ -12,6 +11,7 @@
 #include "render/shade.h"
 #include "support/program.h"
 #include "volume/fog_data.h"
+#include "volume/grids.h"
 #include "volume/vdb_file.h"
 
 namespace lamina {

@@ -1,6 +1,5 @@
 // Level sets drawn by rays, against spheres whose depth is known at every sample.
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/SignedFloodFill.h>
 
 #include <cmath>
@@ -8,6 +7,7 @@
 
 #include "lamina/render.h"
 #include "render/draw.h"
+#include "volume/grids.h"
 #include "volume/level_set_data.h"
 
 namespace lamina {

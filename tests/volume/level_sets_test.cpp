@@ -1,7 +1,6 @@
 // Level sets read from files, and the way back to meshes and fogs.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include <cmath>
@@ -16,6 +15,7 @@
 #include "support/mesh_check.h"
 #include "support/program.h"
 #include "surface/clouds.h"
+#include "volume/grids.h"
 #include "volume/vdb_file.h"
 
 namespace lamina {

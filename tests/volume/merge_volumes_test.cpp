@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include "lamina/error.h"
@@ -11,6 +10,7 @@
 #include "lamina/volume_points.h"
 #include "support/program.h"
 #include "surface/clouds.h"
+#include "volume/grids.h"
 #include "volume/vdb_file.h"
 
 namespace lamina {

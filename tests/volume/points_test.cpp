@@ -1,6 +1,5 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
@@ -13,6 +12,7 @@
 #include "lamina/volume_info.h"
 #include "lamina/volume_points.h"
 #include "support/program.h"
+#include "volume/grids.h"
 
 namespace lamina {
 namespace {

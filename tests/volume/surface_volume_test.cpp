@@ -1,7 +1,6 @@
 // The grids that a reconstruction writes, against the surfaces they are reconstructed from.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/Interpolation.h>
 
 #include <cmath>
@@ -14,6 +13,7 @@
 #include "lamina/volume_points.h"
 #include "support/program.h"
 #include "surface/clouds.h"
+#include "volume/grids.h"
 #include "volume/vdb_file.h"
 
 namespace lamina {

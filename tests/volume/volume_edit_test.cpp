@@ -3,7 +3,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <openvdb/openvdb.h>
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include <filesystem>
@@ -13,6 +12,7 @@
 #include "lamina/transform.h"
 #include "lamina/volume_points.h"
 #include "support/program.h"
+#include "volume/grids.h"
 #include "volume/vdb_file.h"
 
 namespace lamina {

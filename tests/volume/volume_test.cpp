@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <openvdb/io/Stream.h>
-#include <openvdb/openvdb.h>
 
 #include <algorithm>
 #include <cmath>
@@ -15,6 +14,7 @@
 #include "measure/point_triangle.h"
 #include "render/shapes.h"
 #include "support/program.h"
+#include "volume/grids.h"
 
 namespace lamina {
 namespace {
