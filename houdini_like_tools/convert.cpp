@@ -2,14 +2,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
-#include <filesystem>
 #include <memory>
 
 #include "console.h"
 #include "inputs.h"
 #include "lamina/edit_points.h"
 #include "lamina/error.h"
+#include "lamina/file_ending.h"
 #include "lamina/volume.h"
 #include "lamina/volume_info.h"
 #include "lamina/volume_level_set.h"
@@ -30,12 +29,6 @@ struct ConvertOptions {
   Precision precision = Precision::automatic;
   RunOptions run;
 };
-
-std::string ending(const std::string& path) {
-  std::string e = std::filesystem::path(path).extension().string();
-  std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return e;
-}
 
 template <class T>
 void append(std::vector<T>& to, const std::vector<T>& from) {
@@ -72,7 +65,7 @@ void points_to_volume(const ConvertOptions& o, PointSource& source, const RunCon
 }
 
 void convert_points(const ConvertOptions& o, const RunContext& context) {
-  const std::string to = ending(o.output);
+  const std::string to = file_ending(o.output);
   if (to == ".vdb") return points_to_volume(o, *open_point_input(o.input, o.columns, context), context);
   if (to == ".off" || to == ".stl")
     throw Error(ExitCode::usage, fmt::format("{}: points do not become a {} file: make a mesh of them with 'lamina "
@@ -119,7 +112,7 @@ void convert_mesh(const ConvertOptions& o, const RunContext& context) {
   if (o.vertices) return write_vertices(o, mesh, context);
   if (o.fog)
     throw Error(ExitCode::usage, shown_name(o.input) + ": --fog wants a level set; make a .vdb of the mesh first");
-  if (ending(o.output) != ".vdb") {
+  if (file_ending(o.output) != ".vdb") {
     write_mesh(mesh, o.output);
     context.info(fmt::format("wrote {} vertices, {} triangles", count_text(mesh.positions.size()),
                              count_text(mesh.triangles.size())));
@@ -159,7 +152,7 @@ void convert_volume(const ConvertOptions& o, const RunContext& context) {
   if (chosen != info.grids.end() && chosen->points && (points_only || !o.grid.empty()))
     return volume_points_to_points(o, context);
   const LevelSet level_set = read_level_set(o.input, o.grid);
-  if (ending(o.output) == ".vdb") {
+  if (file_ending(o.output) == ".vdb") {
     if (!o.fog)
       throw Error(ExitCode::usage,
                   fmt::format("{}: is a volume already; --fog makes a fog volume of its level set", o.input));
@@ -228,7 +221,7 @@ void add_convert(CLI::App& app) {
                "  lamina convert scan.ply -o scan.vdb\n"
                "  lamina convert scan.ply --precision double -o scan_double.ply");
   tool->callback([o, tool] {
-    if (ending(o->output) != ".vdb") {
+    if (file_ending(o->output) != ".vdb") {
       for (const char* name : {"--voxelsize", "--halfbandvoxels", "--half", "--fog"})
         if (tool->count(name) > 0) throw CLI::ValidationError(name, "is for .vdb files; name one with --output");
     }

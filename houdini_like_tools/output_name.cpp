@@ -4,11 +4,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
-#include <filesystem>
 #include <string_view>
 
 #include "lamina/error.h"
+#include "lamina/file_ending.h"
 
 namespace lamina::tools {
 namespace {
@@ -27,16 +26,9 @@ bool among(const Endings& endings, std::string_view ending) {
   return std::find(endings.begin(), endings.end(), ending) != endings.end();
 }
 
-std::string ending_of(const std::string& output) {
-  std::string ending = std::filesystem::path(output).extension().string();
-  std::transform(ending.begin(), ending.end(), ending.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return ending;
-}
-
 /// `format` as "a mesh is written as PLY", `hint` what else to do than to name it `wanted`.
 void require(const std::string& output, std::string_view wanted, std::string_view format, const std::string& hint) {
-  const std::string ending = ending_of(output);
+  const std::string ending = file_ending(output);
   if (ending == wanted || !(among(kMeshes, ending) || among(kOthers, ending))) return;
   throw Error(ExitCode::usage, fmt::format("{}: {}; name it {}{}", output, format, wanted, hint));
 }
@@ -44,7 +36,7 @@ void require(const std::string& output, std::string_view wanted, std::string_vie
 }  // namespace
 
 void require_mesh_name(const std::string& output) {
-  const std::string ending = ending_of(output);
+  const std::string ending = file_ending(output);
   const std::string hint = among(kMeshes, ending) ? ", or pipe it on: -o - | lamina convert - -o " + output
                            : ending == ".gz"      ? ", or pipe it on: -o - | gzip"
                            : ending == ".vdb"     ? " (--vdb names the volume beside it)"

@@ -12,8 +12,8 @@
 
 #include "files/descriptor.h"
 #include "lamina/error.h"
+#include "lamina/file_ending.h"
 #include "lamina/info.h"
-#include "meshes/format_name.h"
 
 namespace lamina {
 namespace {
@@ -98,7 +98,7 @@ bool obj_names_faces(const std::string& path) {
 FileContent content_of(const std::string& path, const std::string& tmp_dir) {
   if (path == "-") spool_standard_input(tmp_dir);
   const std::string start = beginning(path);
-  const std::string format = meshes::format_name(path);
+  const std::string format = packed_ending(path);
   constexpr std::string_view kVdbMagic(" BDV\0\0\0\0", 8);
   if (std::string_view(start).starts_with(kVdbMagic)) return FileContent::volume;
   if (start.starts_with("ply\n") || start.starts_with("ply\r"))

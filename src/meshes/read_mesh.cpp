@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "lamina/error.h"
+#include "lamina/file_ending.h"
 #include "lamina/mesh.h"
-#include "meshes/format_name.h"
 #include "meshes/readers.h"
 #include "points/line_reader.h"
 
@@ -25,7 +25,7 @@ TriangleMesh read_by_format(meshes::FileBuffer& file, const std::string& path) {
   }
   in.clear();
   in.seekg(0);
-  const std::string format = meshes::format_name(path);
+  const std::string format = packed_ending(path);
   if (magic == "ply\n" || magic == "ply\r" || format == ".ply") return meshes::read_ply(file, path);
   if (format == ".obj") return meshes::read_with_openmesh(file, path, meshes::TextFormat::obj);
   if (format == ".off") return meshes::read_off(file, path);

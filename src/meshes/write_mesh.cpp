@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "lamina/error.h"
+#include "lamina/file_ending.h"
 #include "lamina/mesh.h"
-#include "meshes/format_name.h"
 #include "meshes/output_file.h"
 #include "meshes/ply_writer.h"
 #include "meshes/text_writers.h"
@@ -20,7 +20,7 @@ void write_mesh(const TriangleMesh& mesh, const std::string& path) {
                                                                            {".stl", meshes::write_stl}}};
   for (const auto& [format, write] : kWriters) {
     const bool standard = path == "-" && format == kWriters.front().first;
-    if (path.ends_with(".gz") || (meshes::format_name(path) != format && !standard)) continue;
+    if (path.ends_with(".gz") || (packed_ending(path) != format && !standard)) continue;
     meshes::OutputFile out(path);
     write(mesh, out);
     out.commit();

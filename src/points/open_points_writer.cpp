@@ -1,12 +1,11 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
-#include <cctype>
 #include <filesystem>
 #include <utility>
 
 #include "lamina/error.h"
+#include "lamina/file_ending.h"
 #include "lamina/points_writer.h"
 #include "points/las_points_writer.h"
 #include "points/pcd_points_writer.h"
@@ -26,12 +25,6 @@ constexpr std::array<std::pair<const char*, OpenWriter>, 5> kFormats{{{".ply", o
                                                                       {".pcd", open_pcd_points_writer},
                                                                       {".las", open_las_points_writer}}};
 
-std::string lower_extension(const std::string& path) {
-  std::string e = std::filesystem::path(path).extension().string();
-  std::transform(e.begin(), e.end(), e.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return e;
-}
-
 bool is_pipe_or_device(const std::string& path) {
   std::error_code ignored;
   const auto kind = std::filesystem::status(path, ignored).type();
@@ -47,7 +40,7 @@ PointColumns columns_of(const PointSourceInfo& info) {
 
 std::unique_ptr<PointsWriter> open_points_writer(const std::string& path, const PointColumns& columns,
                                                  const PointsWriterSettings& settings) {
-  const std::string extension = lower_extension(path);
+  const std::string extension = file_ending(path);
   std::string known;
   for (const auto& [ending, open] : kFormats) {
     if (extension == ending) return open(path, columns, settings);

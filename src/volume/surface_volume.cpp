@@ -7,10 +7,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <span>
 
 #include "lamina/error.h"
+#include "lamina/file_ending.h"
 #include "lamina/volume_points.h"
 #include "volume/brick_leaves.h"
 #include "volume/corner_points.h"
@@ -39,7 +39,7 @@ bool fits_half(double voxel, double band) {
 }
 
 void require_vdb(const char* option, const std::string& path) {
-  if (path.empty() || std::filesystem::path(path).extension() == ".vdb") return;
+  if (path.empty() || file_ending(path) == ".vdb") return;
   usage(fmt::format("{} {}: the file's name must end in .vdb, by which other programs know it", option, path));
 }
 
