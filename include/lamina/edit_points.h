@@ -17,9 +17,10 @@ using EditBatch = std::function<void(SampleBatch&)>;
 
 struct EditReport {
   std::uint64_t read = 0, written = 0;
-  std::uint64_t bad_rows = 0;  ///< left out: a position, normal, radius or quality was not finite
+  std::uint64_t bad_rows = 0;  ///< left out: a position or radius was not finite
   std::optional<std::uint64_t> first_bad_row;
-  std::uint64_t replaced_values = 0;  ///< attribute values that were not finite and became 0
+  std::uint64_t replaced_normals = 0;  ///< that were not finite and became 0 0 0
+  std::uint64_t replaced_values = 0;   ///< of attributes and qualities, that were not finite and became 0
 };
 
 /// Passes all rows of the source through `edit` to the writer, in order; a few batches are in memory at a time. Rows

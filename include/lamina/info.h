@@ -41,7 +41,7 @@ struct HistogramBin {
 
 struct PointsInfo {
   std::uint64_t count = 0;
-  std::uint64_t bad_rows = 0;  ///< a position, normal, radius or quality is not finite
+  std::uint64_t bad_rows = 0;  ///< a position or radius is not finite
   std::array<double, 3> low{}, high{};
   bool double_precision = false;
   std::vector<ColumnRange> columns;  ///< x y z, nx ny nz, radius, quality, attributes

@@ -13,11 +13,8 @@ namespace lamina {
 namespace {
 
 bool is_finite_row(const SampleBatch& b, std::size_t i) {
-  bool good = std::isfinite(b.x[i]) && std::isfinite(b.y[i]) && std::isfinite(b.z[i]);
-  if (!b.nx.empty()) good = good && std::isfinite(b.nx[i]) && std::isfinite(b.ny[i]) && std::isfinite(b.nz[i]);
-  if (!b.radius.empty()) good = good && std::isfinite(b.radius[i]);
-  if (!b.quality.empty()) good = good && std::isfinite(b.quality[i]);
-  return good;
+  const bool radius = b.radius.empty() || std::isfinite(b.radius[i]);
+  return radius && std::isfinite(b.x[i]) && std::isfinite(b.y[i]) && std::isfinite(b.z[i]);
 }
 
 template <class T>
@@ -26,6 +23,17 @@ std::uint64_t replace_non_finite(std::vector<T>& values) {
   for (T& value : values) {
     if (std::isfinite(value)) continue;
     value = 0;
+    ++replaced;
+  }
+  return replaced;
+}
+
+/// A point without a normal is still a point: PCL, for one, writes NaN where a point has too few neighbours.
+std::uint64_t replace_normals(SampleBatch& b) {
+  std::uint64_t replaced = 0;
+  for (std::size_t i = 0; i < b.nx.size(); ++i) {
+    if (std::isfinite(b.nx[i]) && std::isfinite(b.ny[i]) && std::isfinite(b.nz[i])) continue;
+    b.nx[i] = b.ny[i] = b.nz[i] = 0;
     ++replaced;
   }
   return replaced;
@@ -56,6 +64,8 @@ EditReport clean_rows(SampleBatch& batch, std::vector<std::uint8_t> keep) {
     if (report.bad_rows++ == 0) report.first_bad_row = batch.first + i;
   }
   if (std::find(keep.begin(), keep.end(), 0) != keep.end()) keep_rows(batch, keep);
+  report.replaced_normals = replace_normals(batch);
+  report.replaced_values = replace_non_finite(batch.quality);
   for (std::size_t a = 0; a < batch.attributes.size(); ++a) {
     // A double may be finite where the float beside it is not.
     const bool exact = a < batch.exact.size() && !batch.exact[a].empty();
@@ -68,6 +78,7 @@ EditReport clean_rows(SampleBatch& batch, std::vector<std::uint8_t> keep) {
 void add(EditReport& total, const EditReport& batch) {
   total.read += batch.read;
   total.bad_rows += batch.bad_rows;
+  total.replaced_normals += batch.replaced_normals;
   total.replaced_values += batch.replaced_values;
   if (batch.first_bad_row) total.first_bad_row = std::min(*batch.first_bad_row, total.first_bad_row.value_or(~0ULL));
 }
@@ -105,6 +116,10 @@ void warn_of_bad_rows(const EditReport& report, const std::string& path, const R
   if (report.bad_rows > 0) {
     run.warn(fmt::format("{}: {} of {} rows are not finite, the first is row {} (counted from 0); dropped", path,
                          report.bad_rows, report.read, *report.first_bad_row));
+  }
+  if (report.replaced_normals > 0) {
+    run.warn(fmt::format("{}: {} of {} normals are not finite; they become 0 0 0", path, report.replaced_normals,
+                         report.read));
   }
   if (report.replaced_values > 0) {
     run.warn(fmt::format("{}: {} attribute values are not finite; they become 0", path, report.replaced_values));

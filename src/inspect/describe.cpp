@@ -34,8 +34,7 @@ class RadiusBins {
 
 bool is_finite_row(const SampleBatch& b, std::size_t i) {
   const auto good = [&](const auto& column) { return column.empty() || std::isfinite(column[i]); };
-  return good(b.x) && good(b.y) && good(b.z) && good(b.nx) && good(b.ny) && good(b.nz) && good(b.radius) &&
-         good(b.quality);
+  return good(b.x) && good(b.y) && good(b.z) && good(b.radius);
 }
 
 std::vector<ColumnRange> results(const std::vector<RangeOf>& ranges) {

@@ -17,7 +17,8 @@ namespace {
 /// be anything else.
 std::uint32_t unpack_colour(double value, const PcdField& field) {
   const bool integer = field.type != ScalarType::float32 || (value >= 1 && value < 0x1p24);
-  if (integer) return value >= 0 && value < 0x1p32 ? static_cast<std::uint32_t>(value) : 0;
+  if (integer && value < 0) return value >= -0x1p31 ? static_cast<std::uint32_t>(static_cast<std::int32_t>(value)) : 0;
+  if (integer) return value < 0x1p32 ? static_cast<std::uint32_t>(value) : 0;
   return std::bit_cast<std::uint32_t>(static_cast<float>(value));
 }
 

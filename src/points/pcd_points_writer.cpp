@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 #include <string_view>
+#include <utility>
 
 #include "files/record_writer.h"
 #include "lamina/error.h"
@@ -18,22 +19,29 @@
 namespace lamina {
 namespace {
 
-/// Where red, green and blue stand among the attributes, when all three are there in 8 bits.
-using Colours = std::optional<std::array<std::size_t, 3>>;
+/// Where red, green and blue stand among the attributes, when all three are there in 8 bits, or in 16.
+struct Channels {
+  std::array<std::size_t, 3> at{};
+  double scale = 1;  ///< to 8 bits, which is all that the format's colours have
+};
+using Colours = std::optional<Channels>;
 
 Colours colours_of(const AttributeLayout& layout) {
-  std::array<std::size_t, 3> found{};
   constexpr std::array kNames{"red", "green", "blue"};
-  for (std::size_t k = 0; k < 3; ++k) {
-    const auto at = std::find(layout.begin(), layout.end(), AttributeSpec{kNames.at(k), ScalarType::uint8});
-    if (at == layout.end()) return std::nullopt;
-    found.at(k) = static_cast<std::size_t>(at - layout.begin());
+  for (const auto& [type, scale] : {std::pair{ScalarType::uint8, 1.0}, std::pair{ScalarType::uint16, 1 / 257.0}}) {
+    Channels found{{}, scale};
+    const auto has = [&](std::size_t k) {
+      const auto at = std::find(layout.begin(), layout.end(), AttributeSpec{kNames.at(k), type});
+      found.at.at(k) = static_cast<std::size_t>(at - layout.begin());
+      return at != layout.end();
+    };
+    if (has(0) && has(1) && has(2)) return found;
   }
-  return found;
+  return std::nullopt;
 }
 
-bool is_one_of(const std::array<std::size_t, 3>& colours, std::size_t attribute) {
-  return std::find(colours.begin(), colours.end(), attribute) != colours.end();
+bool is_one_of(const Channels& colours, std::size_t attribute) {
+  return std::find(colours.at.begin(), colours.at.end(), attribute) != colours.at.end();
 }
 
 /// Columns as they are stored: the packed colour is an integer behind the other attributes.
@@ -152,9 +160,9 @@ class PcdPointsWriter final : public PointsWriter {
       out.exact.push_back(a < batch.exact.size() ? batch.exact[a] : std::vector<double>{});
     }
     std::vector<double> colour(batch.size());
-    for (const std::size_t a : *colours_) {
+    for (const std::size_t a : colours_->at) {
       for (std::size_t i = 0; i < batch.size(); ++i) {
-        colour[i] = colour[i] * 256 + std::clamp(std::nearbyint(double{batch.attributes[a][i]}), 0.0, 255.0);
+        colour[i] = colour[i] * 256 + std::clamp(std::nearbyint(colours_->scale * batch.attributes[a][i]), 0.0, 255.0);
       }
     }
     out.attributes.emplace_back(colour.begin(), colour.end());

@@ -34,7 +34,7 @@ void require_scalars(const PlyElement& vertices, const std::string& name) {
   for (const PlyProperty& property : vertices.properties) {
     if (property.list_count) {
       unreadable(name, fmt::format("property {} of the vertices is a list; points with lists are not read; write the "
-                                   "file again without it (CloudCompare and MeshLab do)",
+                                   "file again without it (MeshLab does)",
                                    quoted_word(property.name)));
     }
   }

@@ -34,6 +34,12 @@ constexpr std::array kAliases{std::pair{"r"sv, "red"sv},
                               std::pair{"normals:0"sv, "nx"sv},
                               std::pair{"normals:1"sv, "ny"sv},
                               std::pair{"normals:2"sv, "nz"sv},
+                              std::pair{"rgb:0"sv, "red"sv},
+                              std::pair{"rgb:1"sv, "green"sv},
+                              std::pair{"rgb:2"sv, "blue"sv},
+                              std::pair{"n[x]"sv, "nx"sv},
+                              std::pair{"n[y]"sv, "ny"sv},
+                              std::pair{"n[z]"sv, "nz"sv},
                               std::pair{"n.x"sv, "nx"sv},
                               std::pair{"n.y"sv, "ny"sv},
                               std::pair{"n.z"sv, "nz"sv},
@@ -43,11 +49,25 @@ constexpr std::array kAliases{std::pair{"r"sv, "red"sv},
                               std::pair{"remission"sv, "intensity"sv}};
 
 /// What positions are called where nothing is called x, y and z: by surveyors, in tables of Houdini and ParaView.
-constexpr std::array kPlaces{std::pair{"easting"sv, "x"sv},   std::pair{"northing"sv, "y"sv},
-                             std::pair{"elevation"sv, "z"sv}, std::pair{"height"sv, "z"sv},
-                             std::pair{"p.x"sv, "x"sv},       std::pair{"p.y"sv, "y"sv},
-                             std::pair{"p.z"sv, "z"sv},       std::pair{"points:0"sv, "x"sv},
-                             std::pair{"points:1"sv, "y"sv},  std::pair{"points:2"sv, "z"sv}};
+constexpr std::array kPlaces{
+    std::pair{"easting"sv, "x"sv},  std::pair{"northing"sv, "y"sv}, std::pair{"elevation"sv, "z"sv},
+    std::pair{"height"sv, "z"sv},   std::pair{"p.x"sv, "x"sv},      std::pair{"p.y"sv, "y"sv},
+    std::pair{"p.z"sv, "z"sv},      std::pair{"points:0"sv, "x"sv}, std::pair{"points:1"sv, "y"sv},
+    std::pair{"points:2"sv, "z"sv}, std::pair{"p[x]"sv, "x"sv},     std::pair{"p[y]"sv, "y"sv},
+    std::pair{"p[z]"sv, "z"sv}};
+
+constexpr std::array kUnits{"m"sv,  "mm"sv, "cm"sv,  "km"sv,  "ft"sv,      "feet"sv, "metre"sv, "metres"sv, "meter"sv,
+                            "in"sv, "db"sv, "deg"sv, "rad"sv, "degrees"sv, "s"sv,    "ns"sv,    "us"sv,     "meters"sv};
+
+/// "x" of "x[m]", "x(m)" and "x_(m)".
+std::string without_unit(std::string name) {
+  const std::size_t open = name.find_last_of("([");
+  if (open == std::string::npos || open == 0 || name.back() != (name[open] == '(' ? ')' : ']')) return name;
+  const std::string_view unit = std::string_view(name).substr(open + 1, name.size() - open - 2);
+  if (std::find(kUnits.begin(), kUnits.end(), unit) == kUnits.end()) return name;
+  name.resize(name.find_last_not_of("_ ", open - 1) + 1);
+  return name;
+}
 
 template <class Names>
 std::string renamed(const Names& names, std::string name) {
@@ -65,7 +85,7 @@ std::string usual_name(std::string_view name) {
   for (const char c : name.substr(0, 256)) {
     lower += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c > ' ' && c <= '~' ? c : '_';
   }
-  return renamed(kAliases, std::move(lower));
+  return renamed(kAliases, without_unit(std::move(lower)));
 }
 
 std::vector<std::string> names_with_positions(const std::vector<std::string_view>& words) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "lamina/error.h"
+#include "lamina/file_ending.h"
 #include "points/line_reader.h"
 #include "points/number.h"
 #include "points/point_columns.h"
@@ -28,6 +29,12 @@ constexpr std::array kSignatures{
     Signature{"ASTM-E57",
               "is an E57 file, which is not read; convert it: CloudCompare -O FILE -C_EXPORT_FMT PLY -SAVE_CLOUDS, or "
               "pdal translate FILE.e57 FILE.las"},
+    Signature{"# vtk DataFile", "is a VTK file; write it as PLY in ParaView or CloudCompare"},
+    Signature{"CCB2",
+              "is a file of CloudCompare's own; write it as PLY: CloudCompare -O FILE -C_EXPORT_FMT PLY -SAVE_CLOUDS"},
+    Signature{"OCTM", "is an OpenCTM mesh; write it as PLY in MeshLab"},
+    Signature{"#VRML", "is a VRML scene; write it as PLY in MeshLab"},
+    Signature{"<?xml", "is XML, which holds no points known here; write them as PLY in MeshLab or ParaView"},
     Signature{"PK\x03\x04"sv, "is a zip archive; unpack it"},
     Signature{"\x28\xb5\x2f\xfd"sv, "is compressed with zstd; unpack it, or pipe it in: zstdcat FILE | lamina ... -"},
     Signature{"\xFF\xFE", "is text in UTF-16; save it as UTF-8: iconv -f UTF-16 -t UTF-8 FILE > OTHER"},
@@ -48,14 +55,6 @@ constexpr std::string_view kKnown = "PLY, OBJ, XYZ, PTS, ASC, CSV, PWN, PTX, PCD
 constexpr std::array kTextEndings{".xyz"sv, ".pts"sv,  ".asc"sv,    ".csv"sv, ".pwn"sv, ".txt"sv,
                                   ".neu"sv, ".xyzn"sv, ".xyzrgb"sv, ".3d"sv,  ".dat"sv};
 constexpr std::array kOtherEndings{".ply"sv, ".obj"sv, ".ptx"sv, ".pcd"sv, ".las"sv};
-
-std::string ending_of(std::string_view name) {
-  std::string lower;
-  for (const char c : name) lower += c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  if (lower.ends_with(".gz")) lower.resize(lower.size() - 3);
-  const std::size_t dot = lower.find_last_of("./");
-  return dot == std::string::npos || lower[dot] == '/' ? "" : lower.substr(dot);
-}
 
 template <class Endings>
 bool is_one_of(const Endings& endings, const std::string& ending) {
@@ -168,7 +167,7 @@ bool is_scan_list(std::string_view start) {
 }
 
 bool has_point_ending(std::string_view name) {
-  const std::string ending = ending_of(name);
+  const std::string ending = packed_ending(name);
   return is_one_of(kTextEndings, ending) || is_one_of(kOtherEndings, ending);
 }
 
@@ -195,7 +194,7 @@ PointFormat detect_format(std::string_view start, const std::string& name) {
     const bool something = lines.next(words);
     if (something && is_obj_keyword(words[0])) return PointFormat::obj;
     if (is_columns(text)) return PointFormat::text;
-    const std::string ending = ending_of(name);
+    const std::string ending = packed_ending(name);
     if (ending == ".obj") return PointFormat::obj;
     if (is_one_of(kTextEndings, ending) && !is_scan_list(text)) return PointFormat::text;
   } else if (!refused && is_pcd(start.substr(0, std::min(start.find('\0'), start.size())))) {

@@ -9,6 +9,7 @@
 
 #include "attributes/ply_type.h"
 #include "lamina/error.h"
+#include "lamina/file_ending.h"
 #include "points/row_parser.h"
 #include "points/text_sample.h"
 
@@ -77,19 +78,40 @@ Triple kind_of_triple(const TextSample& sample, std::size_t at) {
   return !whole && high <= 1 ? Triple::unit_colour : Triple::none;
 }
 
+/// Whether the first column numbers the points: it counts by one, before coordinates that are no whole numbers.
+bool is_numbered(const TextSample& sample) {
+  constexpr std::size_t kLeastRows = 3;
+  constexpr std::size_t kHead = 100;  // rows further on may come from elsewhere in the file
+  if (sample.columns < 4 || sample.values.size() < kLeastRows || !sample.is_whole[0]) return false;
+  if (sample.is_whole[1] || sample.is_whole[2] || sample.is_whole[3]) return false;
+  for (std::size_t i = 1; i < std::min(kHead, sample.values.size()); ++i)
+    if (sample.values[i][0] != sample.values[i - 1][0] + 1) return false;
+  return true;
+}
+
+/// What Open3D's endings say of the columns behind x y z.
+Triple kind_of_ending(const std::string& file) {
+  const std::string ending = packed_ending(file);
+  return ending == ".xyzn" ? Triple::normal : ending == ".xyzrgb" ? Triple::unit_colour : Triple::none;
+}
+
 /// Names for columns that nobody has named.
-std::vector<std::string> guess_names(const TextSample& sample) {
+std::vector<std::string> guess_names(const TextSample& sample, const std::string& file) {
   std::vector<std::string> names{"x", "y", "z"};
+  if (is_numbered(sample)) names.insert(names.begin(), std::string(kSkip));
+  const std::size_t first = names.size();
+  const Triple told = sample.columns == 6 ? kind_of_ending(file) : Triple::none;
   bool normals = false;
   bool colours = false;
   bool intensity = false;
   std::size_t others = 0;
   // Leica's order, with an intensity that may look like a colour.
-  const bool intensity_first = sample.columns == 7 && kind_of_triple(sample, 4) == Triple::whole_colour &&
-                               (sample.counted || kind_of_triple(sample, 3) != Triple::whole_colour);
-  for (std::size_t c = 3; c < sample.columns;) {
-    const bool three = c + 3 <= sample.columns && !(intensity_first && c == 3);
-    const Triple kind = three ? kind_of_triple(sample, c) : Triple::none;
+  const bool intensity_first = sample.columns == first + 4 &&
+                               kind_of_triple(sample, first + 1) == Triple::whole_colour &&
+                               (sample.counted || kind_of_triple(sample, first) != Triple::whole_colour);
+  for (std::size_t c = first; c < sample.columns;) {
+    const bool three = c + 3 <= sample.columns && !(intensity_first && c == first);
+    const Triple kind = !three ? Triple::none : told != Triple::none ? told : kind_of_triple(sample, c);
     if (kind == Triple::normal && !normals) {
       names.insert(names.end(), {"nx", "ny", "nz"});
       normals = true;
@@ -139,7 +161,7 @@ void require_columns(const std::string& told) {
 
 TextLayout understand_text(const InputFile& file, char line_end, const std::string& told, PointSourceInfo& info) {
   const std::vector<Told> wanted = told.empty() ? std::vector<Told>{} : parse_told(told);
-  TextSample sample = sample_text(file, line_end);
+  TextSample sample = sample_text(file, line_end, !wanted.empty());
   const std::size_t named = wanted.empty() ? sample.names.size() : wanted.size();
   if (sample.ends_open && named != sample.columns) --sample.columns;
   if (sample.columns < 3) {
@@ -156,13 +178,23 @@ TextLayout understand_text(const InputFile& file, char line_end, const std::stri
   layout.counted = sample.counted;
   layout.top_lines = sample.top_lines;
   const bool guessed = named == 0;
-  const std::vector<std::string> guesses = guessed ? guess_names(sample) : std::vector<std::string>{};
+  const std::vector<std::string> guesses = guessed ? guess_names(sample, file.name) : std::vector<std::string>{};
   for (std::size_t c = 0; c < sample.columns; ++c) {
     PointColumn column;
     column.name = guessed ? guesses[c] : !wanted.empty() ? wanted[c].name : sample.names[c];
     const bool axis = column.name == "x" || column.name == "y" || column.name == "z";
     const bool words = wanted.empty() && sample.is_word[c] && !axis;
     if (words || column.name == kSkip || column.name.empty()) column.role = Role::skipped;
+    const auto is_same = [&](const PointColumn& other) {
+      return other.role != Role::skipped && other.name == column.name;
+    };
+    if (wanted.empty() && column.role != Role::skipped &&
+        std::any_of(layout.columns.begin(), layout.columns.end(), is_same)) {
+      // CloudCompare writes normals twice when they are scalar fields as well.
+      column.role = Role::skipped;
+      info.remarks.push_back(fmt::format("{}: the second column {} is left out; --columns tells otherwise", file.name,
+                                         quoted_word(column.name)));
+    }
     if (words && !guessed && !column.name.empty())
       info.remarks.push_back(fmt::format("{}: column {} is left out: it holds words, or nothing in places", file.name,
                                          quoted_word(column.name)));
@@ -171,6 +203,7 @@ TextLayout understand_text(const InputFile& file, char line_end, const std::stri
   const ScalarType colours = colour_type(sample, layout.columns);
   for (std::size_t c = 0; c < layout.columns.size(); ++c) {
     PointColumn& column = layout.columns[c];
+    if (sample.is_long[c]) column.type = ScalarType::float64;
     if (is_colour(column.name)) column.type = colours;
     if (column.name == "x" || column.name == "y" || column.name == "z") {
       column.type = sample.long_numbers ? ScalarType::float64 : ScalarType::float32;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <initializer_list>
 #include <limits>
 #include <string_view>
@@ -62,7 +63,7 @@ bool begins_with_number(std::string_view line) {
 }
 
 /// Rows from the beginning; finds the header line and the count on the way.
-std::vector<Row> head_rows(const InputFile& file, char line_end, TextSample& sample) {
+std::vector<Row> head_rows(const InputFile& file, char line_end, bool named, TextSample& sample) {
   std::vector<Row> rows;
   LineReader lines(file, 0, 0, line_end);
   std::string_view line;
@@ -71,6 +72,10 @@ std::vector<Row> head_rows(const InputFile& file, char line_end, TextSample& sam
     if (rows.empty() && !sample.counted && (comment || !begins_with_number(line))) {
       if (std::vector<std::string> names = names_on(line); !names.empty()) {
         sample.names = std::move(names);
+        sample.top_lines = lines.line();
+        continue;
+      }
+      if (named && !comment && sample.top_lines == 0) {
         sample.top_lines = lines.line();
         continue;
       }
@@ -131,7 +136,10 @@ void require_numbers(const InputFile& file, const Row& row) {
   if (has({"lat", "latitude"}) && has({"lon", "long", "longitude"}))
     fail(file, row.line,
          "longitude and latitude are degrees; project them to metres first, for example with PDAL or QGIS");
-  fail(file, row.line, fmt::format("{} is no row of numbers; points need x y z", quoted_word(row.text)));
+  fail(file, row.line,
+       fmt::format("{} is no row of numbers; points need x y z; where it names the columns, name them in its place: "
+                   "--columns x,y,z,...",
+                   quoted_word(row.text)));
 }
 
 bool has_many_digits(std::string_view word) {
@@ -140,6 +148,8 @@ bool has_many_digits(std::string_view word) {
 }
 
 void take_row(const std::vector<std::string_view>& words, TextSample& sample) {
+  // From here on floats are more than 0.007 apart: a clock's digits, not a measurement's.
+  constexpr double kCoarse = 1 << 16;
   constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
   std::vector<double>& row = sample.values.emplace_back(words.size(), kNone);
   for (std::size_t c = 0; c < words.size(); ++c) {
@@ -149,7 +159,9 @@ void take_row(const std::vector<std::string_view>& words, TextSample& sample) {
     }
     const bool whole = !words[c].empty() && words[c].find_first_not_of("0123456789+-") == std::string_view::npos;
     sample.is_whole[c] = sample.is_whole[c] && whole;
-    sample.long_numbers = sample.long_numbers || has_many_digits(words[c]);
+    const bool many_digits = has_many_digits(words[c]);
+    sample.long_numbers = sample.long_numbers || many_digits;
+    sample.is_long[c] = sample.is_long[c] || (many_digits && std::abs(row[c]) >= kCoarse);
   }
 }
 
@@ -168,13 +180,14 @@ void take_others(const InputFile& file, char line_end, std::uint64_t offset, Tex
 
 }  // namespace
 
-TextSample sample_text(const InputFile& file, char line_end) {
+TextSample sample_text(const InputFile& file, char line_end, bool named) {
   TextSample sample;
-  std::vector<Row> rows = head_rows(file, line_end, sample);
+  std::vector<Row> rows = head_rows(file, line_end, named, sample);
   if (rows.empty() && !sample.names.empty()) {
     sample.columns = sample.names.size();
     sample.is_word.assign(sample.columns, false);
     sample.is_whole.assign(sample.columns, true);
+    sample.is_long.assign(sample.columns, false);
     return sample;
   }
   if (rows.empty()) {
@@ -191,6 +204,7 @@ TextSample sample_text(const InputFile& file, char line_end) {
       sample.columns = words.size();
       sample.is_word.assign(sample.columns, false);
       sample.is_whole.assign(sample.columns, true);
+      sample.is_long.assign(sample.columns, false);
     } else if (words.size() == 1 && sample.counted) {
       continue;  // the next block's count
     } else if (words.size() != sample.columns) {

@@ -19,10 +19,11 @@ struct TextSample {
   std::vector<std::vector<double>> values;  ///< rows looked at; NaN where no number stands
   std::vector<bool> is_word;                ///< per column: something that is no number stands there
   std::vector<bool> is_whole;               ///< per column: digits only
-  bool long_numbers = false;                ///< a coordinate with more digits than a float holds
+  std::vector<bool> is_long;  ///< per column: has numbers that a float would tell from others too coarsely
+  bool long_numbers = false;  ///< a coordinate with more digits than a float holds
 };
 
-/// Throws as understand_text does.
-TextSample sample_text(const InputFile& file, char line_end);
+/// Throws as understand_text does. With `named`, the user names the columns: a first line of words is passed over.
+TextSample sample_text(const InputFile& file, char line_end, bool named);
 
 }  // namespace lamina

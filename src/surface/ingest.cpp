@@ -61,9 +61,9 @@ class PiecePool {
 };
 
 /// Factor that brings the greatest quality to at most 1, so that sums of weights cannot overflow. A power of two: the
-/// surface does not depend on it.
+/// surface does not depend on it. 0 where every quality is 0, which tells no weights: MeshLab writes such.
 double quality_scale(const Survey& survey) {
-  if (!(survey.max_quality > 0)) return 1;
+  if (!(survey.max_quality > 0)) return 0;
   return std::exp2(-std::ceil(std::log2(double{survey.max_quality})));
 }
 
@@ -129,7 +129,7 @@ void to_local(Piece& piece, const AttributeLayout& layout, const Frame& frame, d
     if (!rows.radius.empty()) out.radius[n] = radius_in_steps(rows.radius[i] * radius);
     if (!rows.quality.empty()) {
       census.max_quality = std::max(census.max_quality, rows.quality[i]);
-      out.quality[n] = static_cast<float>(rows.quality[i] * quality_scale);
+      out.quality[n] = quality_scale > 0 ? static_cast<float>(rows.quality[i] * quality_scale) : 1.0F;
     }
     for (std::size_t c = 0; c < rows.attributes.size(); ++c) {
       out.attributes[c][n] = usable_attribute(rows.attributes[c][i]);
@@ -137,7 +137,8 @@ void to_local(Piece& piece, const AttributeLayout& layout, const Frame& frame, d
     ++n;
   }
   census.usable = n;
-  piece.within = farthest <= kMostSteps && census.max_quality * quality_scale <= kMostQuality;
+  const bool weighs = quality_scale > 0 ? census.max_quality * quality_scale <= kMostQuality : census.max_quality == 0;
+  piece.within = farthest <= kMostSteps && weighs;
   resize(out, rows, n);
   std::tie(piece.extent.x_min, piece.extent.x_max) = range_of(out.x);
   std::tie(piece.extent.y_min, piece.extent.y_max) = range_of(out.y);

@@ -242,11 +242,9 @@ void judge(const Census& c, const PointSourceInfo& source, BadSamples bad, const
                             path, source.count));
   if (c.usable == 0)
     throw Error(ExitCode::empty, fmt::format("{}: none of its {} samples is usable", path, source.count));
-  if (source.has_quality && !(c.max_quality > 0)) {
-    throw Error(ExitCode::empty, fmt::format("{}: the quality of every sample is 0, so none has a weight; leave the "
-                                             "property out or give it values above 0",
-                                             path));
-  }
+  if (source.has_quality && !(c.max_quality > 0))
+    run.warn(
+        fmt::format("{}: the {} of every sample is 0, which tells no weights; not used", path, source.quality_name));
   if (makes_a_frame(c)) return;
   const Eigen::Vector3d extent = c.high - c.low;
   if (!(extent.squaredNorm() > kLeastExtent * kLeastExtent)) {

@@ -180,6 +180,11 @@ TEST_F(PcdPoints, ColoursAsIntegersWithAlpha) {
     EXPECT_THAT(rows.attributes[2], ElementsAre(0x30));
     EXPECT_THAT(rows.attributes[3], ElementsAre(0x80));
   }
+  // The same bits as a signed integer.
+  EXPECT_THAT(
+      all_rows(file("FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F I\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2 3 -5378645\n"))
+          .attributes[0],
+      ElementsAre(173));
   // The way old files print a packed float: as the integer it stands for.
   const SampleBatch rows =
       all_rows(file("FIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2 3 4.2108e+06\n"));

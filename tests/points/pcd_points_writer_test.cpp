@@ -43,5 +43,17 @@ TEST(PcdPointsWriter, EightBitColoursArePackedAsThePointCloudLibraryDoes) {
               back.attributes[3] == rows.attributes[3]);
 }
 
+TEST(PcdPointsWriter, SixteenBitColoursArePackedInEight) {
+  const test::TemporaryFolder folder;
+  const PointColumns columns{
+      .attributes = {{"red", ScalarType::uint16}, {"green", ScalarType::uint16}, {"blue", ScalarType::uint16}}};
+  SampleBatch rows = test::random_rows(columns, 3, 3);
+  for (auto& channel : rows.attributes) channel = {0, 257 * 100 + 50, 65535};
+  test::write_rows(folder / "a.pcd", columns, rows);
+  EXPECT_THAT(test::read_file(folder / "a.pcd"), HasSubstr("FIELDS x y z rgb\n"));
+  for (const auto& channel : test::all_rows(folder / "a.pcd").attributes)
+    EXPECT_THAT(channel, ::testing::ElementsAre(0, 100, 255));
+}
+
 }  // namespace
 }  // namespace lamina

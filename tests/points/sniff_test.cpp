@@ -67,6 +67,8 @@ TEST(Sniff, NamesWhatItLooksLikeAndTheRemedy) {
                              "1\0 \0"sv),
               HasSubstr("iconv -f UTF-16"));
   EXPECT_THAT(refused_format("\xEF\xBB\xBFply\n"), HasSubstr("byte order mark"));
+  EXPECT_THAT(refused_format("# vtk DataFile Version 3.0\n"), HasSubstr("ParaView"));
+  EXPECT_THAT(refused_format("CCB2\3"), HasSubstr("-C_EXPORT_FMT PLY"));
   EXPECT_THAT(refused_format("OFF\n3 1 0\n"), HasSubstr("lamina convert FILE --vertices"));
   EXPECT_THAT(refused_format("camera 0 0 0 0 0 0 1\nbmesh a.ply 0 0 0 0 0 0 1\n"), HasSubstr("list of scans"));
 }

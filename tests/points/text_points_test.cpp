@@ -167,6 +167,61 @@ TEST_F(TextPoints, GuessesWhatUnnamedColumnsAreAndSaysSo) {
   EXPECT_THAT(open(pts)->info().remarks[0], HasSubstr("taken as x,y,z,intensity,red:uchar"));
 }
 
+TEST_F(TextPoints, APointsNumberIsNotItsX) {
+  const auto source = open("7 431001.7 5213003.7 303.5\n8 430999.4 5213003.1 303.25\n9 430999.8 5213003.3 303.8\n");
+  EXPECT_THAT(all_rows(*source).x, ElementsAre(431001.7, 430999.4, 430999.8));
+  EXPECT_THAT(all_rows(*source).z, ElementsAre(303.5, 303.25, 303.8));
+  EXPECT_THAT(source->info().attributes, IsEmpty());
+  EXPECT_THAT(source->info().remarks, ElementsAre(HasSubstr("taken as -,x,y,z")));
+  // Whole numbers all over may be a raster.
+  EXPECT_THAT(all_rows(*open("1 5 6 7\n2 5 6 7\n3 5 6 7\n")).x, ElementsAre(1, 2, 3));
+  EXPECT_THAT(all_rows(*open("1 5.5 6.5 7.5\n2 5.5 6.5 7.5\n4 5.5 6.5 7.5\n")).x, ElementsAre(1, 2, 4));
+}
+
+TEST_F(TextPoints, EndingsTellWhatNumbersDoNot) {
+  const auto open_as = [&](const char* name, const std::string& text) {
+    return open_points(test::write_file(folder_ / name, text), PointSettings{});
+  };
+  EXPECT_TRUE(open_as("cloud.xyzn", "1 2 3 0 0 2.5\n1 2 4 0 2 2\n")->info().has_normals);
+  const auto black = open_as("cloud.XYZRGB", "1 2 3 0 0 0\n1 2 4 0 0 0\n");
+  ASSERT_EQ(black->info().attributes.size(), 3U);
+  EXPECT_EQ(black->info().attributes[0].name, "red");
+}
+
+TEST_F(TextPoints, HeadersThatNobodyKnowsAreReplacedByTheUsers) {
+  const std::string text = "east side up amp\n1 2 3 4\n5 6 7 8\n";
+  EXPECT_THAT(refusal(text), AllOf(HasSubstr("line 1"), HasSubstr("--columns x,y,z")));
+  const auto source = open(text, "x,y,z,amp");
+  EXPECT_THAT(all_rows(*source).x, ElementsAre(1, 5));
+  EXPECT_THAT(all_rows(*source).attributes[0], ElementsAre(4, 8));
+  EXPECT_THAT(refusal("east side up amp\nin metres each -\n1 2 3 4\n", "x,y,z,amp"), HasSubstr("line 2"));
+}
+
+TEST_F(TextPoints, HeadersMayTellUnitsAndPlacesInArrays) {
+  for (const char* text : {"X[m],Y[m],Z[m],RGB:0,RGB:1,RGB:2\n1,2,3,10,20,30\n",
+                           "X (m),Y (m),Z (m),R,G,B\n1,2,3,10,20,30\n", "P[x],P[y],P[z],r,g,b\n1,2,3,10,20,30\n"}) {
+    const auto source = open(text);
+    EXPECT_THAT(all_rows(*source).z, ElementsAre(3)) << text;
+    ASSERT_EQ(source->info().attributes.size(), 3U) << text;
+    EXPECT_EQ(source->info().attributes[2], (AttributeSpec{"blue", ScalarType::uint8})) << text;
+  }
+}
+
+TEST_F(TextPoints, ASecondColumnOfANameIsLeftOutAndSaidSo) {
+  const auto source = open("//X Y Z Nx Ny Nz Dip Nx Ny Nz\n1 2 3 0 0 1 0 0.5 0.5 0.5\n");
+  EXPECT_THAT(all_rows(*source).nz, ElementsAre(1));
+  EXPECT_EQ(source->info().remarks.size(), 3U);
+  EXPECT_THAT(source->info().remarks[0], HasSubstr("second column 'nx'"));
+  EXPECT_THAT(refusal("1 2 3 4 5\n", "x,y,z,a,a"), HasSubstr("there twice"));
+}
+
+TEST_F(TextPoints, AttributesOfManyDigitsAreDoubles) {
+  const auto source = open("x,y,z,gps_time,amplitude\n1,2,3,312345678.123456,0.123456789\n");
+  EXPECT_EQ(source->info().attributes[0].type, ScalarType::float64);
+  EXPECT_EQ(source->info().attributes[1].type, ScalarType::float32);
+  EXPECT_THAT(all_rows(*source).exact[0], ElementsAre(312345678.123456));
+}
+
 TEST_F(TextPoints, AColourUnlikeThoseBeforeIsAnErrorNotAWrongPicture) {
   std::string text;
   for (int i = 0; i < 60'000; ++i) text += fmt::format("1 2 3 {} 5 6\n", i == 20'000 ? 256 : 50);

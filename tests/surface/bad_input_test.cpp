@@ -116,9 +116,6 @@ TEST_F(SurfaceBadInput, NoUsableSample) {
   cloud = test::sphere_cloud(10);
   for (Point3& n : cloud.normals) n = {0, 0, 0};
   expect_failure(ExitCode::empty, {"in.ply", "none of its 10 samples has a normal", "--normals auto"}, cloud);
-  cloud = test::sphere_cloud(10);
-  cloud.add_property("quality", ScalarType::float32, [](const Point3&) { return 0.0; });
-  expect_failure(ExitCode::empty, {"in.ply", "quality of every sample is 0"}, cloud);
 }
 
 TEST_F(SurfaceBadInput, CoordinatesTooLargeToSquare) {

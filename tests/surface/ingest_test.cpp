@@ -1,5 +1,6 @@
 #include "surface/ingest.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "surface/clouds.h"
@@ -119,6 +120,12 @@ TEST(Ingest, QualityIsBroughtBelowOneByAPowerOfTwo) {
     int exponent = 0;
     EXPECT_EQ(std::frexp(*high / static_cast<float>(largest), &exponent), 0.5F) << largest;
   }
+}
+
+TEST(Ingest, QualitiesThatAreAllZeroTellNoWeights) {
+  Cloud cloud = test::sphere_cloud(100);
+  cloud.add_property("quality", ScalarType::float32, [](const Point3&) { return 0.0; });
+  EXPECT_THAT(store(cloud).samples.quality, ::testing::Each(1.0F));
 }
 
 }  // namespace

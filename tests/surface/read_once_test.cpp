@@ -34,10 +34,11 @@ class ComputedRows final : public PointSource {
       out.x[i] = p[0];
       out.y[i] = p[1];
       out.z[i] = p[2];
-      out.quality[i] = first + i == best ? 1e30F : 1.0F;
+      out.quality[i] = first + i == best ? 1e30F : others;
     }
   }
   std::uint64_t best = kRows;  ///< row of enormous quality
+  float others = 1;            ///< quality of the other rows
 
  private:
   Row row_;
@@ -135,6 +136,15 @@ TEST(ReadOnce, EnormousQualitiesAreNoticed) {
     again.store.read(b, samples);
     for (const float q : samples.quality) ASSERT_LE(q, 1.0F);
   }
+}
+
+// Zeros alone tell no weights: with one quality above they do.
+TEST(ReadOnce, TheOnlyQualityAboveZeroIsNoticed) {
+  ComputedRows source(helix);
+  source.others = 0;
+  EXPECT_TRUE(read_by_part(source).ingested->complete);
+  source.best = 32'000;
+  EXPECT_FALSE(read_by_part(source).ingested->complete);
 }
 
 TEST(ReadOnce, NotWhereRowsComeInOneOrderOrMakeNoFrame) {
