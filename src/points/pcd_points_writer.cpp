@@ -9,7 +9,6 @@
 #include <optional>
 #include <set>
 #include <string_view>
-#include <utility>
 
 #include "files/record_writer.h"
 #include "lamina/error.h"
@@ -26,18 +25,20 @@ struct Channels {
 };
 using Colours = std::optional<Channels>;
 
-Colours colours_of(const AttributeLayout& layout) {
+Colours channels_of(const AttributeLayout& layout, ScalarType type, double scale) {
   constexpr std::array kNames{"red", "green", "blue"};
-  for (const auto& [type, scale] : {std::pair{ScalarType::uint8, 1.0}, std::pair{ScalarType::uint16, 1 / 257.0}}) {
-    Channels found{{}, scale};
-    const auto has = [&](std::size_t k) {
-      const auto at = std::find(layout.begin(), layout.end(), AttributeSpec{kNames.at(k), type});
-      found.at.at(k) = static_cast<std::size_t>(at - layout.begin());
-      return at != layout.end();
-    };
-    if (has(0) && has(1) && has(2)) return found;
+  Channels found{{}, scale};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const auto at = std::find(layout.begin(), layout.end(), AttributeSpec{kNames.at(k), type});
+    if (at == layout.end()) return std::nullopt;
+    found.at.at(k) = static_cast<std::size_t>(at - layout.begin());
   }
-  return std::nullopt;
+  return found;
+}
+
+Colours colours_of(const AttributeLayout& layout) {
+  const Colours bytes = channels_of(layout, ScalarType::uint8, 1);
+  return bytes ? bytes : channels_of(layout, ScalarType::uint16, 1 / 257.0);
 }
 
 bool is_one_of(const Channels& colours, std::size_t attribute) {
