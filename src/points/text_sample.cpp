@@ -62,6 +62,20 @@ bool begins_with_number(std::string_view line) {
   return false;
 }
 
+/// The words of a line whatever separates them.
+std::vector<std::string_view> words_of(std::string& line) {
+  std::replace_if(
+      line.begin(), line.end(), [](char c) { return c == ',' || c == ';'; }, ' ');
+  std::vector<std::string_view> words;
+  split_line(line, kBlanks, words);
+  return words;
+}
+
+bool has_position(const std::vector<std::string_view>& words) {
+  double ignored = 0;
+  return std::count_if(words.begin(), words.end(), [&](std::string_view w) { return is_number(w, ignored); }) >= 3;
+}
+
 /// Rows from the beginning; finds the header line and the count on the way.
 std::vector<Row> head_rows(const InputFile& file, char line_end, bool named, TextSample& sample) {
   std::vector<Row> rows;
@@ -75,7 +89,9 @@ std::vector<Row> head_rows(const InputFile& file, char line_end, bool named, Tex
         sample.top_lines = lines.line();
         continue;
       }
-      if (named && !comment && sample.top_lines == 0) {
+      // A row may begin with a word: "Station1 1 2 3".
+      std::string copy(line);
+      if (named && !comment && sample.top_lines == 0 && !has_position(words_of(copy))) {
         sample.top_lines = lines.line();
         continue;
       }
@@ -121,13 +137,9 @@ char separator_of(const InputFile& file, const std::vector<Row>& rows) {
 
 /// Prose is told from points by its first line.
 void require_numbers(const InputFile& file, const Row& row) {
-  std::vector<std::string_view> words;
   std::string line = row.text;
-  std::replace_if(
-      line.begin(), line.end(), [](char c) { return c == ',' || c == ';'; }, ' ');
-  split_line(line, kBlanks, words);
-  double ignored = 0;
-  if (std::count_if(words.begin(), words.end(), [&](std::string_view w) { return is_number(w, ignored); }) >= 3) return;
+  const std::vector<std::string_view> words = words_of(line);
+  if (has_position(words)) return;
   const auto has = [&](std::initializer_list<std::string_view> names) {
     return std::any_of(words.begin(), words.end(), [&](std::string_view word) {
       return std::find(names.begin(), names.end(), usual_name(word)) != names.end();

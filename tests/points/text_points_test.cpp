@@ -194,6 +194,7 @@ TEST_F(TextPoints, HeadersThatNobodyKnowsAreReplacedByTheUsers) {
   const auto source = open(text, "x,y,z,amp");
   EXPECT_THAT(all_rows(*source).x, ElementsAre(1, 5));
   EXPECT_THAT(all_rows(*source).attributes[0], ElementsAre(4, 8));
+  EXPECT_THAT(all_rows(*open("Station1 1 2 3\nStation2 4 5 6\n", "-,x,y,z")).x, ElementsAre(1, 4));
   EXPECT_THAT(refusal("east side up amp\nin metres each -\n1 2 3 4\n", "x,y,z,amp"), HasSubstr("line 2"));
 }
 
