@@ -32,6 +32,9 @@ EditReport edit_points(PointSource& source, PointsWriter& writer, const EditBatc
 /// Keeps the rows i with keep[i] != 0, in order.
 void keep_rows(SampleBatch& batch, const std::vector<std::uint8_t>& keep);
 
+/// Whether row i can be passed on: its position and radius are finite.
+bool is_finite_row(const SampleBatch& batch, std::size_t i);
+
 /// The pieces edit_points() is made of. Drops rows that cannot be written and replaces attribute values that are not
 /// finite; `written` is left at 0.
 EditReport clean_rows(SampleBatch& batch);

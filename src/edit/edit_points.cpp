@@ -12,11 +12,6 @@
 namespace lamina {
 namespace {
 
-bool is_finite_row(const SampleBatch& b, std::size_t i) {
-  const bool radius = b.radius.empty() || std::isfinite(b.radius[i]);
-  return radius && std::isfinite(b.x[i]) && std::isfinite(b.y[i]) && std::isfinite(b.z[i]);
-}
-
 template <class T>
 std::uint64_t replace_non_finite(std::vector<T>& values) {
   std::uint64_t replaced = 0;
@@ -50,6 +45,11 @@ void keep_values(std::vector<T>& values, const std::vector<std::uint8_t>& keep) 
 }
 
 }  // namespace
+
+bool is_finite_row(const SampleBatch& b, std::size_t i) {
+  const bool radius = b.radius.empty() || std::isfinite(b.radius[i]);
+  return radius && std::isfinite(b.x[i]) && std::isfinite(b.y[i]) && std::isfinite(b.z[i]);
+}
 
 EditReport clean_rows(SampleBatch& batch) {
   return clean_rows(batch, std::vector<std::uint8_t>(batch.size(), 1));

@@ -32,11 +32,6 @@ class RadiusBins {
   std::map<int, std::uint64_t> bins_;
 };
 
-bool is_finite_row(const SampleBatch& b, std::size_t i) {
-  const auto good = [&](const auto& column) { return column.empty() || std::isfinite(column[i]); };
-  return good(b.x) && good(b.y) && good(b.z) && good(b.radius);
-}
-
 std::vector<ColumnRange> results(const std::vector<RangeOf>& ranges) {
   std::vector<ColumnRange> out;
   out.reserve(ranges.size());

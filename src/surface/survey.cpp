@@ -243,8 +243,7 @@ void judge(const Census& c, const PointSourceInfo& source, BadSamples bad, const
   if (c.usable == 0)
     throw Error(ExitCode::empty, fmt::format("{}: none of its {} samples is usable", path, source.count));
   if (source.has_quality && !(c.max_quality > 0))
-    run.warn(
-        fmt::format("{}: the {} of every sample is 0, which tells no weights; not used", path, source.quality_name));
+    run.warn(fmt::format("{}: the quality of every sample is 0, which tells no weights; not used", path));
   if (makes_a_frame(c)) return;
   const Eigen::Vector3d extent = c.high - c.low;
   if (!(extent.squaredNorm() > kLeastExtent * kLeastExtent)) {
