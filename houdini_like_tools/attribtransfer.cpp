@@ -5,11 +5,12 @@
 #include <map>
 #include <memory>
 
-#include "console.h"
-#include "inputs.h"
+#include "common/console.h"
+#include "common/help.h"
+#include "common/inputs.h"
+#include "common/text.h"
 #include "lamina/attribute_transfer.h"
 #include "lamina/error.h"
-#include "text.h"
 #include "tool.h"
 
 namespace lamina::tools {

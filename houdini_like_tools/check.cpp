@@ -4,7 +4,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "inputs.h"
+#include "common/help.h"
+#include "common/inputs.h"
 #include "lamina/check.h"
 #include "lamina/error.h"
 #include "tool.h"

@@ -3,12 +3,14 @@
 
 #include <memory>
 
-#include "clean_options.h"
-#include "console.h"
-#include "inputs.h"
+#include "common/console.h"
+#include "common/help.h"
+#include "common/inputs.h"
+#include "common/outputs.h"
+#include "common/point_options.h"
+#include "common/text.h"
 #include "lamina/clean_points.h"
 #include "lamina/error.h"
-#include "text.h"
 #include "tool.h"
 
 namespace lamina::tools {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "option_table.h"
+#include "common/help.h"
 #include "tool.h"
 
 namespace lamina::tools {

@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <memory>
 
-#include "console.h"
-#include "inputs.h"
+#include "common/console.h"
+#include "common/help.h"
+#include "common/inputs.h"
+#include "common/outputs.h"
+#include "common/text.h"
 #include "lamina/edit_points.h"
 #include "lamina/error.h"
 #include "lamina/file_ending.h"
@@ -13,7 +16,6 @@
 #include "lamina/volume_info.h"
 #include "lamina/volume_level_set.h"
 #include "lamina/volume_points.h"
-#include "text.h"
 #include "tool.h"
 
 namespace lamina::tools {

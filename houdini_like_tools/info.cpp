@@ -7,10 +7,11 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "console.h"
-#include "inputs.h"
+#include "common/console.h"
+#include "common/help.h"
+#include "common/inputs.h"
+#include "common/text.h"
 #include "lamina/volume_info.h"
-#include "text.h"
 #include "tool.h"
 
 namespace lamina::tools {

@@ -1,7 +1,7 @@
 // The program: one sub-command per tool.
 #include <malloc.h>
 
-#include "command_line.h"
+#include "common/command_line.h"
 #include "tool.h"
 
 namespace {

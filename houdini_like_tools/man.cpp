@@ -8,10 +8,10 @@
 #include <string>
 #include <string_view>
 
+#include "common/help.h"
+#include "common/outputs.h"
 #include "lamina/error.h"
 #include "lamina/version.h"
-#include "option_table.h"
-#include "result_file.h"
 #include "tool.h"
 
 namespace lamina::tools {

@@ -8,13 +8,14 @@
 #include <memory>
 #include <optional>
 
-#include "console.h"
-#include "inputs.h"
+#include "common/console.h"
+#include "common/help.h"
+#include "common/inputs.h"
+#include "common/outputs.h"
+#include "common/text.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "lamina/volume_merge.h"
-#include "output_name.h"
-#include "text.h"
 #include "tool.h"
 
 namespace lamina::tools {

@@ -7,13 +7,14 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "console.h"
-#include "inputs.h"
+#include "common/console.h"
+#include "common/help.h"
+#include "common/inputs.h"
+#include "common/outputs.h"
+#include "common/point_options.h"
+#include "common/stats.h"
 #include "lamina/edit_points.h"
 #include "lamina/error.h"
-#include "normal_options.h"
-#include "result_file.h"
-#include "text.h"
 #include "tool.h"
 
 namespace lamina::tools {

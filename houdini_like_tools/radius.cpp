@@ -3,11 +3,13 @@
 
 #include <memory>
 
-#include "console.h"
-#include "inputs.h"
+#include "common/console.h"
+#include "common/help.h"
+#include "common/inputs.h"
+#include "common/outputs.h"
+#include "common/text.h"
 #include "lamina/error.h"
 #include "lamina/point_radii.h"
-#include "text.h"
 #include "tool.h"
 
 namespace lamina::tools {

@@ -7,11 +7,11 @@
 #include <filesystem>
 #include <memory>
 
-#include "console.h"
-#include "inputs.h"
-#include "model.h"
-#include "numbers.h"
-#include "output_name.h"
+#include "common/console.h"
+#include "common/help.h"
+#include "common/model.h"
+#include "common/option_values.h"
+#include "common/outputs.h"
 #include "tool.h"
 
 namespace lamina::tools {

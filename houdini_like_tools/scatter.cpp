@@ -3,7 +3,8 @@
 
 #include <memory>
 
-#include "inputs.h"
+#include "common/help.h"
+#include "common/inputs.h"
 #include "lamina/error.h"
 #include "lamina/scan.h"
 #include "lamina/scatter.h"

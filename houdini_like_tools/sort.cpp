@@ -6,14 +6,15 @@
 #include <string>
 #include <vector>
 
-#include "clean_options.h"
-#include "console.h"
-#include "inputs.h"
+#include "common/console.h"
+#include "common/help.h"
+#include "common/inputs.h"
+#include "common/outputs.h"
+#include "common/point_options.h"
+#include "common/text.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "lamina/sort_points.h"
-#include "normal_options.h"
-#include "text.h"
 #include "tool.h"
 
 namespace lamina::tools {

@@ -8,23 +8,19 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "clean_options.h"
-#include "console.h"
-#include "inputs.h"
+#include "common/console.h"
+#include "common/help.h"
+#include "common/inputs.h"
+#include "common/model.h"
+#include "common/option_values.h"
+#include "common/outputs.h"
+#include "common/parts.h"
+#include "common/point_options.h"
+#include "common/stats.h"
+#include "common/surface_options.h"
+#include "common/text.h"
 #include "lamina/error.h"
-#include "model.h"
-#include "normal_options.h"
-#include "output_name.h"
-#include "result_file.h"
-#include "surface_fit.h"
-#include "surface_holes.h"
-#include "surface_parts.h"
-#include "surface_ranks.h"
-#include "surface_stats.h"
-#include "surface_volume.h"
-#include "text.h"
 #include "tool.h"
-#include "words.h"
 
 namespace lamina::tools {
 namespace {

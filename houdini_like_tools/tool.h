@@ -5,7 +5,7 @@
 namespace lamina::tools {
 
 /// Adds the tool's sub-command to the program `app`: name, options in groups, and a callback that does the work.
-/// The callback throws lamina::Error; options shared by tools come from console.h.
+/// The callback throws lamina::Error; what tools share lies in common/.
 void add_surface(CLI::App& app);
 void add_scatter(CLI::App& app);
 void add_compare(CLI::App& app);

@@ -5,14 +5,15 @@
 
 #include <memory>
 
-#include "console.h"
-#include "inputs.h"
+#include "common/console.h"
+#include "common/help.h"
+#include "common/inputs.h"
+#include "common/option_values.h"
+#include "common/outputs.h"
+#include "common/text.h"
 #include "lamina/edit_points.h"
 #include "lamina/error.h"
 #include "lamina/volume_edit.h"
-#include "numbers.h"
-#include "output_name.h"
-#include "text.h"
 #include "tool.h"
 
 namespace lamina::tools {

@@ -1,4 +1,4 @@
-#include "command_line.h"
+#include "common/command_line.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -11,12 +11,12 @@
 #include <thread>
 #include <utility>
 
-#include "console.h"
+#include "common/console.h"
+#include "common/help.h"
+#include "common/text.h"
 #include "lamina/error.h"
 #include "lamina/ranks.h"
 #include "lamina/version.h"
-#include "option_table.h"
-#include "text.h"
 
 namespace lamina::tools {
 namespace {

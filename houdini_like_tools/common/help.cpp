@@ -1,4 +1,4 @@
-#include "option_table.h"
+#include "common/help.h"
 
 #include <algorithm>
 #include <string_view>
@@ -40,6 +40,10 @@ void read_value(const CLI::Option& option, OptionEntry& entry) {
 }
 
 }  // namespace
+
+void add_examples(CLI::App& tool, const std::string& lines) {
+  tool.footer("Examples:\n" + lines);
+}
 
 std::vector<OptionEntry> option_table(const CLI::App& tool) {
   std::vector<OptionEntry> table;

@@ -1,17 +1,17 @@
-#include "model.h"
+#include "common/model.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <utility>
 
+#include "common/point_models.h"
+#include "common/text.h"
 #include "lamina/error.h"
 #include "lamina/info.h"
 #include "lamina/volume_fog.h"
 #include "lamina/volume_info.h"
 #include "lamina/volume_points.h"
-#include "point_models.h"
-#include "text.h"
 
 namespace lamina::tools {
 namespace {

@@ -1,14 +1,29 @@
-// Options whose value is several numbers in one word, such as 1024x768 or 0.5,1,2.
+// The values that options take: one of a few words, a length, or several numbers in one word such as 1024x768 or
+// 0.5,1,2.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <cstddef>
 #include <functional>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "lamina/length.h"
+
 namespace lamina::tools {
+
+/// Takes the words of `map`, whatever their case, for its values.
+template <typename T>
+CLI::CheckedTransformer words(const std::map<std::string, T>& map) {
+  return CLI::CheckedTransformer(map, CLI::ignore_case);
+}
+
+/// The value of an option that takes a length (length.h); what cannot be read is a usage error naming the option.
+Length length_of(const std::string& option, const std::string& text);
+/// Adds an option that takes a length (length.h); what cannot be read is a usage error naming the option.
+CLI::Option* add_length(CLI::App& app, const std::string& names, Length& value, const std::string& description);
 
 /// Exactly `count` finite numbers between separators; nothing when the text is anything else.
 std::optional<std::vector<double>> read_numbers(std::string_view text, char separator, std::size_t count);

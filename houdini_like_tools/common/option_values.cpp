@@ -1,9 +1,11 @@
-#include "numbers.h"
+#include "common/option_values.h"
 
 #include <fmt/format.h>
 
 #include <charconv>
 #include <cmath>
+
+#include "lamina/error.h"
 
 namespace lamina::tools {
 namespace {
@@ -65,6 +67,23 @@ CLI::Option* add_number_or_auto(CLI::App& app, const std::string& name, const st
     take(number->front());
   };
   return app.add_option_function<std::string>(name, read, description)->option_text("FLOAT|auto [" + usual + "]");
+}
+
+Length length_of(const std::string& option, const std::string& text) {
+  try {
+    return parse_length(text);
+  } catch (const Error& e) {
+    throw CLI::ValidationError(option, e.what());
+  }
+}
+
+CLI::Option* add_length(CLI::App& app, const std::string& names, Length& value, const std::string& description) {
+  const std::string shown = names.substr(names.find_last_of(',') + 1);
+  return app
+      .add_option_function<std::string>(
+          names, [&value, shown](const std::string& text) { value = length_of(shown, text); }, description)
+      ->type_name("LENGTH")
+      ->default_str(to_string(value));
 }
 
 }  // namespace lamina::tools

@@ -1,4 +1,4 @@
-#include "output_name.h"
+#include "common/outputs.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

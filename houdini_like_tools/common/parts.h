@@ -1,10 +1,13 @@
-// What `lamina surface` can do beside running at once: one chunk of a farm's job, the list of its tasks, checkpoints.
+// `lamina surface` in parts: one chunk of a farm's job, the list of its tasks, checkpoints, and several processes that
+// mpirun started.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "lamina/chunk.h"
+#include "lamina/ranks.h"
 #include "lamina/run.h"
 #include "lamina/surface.h"
 
@@ -29,6 +32,12 @@ struct PartsResult {
 
 /// Runs as the options ask for.
 PartsResult run_parts(const SurfaceSettings& settings, const PartsOptions& options, const RunContext& context);
+
+/// Runs this process's share. Throws Error(usage) for options that several processes cannot meet together.
+RanksStats run_ranks(const SurfaceSettings& settings, const PartsOptions& parts, const RunContext& context);
+
+/// A line per rank, for the reader.
+void report_ranks(const std::vector<RankStats>& ranks, const RunContext& context);
 
 /// Prints the command lines that make `output` out of the store `input` in options.tasks chunks, with the options the
 /// tool was given. Throws Error(usage) for outputs that parts cannot lie beside.

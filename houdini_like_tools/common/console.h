@@ -1,4 +1,4 @@
-// What the tools share at the terminal: run options, progress, messages and cancelling.
+// The tools at the terminal: run options, progress, messages and cancelling.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <atomic>
@@ -10,7 +10,6 @@
 #include <string>
 #include <string_view>
 
-#include "lamina/length.h"
 #include "lamina/run.h"
 
 namespace lamina::tools {
@@ -36,15 +35,6 @@ const std::atomic<bool>& cancel_requested();
 /// From here on signals ask the running job to stop, so that it unwinds and its temporary files vanish. Writing into a
 /// closed pipe, or past the largest file the shell allows, becomes an error of the writer.
 void cancel_on_signals();
-
-/// `name`, or "-" where it stands for standard input or output with the format given by its ending: stdin.ply,
-/// stdout.ply. A file of that name is ./stdin.ply.
-std::string pipe_name(const std::string& name);
-
-/// The value of an option that takes a length (length.h); what cannot be read is a usage error naming the option.
-Length length_of(const std::string& option, const std::string& text);
-/// Adds an option that takes a length (length.h); what cannot be read is a usage error naming the option.
-CLI::Option* add_length(CLI::App& app, const std::string& names, Length& value, const std::string& description);
 
 /// Writes messages and progress to a stream. On a terminal progress is one line, rewritten at most ten times a second;
 /// elsewhere it is a plain line per stage and then one when five seconds or, past the first half second, ten per cent

@@ -1,13 +1,10 @@
-#include "normal_options.h"
+#include "common/point_options.h"
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
 #include <vector>
 
-#include "lamina/error.h"
-#include "numbers.h"
-#include "words.h"
+#include "common/option_values.h"
 
 namespace lamina::tools {
 namespace {
@@ -25,6 +22,37 @@ void take_viewpoint(NormalsSettings& settings, const std::string& text) {
 }
 
 }  // namespace
+
+void add_clean_options(CLI::App& app, CleanSettings& s, const std::string& group) {
+  add_numbers(app, "--clip", ',', 6, "X0,Y0,Z0,X1,Y1,Z1", "take only samples in this box, given by two corners",
+              [&s](const std::vector<double>& v) {
+                s.pick.clip = Box{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
+              })
+      ->group(group);
+  app.add_option("--every", s.pick.every, "take the first of so many samples")
+      ->type_name("N")
+      ->capture_default_str()
+      ->group(group);
+  app.add_option_function<double>(
+         "--merge", [&s](double length) { s.merge = length; },
+         "leave out samples within LENGTH of another that face the same way; 0: at the same place")
+      ->type_name("LENGTH")
+      ->group(group);
+  app.add_option("--outliers", s.sigma,
+                 "leave out samples whose mean distance to their neighbours lies more than so many standard deviations "
+                 "above the mean; 0: none")
+      ->type_name("T")
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--neighbours,--neighbors", s.neighbours, "neighbours that --outliers looks at")
+      ->type_name("N")
+      ->capture_default_str()
+      ->group(group);
+  app.add_option("--spacing", s.spacing, "thin out: no two samples nearer than LENGTH; 0: all")
+      ->type_name("LENGTH")
+      ->capture_default_str()
+      ->group(group);
+}
 
 void add_normals_choice(CLI::App& tool, NormalsChoice& normals, const std::string& group) {
   tool.add_option("--normals", normals,
@@ -60,25 +88,6 @@ void add_normals_options(CLI::App& tool, NormalsSettings& s, const std::string& 
               })
       ->group(group);
   tool.add_flag("--flip", s.flip, "turn all normals found or turned to the other side at the end")->group(group);
-}
-
-nlohmann::ordered_json normals_json(const NormalsReport& r) {
-  nlohmann::ordered_json j;
-  j["samples"] = r.samples;
-  j["estimated"] = r.estimated;
-  j["flipped"] = r.flipped;
-  j["without_normal"] = r.without;
-  j["sign_from"] = {
-      {"viewpoint", r.by_viewpoint}, {"given", r.by_given}, {"outside", r.by_outside}, {"outside_unsure", r.unsure}};
-  j["patches"] = r.patches;
-  j["components"] = r.components;
-  j["sign_conflicts"] = {
-      {"pairs", r.conflicts.pairs}, {"conflicts", r.conflicts.conflicts}, {"share", r.conflicts.share()}};
-  j["sign_conflicts"]["worst_slab"] = r.worst_slab();
-  auto& slabs = j["sign_conflicts"]["slabs"] = nlohmann::ordered_json::array();
-  for (const SignConflicts& slab : r.slabs)
-    slabs.push_back({{"pairs", slab.pairs}, {"conflicts", slab.conflicts}, {"share", slab.share()}});
-  return j;
 }
 
 }  // namespace lamina::tools

@@ -1,4 +1,4 @@
-#include "inputs.h"
+#include "common/inputs.h"
 
 #include <fmt/format.h>
 
@@ -6,19 +6,13 @@
 #include <map>
 #include <system_error>
 
+#include "common/text.h"
 #include "lamina/error.h"
-#include "text.h"
 
 namespace lamina::tools {
-void add_precision(CLI::App& app, Precision& precision) {
-  const std::map<std::string, Precision> words{
-      {"auto", Precision::automatic}, {"float", Precision::single_precision}, {"double", Precision::double_precision}};
-  app.add_option_function<std::string>(
-         "--precision", [&precision, words](const std::string& word) { precision = words.at(word); },
-         "Positions as float or double; auto: as in the input, double where float would lose detail [auto]")
-      ->check(CLI::IsMember({"auto", "float", "double"}).description(""))
-      ->type_name("auto|float|double")
-      ->group("Output");
+
+std::string pipe_name(const std::string& name) {
+  return name == "stdin.ply" || name == "stdout.ply" ? "-" : name;
 }
 
 void add_bad_samples(CLI::App& app, BadSamples& bad, const std::string& what) {
@@ -29,26 +23,6 @@ void add_bad_samples(CLI::App& app, BadSamples& bad, const std::string& what) {
       ->check(CLI::IsMember({"drop", "refuse"}).description(""))
       ->type_name("drop|refuse")
       ->group("Input");
-}
-
-void add_files(CLI::App& app, std::string& input, const std::string& input_formats, std::string& output,
-               const std::string& output_formats) {
-  app.add_option_function<std::string>(
-         "INPUT", [&input](const std::string& name) { input = pipe_name(name); },
-         input_formats + "; - for PLY on standard input")
-      ->required()
-      ->type_name("");
-  app.add_option_function<std::string>(
-         "-o,--output", [&output](const std::string& name) { output = pipe_name(name); },
-         output_formats + "; - for PLY on standard output")
-      ->required()
-      ->type_name("FILE")
-      ->group("Output");
-}
-
-PointColumns with_precision(PointColumns columns, Precision precision) {
-  if (precision != Precision::automatic) columns.double_positions = precision == Precision::double_precision;
-  return columns;
 }
 
 void add_columns(CLI::App& app, std::string& columns) {
@@ -67,12 +41,6 @@ std::unique_ptr<PointSource> open_point_input(const std::string& path, const std
 
 std::string shown_name(const std::string& path) {
   return path == "-" ? "standard input" : path;
-}
-
-std::string volume_text(std::string_view verb, const VolumeEditStats& stats) {
-  return fmt::format("{} {} grid{} of {} voxels{}, {}", verb, stats.grids, stats.grids == 1 ? "" : "s",
-                     count_text(stats.voxels), stats.points > 0 ? " and " + count_text(stats.points) + " points" : "",
-                     bytes_text(stats.bytes));
 }
 
 TriangleMesh read_mesh_input(const std::string& path, const RunContext& context, NonFinite non_finite) {
@@ -98,10 +66,6 @@ TriangleMesh read_mesh_input(const std::string& path, const RunContext& context,
                              count_text(dropped), dropped == 1 ? "vertex is" : "vertices are"));
   }
   return mesh;
-}
-
-void add_examples(CLI::App& tool, const std::string& lines) {
-  tool.footer("Examples:\n" + lines);
 }
 
 }  // namespace lamina::tools

@@ -1,4 +1,4 @@
-#include "surface_parts.h"
+#include "common/parts.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "common/text.h"
 #include "lamina/error.h"
-#include "text.h"
 
 namespace lamina::tools {
 namespace {
@@ -132,6 +132,28 @@ PartsResult run_parts(const SurfaceSettings& settings, const PartsOptions& optio
                            stats.first_slab + stats.slabs, stats.all_slabs, stats.overlap_slabs,
                            count_text(stats.samples), count_text(stats.surface.plan.samples)));
   return {stats.surface, stats};
+}
+
+RanksStats run_ranks(const SurfaceSettings& settings, const PartsOptions& parts, const RunContext& context) {
+  for (const auto& [given, option] :
+       {std::pair{parts.chunked, "--chunk"}, std::pair{!parts.checkpoint.directory.empty(), "--checkpoint"}}) {
+    if (given) {
+      throw Error(ExitCode::usage,
+                  fmt::format("{} and mpirun contradict each other: both share out the work; leave one away", option));
+    }
+  }
+  return reconstruct_ranks(settings, context);
+}
+
+void report_ranks(const std::vector<RankStats>& ranks, const RunContext& context) {
+  for (std::size_t r = 0; r < ranks.size(); ++r) {
+    const RankStats& s = ranks[r];
+    context.info(fmt::format(
+        "rank {}: read {}, held {} samples; {} slabs and {} beside them; {:.1f} s ({:.1f} s sweeping, {:.1f} s "
+        "waiting), {:.1f} s CPU, {:.0f} MB, {} sent",
+        r, count_text(s.rows_read), count_text(s.samples_held), s.slabs, s.overlap_slabs, s.seconds, s.sweeping,
+        s.waited, s.cpu, static_cast<double>(s.peak_memory) * 1e-6, bytes_text(s.sent)));
+  }
 }
 
 void print_tasks(const CLI::App& tool, const std::string& input, const std::string& output,

@@ -1,14 +1,14 @@
-#include "point_models.h"
+#include "common/point_models.h"
 
 #include <fmt/format.h>
 
 #include <utility>
 
-#include "inputs.h"
+#include "common/inputs.h"
+#include "common/text.h"
 #include "lamina/error.h"
 #include "lamina/info.h"
 #include "lamina/volume.h"
-#include "text.h"
 
 namespace lamina::tools {
 namespace {

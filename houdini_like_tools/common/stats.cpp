@@ -1,7 +1,4 @@
-#include "surface_stats.h"
-
-#include "normal_options.h"
-#include "surface_holes.h"
+#include "common/stats.h"
 
 namespace lamina::tools {
 namespace {
@@ -23,6 +20,66 @@ void add_cleaning(nlohmann::ordered_json& j, const SurfaceStats& s, const Surfac
 }
 
 }  // namespace
+
+nlohmann::ordered_json normals_json(const NormalsReport& r) {
+  nlohmann::ordered_json j;
+  j["samples"] = r.samples;
+  j["estimated"] = r.estimated;
+  j["flipped"] = r.flipped;
+  j["without_normal"] = r.without;
+  j["sign_from"] = {
+      {"viewpoint", r.by_viewpoint}, {"given", r.by_given}, {"outside", r.by_outside}, {"outside_unsure", r.unsure}};
+  j["patches"] = r.patches;
+  j["components"] = r.components;
+  j["sign_conflicts"] = {
+      {"pairs", r.conflicts.pairs}, {"conflicts", r.conflicts.conflicts}, {"share", r.conflicts.share()}};
+  j["sign_conflicts"]["worst_slab"] = r.worst_slab();
+  auto& slabs = j["sign_conflicts"]["slabs"] = nlohmann::ordered_json::array();
+  for (const SignConflicts& slab : r.slabs)
+    slabs.push_back({{"pairs", slab.pairs}, {"conflicts", slab.conflicts}, {"share", slab.share()}});
+  return j;
+}
+
+nlohmann::ordered_json holes_json(const HoleStats& h) {
+  nlohmann::ordered_json j{{"closed", h.closed},
+                           {"closed_edges", h.closed_edges},
+                           {"added_vertices", h.vertices},
+                           {"added_triangles", h.triangles},
+                           {"open", h.open},
+                           {"open_edges", h.open_edges},
+                           {"open_length", h.open_length}};
+  j["longest_open"] = nlohmann::ordered_json::array();
+  for (const OpenLoop& loop : h.longest) {
+    j["longest_open"].push_back({{"position", loop.position},
+                                 {"length", loop.length},
+                                 {"radii", loop.radii},
+                                 {"edges", loop.edges},
+                                 {"why", loop.reason}});
+  }
+  return j;
+}
+
+nlohmann::ordered_json ranks_json(const std::vector<RankStats>& ranks) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const RankStats& s : ranks) {
+    list.push_back({{"rows_read", s.rows_read},
+                    {"samples", s.samples},
+                    {"samples_held", s.samples_held},
+                    {"first_slab", s.first_slab},
+                    {"slabs", s.slabs},
+                    {"overlap_slabs", s.overlap_slabs},
+                    {"vertices", s.vertices},
+                    {"triangles", s.triangles},
+                    {"wall_seconds", s.seconds},
+                    {"cpu_seconds", s.cpu},
+                    {"sweep_seconds", s.sweeping},
+                    {"waited_seconds", s.waited},
+                    {"peak_memory_bytes", s.peak_memory},
+                    {"sent_bytes", s.sent},
+                    {"received_bytes", s.received}});
+  }
+  return list;
+}
 
 nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& settings) {
   nlohmann::ordered_json j;

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
+#include "common/model.h"
 #include "lamina/points.h"
 #include "lamina/volume_points.h"
-#include "model.h"
 
 namespace lamina::tools {
 

@@ -1,4 +1,4 @@
-#include "console.h"
+#include "common/console.h"
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -10,8 +10,8 @@
 #include <memory>
 #include <utility>
 
+#include "common/text.h"
 #include "lamina/error.h"
-#include "text.h"
 
 namespace lamina::tools {
 namespace {
@@ -127,27 +127,6 @@ void cancel_on_signals() {
   sigaction(SIGTERM, &action, nullptr);
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
-}
-
-std::string pipe_name(const std::string& name) {
-  return name == "stdin.ply" || name == "stdout.ply" ? "-" : name;
-}
-
-Length length_of(const std::string& option, const std::string& text) {
-  try {
-    return parse_length(text);
-  } catch (const Error& e) {
-    throw CLI::ValidationError(option, e.what());
-  }
-}
-
-CLI::Option* add_length(CLI::App& app, const std::string& names, Length& value, const std::string& description) {
-  const std::string shown = names.substr(names.find_last_of(',') + 1);
-  return app
-      .add_option_function<std::string>(
-          names, [&value, shown](const std::string& text) { value = length_of(shown, text); }, description)
-      ->type_name("LENGTH")
-      ->default_str(to_string(value));
 }
 
 Console::Console(Settings settings) : settings_(std::move(settings)) {

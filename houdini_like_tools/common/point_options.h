@@ -1,20 +1,22 @@
-// Options and statistics about normals that tools share.
+// Options for what happens to points before they are reconstructed, shared by the tools that can: cleaning, and
+// normals.
 #pragma once
 #include <CLI/CLI.hpp>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 
+#include "lamina/clean.h"
 #include "lamina/normals.h"
 #include "lamina/surface.h"
 
 namespace lamina::tools {
+
+/// --clip, --every, --merge, --outliers, --neighbours, --spacing.
+void add_clean_options(CLI::App& app, CleanSettings& settings, const std::string& group);
 
 /// --normals.
 void add_normals_choice(CLI::App& tool, NormalsChoice& normals, const std::string& group);
 
 /// --k, --radius, --viewpoint, --up, --flip.
 void add_normals_options(CLI::App& tool, NormalsSettings& settings, const std::string& group);
-
-nlohmann::ordered_json normals_json(const NormalsReport& report);
 
 }  // namespace lamina::tools

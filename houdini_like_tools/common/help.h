@@ -1,10 +1,14 @@
-// The options of a tool as data, read back from the parser: what completion and manual pages are made from.
+// A tool's help: the examples that end it, and its options as data, read back from the parser, from which completion,
+// manual pages and the reference are made.
 #pragma once
 #include <CLI/CLI.hpp>
 #include <string>
 #include <vector>
 
 namespace lamina::tools {
+
+/// What a tool's help ends with: command lines that work as they stand (the tests run them).
+void add_examples(CLI::App& tool, const std::string& lines);
 
 struct OptionEntry {
   std::vector<std::string> names;    ///< with their dashes, short ones first; a positional's own name
