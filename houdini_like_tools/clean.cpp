@@ -9,7 +9,7 @@
 #include "common/outputs.h"
 #include "common/point_options.h"
 #include "common/text.h"
-#include "lamina/clean_points.h"
+#include "lamina/clean.h"
 #include "lamina/error.h"
 #include "tool.h"
 

@@ -13,9 +13,8 @@
 #include "lamina/error.h"
 #include "lamina/file_ending.h"
 #include "lamina/volume.h"
-#include "lamina/volume_info.h"
-#include "lamina/volume_level_set.h"
 #include "lamina/volume_points.h"
+#include "lamina/volume_tools.h"
 #include "tool.h"
 
 namespace lamina::tools {

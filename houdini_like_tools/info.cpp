@@ -11,7 +11,7 @@
 #include "common/help.h"
 #include "common/inputs.h"
 #include "common/text.h"
-#include "lamina/volume_info.h"
+#include "lamina/volume_tools.h"
 #include "tool.h"
 
 namespace lamina::tools {

@@ -11,7 +11,7 @@
 #include "common/help.h"
 #include "common/outputs.h"
 #include "lamina/error.h"
-#include "lamina/version.h"
+#include "lamina/run.h"
 #include "tool.h"
 
 namespace lamina::tools {

@@ -15,7 +15,7 @@
 #include "common/text.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
-#include "lamina/volume_merge.h"
+#include "lamina/volume_tools.h"
 #include "tool.h"
 
 namespace lamina::tools {

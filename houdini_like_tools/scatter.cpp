@@ -6,7 +6,6 @@
 #include "common/help.h"
 #include "common/inputs.h"
 #include "lamina/error.h"
-#include "lamina/scan.h"
 #include "lamina/scatter.h"
 #include "tool.h"
 

@@ -13,7 +13,7 @@
 #include "common/text.h"
 #include "lamina/edit_points.h"
 #include "lamina/error.h"
-#include "lamina/volume_edit.h"
+#include "lamina/volume_tools.h"
 #include "tool.h"
 
 namespace lamina::tools {

@@ -16,7 +16,7 @@
 #include "common/text.h"
 #include "lamina/error.h"
 #include "lamina/ranks.h"
-#include "lamina/version.h"
+#include "lamina/run.h"
 
 namespace lamina::tools {
 namespace {

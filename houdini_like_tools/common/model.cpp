@@ -9,9 +9,9 @@
 #include "common/text.h"
 #include "lamina/error.h"
 #include "lamina/info.h"
-#include "lamina/volume_fog.h"
-#include "lamina/volume_info.h"
+#include "lamina/volume.h"
 #include "lamina/volume_points.h"
+#include "lamina/volume_tools.h"
 
 namespace lamina::tools {
 namespace {

@@ -4,7 +4,6 @@
 #include <optional>
 #include <string>
 
-#include "lamina/paint.h"
 #include "lamina/render.h"
 #include "lamina/run.h"
 

@@ -6,7 +6,7 @@
 #include <string_view>
 
 #include "lamina/points_writer.h"
-#include "lamina/volume_edit.h"
+#include "lamina/volume_tools.h"
 
 namespace lamina::tools {
 

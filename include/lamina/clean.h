@@ -6,15 +6,9 @@
 #include <string>
 
 #include "lamina/clip.h"
+#include "lamina/edit_points.h"
 
 namespace lamina {
-
-/// Rows that are taken from the input at all; the others are never stored.
-struct RowPick {
-  std::optional<Box> clip;  ///< faces included; input coordinates
-  std::uint64_t every = 1;  ///< >= 1: of so many rows the first
-  [[nodiscard]] bool takes_all() const { return !clip && every <= 1; }
-};
 
 /// The steps are done in this order, each on what the one before has left. Lengths are in the input's units.
 ///
@@ -49,5 +43,17 @@ void require_sane(const CleanSettings& settings);
 /// A line for the user, such as "3 duplicates merged, 17 outliers (mean distance above 0.012)"; empty when nothing was
 /// left out.
 std::string describe(const CleanCounts& counts);
+
+struct CleanReport {
+  CleanCounts counts;
+  EditReport rows;
+};
+
+/// Writes the source's rows that stay, in their order; values are the same bits as before. Needs the memory of
+/// write_point_radii() and a bit for each row; steps that look around need two to three passes over the input, and
+/// temporary files in run.tmp_dir (empty: the system's). Throws Error(usage) for settings out of range, Error(empty)
+/// when nothing usable is there, Error(budget) when the disk is full. Does not commit.
+CleanReport clean_points(PointSource& source, PointsWriter& writer, const CleanSettings& settings, BadSamples bad,
+                         const RunContext& run = {});
 
 }  // namespace lamina

@@ -20,6 +20,13 @@ struct Box {
   std::array<double, 3> low{}, high{};
 };
 
+/// Rows that are taken from the input at all; the others are never stored.
+struct RowPick {
+  std::optional<Box> clip;  ///< faces included; input coordinates
+  std::uint64_t every = 1;  ///< >= 1: of so many rows the first
+  [[nodiscard]] bool takes_all() const { return !clip && every <= 1; }
+};
+
 /// A convex region: the box, faces included, and all half spaces.
 struct ClipRegion {
   std::optional<Box> box;

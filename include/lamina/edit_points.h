@@ -8,7 +8,7 @@
 #include "lamina/points.h"
 #include "lamina/points_writer.h"
 #include "lamina/run.h"
-#include "lamina/surface.h"
+#include "lamina/sample.h"
 
 namespace lamina {
 

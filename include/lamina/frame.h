@@ -6,6 +6,11 @@
 
 namespace lamina {
 
+enum class FrameMode {
+  pca,   ///< sweep along the dominant axis of the covariance: smallest cross-section, least memory
+  axis,  ///< sweep along the input's longest axis: the lattice stays aligned with the input's axes
+};
+
 /// local = rotation * (world - origin) / step, rounded to integers; axis 2 (z) is the sweep axis.
 struct Frame {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();        ///< input coordinates, centre of the cloud's bounding box

@@ -6,9 +6,9 @@
 #include <optional>
 #include <vector>
 
-#include "lamina/bad_samples.h"
 #include "lamina/points.h"
 #include "lamina/run.h"
+#include "lamina/sample.h"
 
 namespace lamina {
 

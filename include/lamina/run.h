@@ -37,4 +37,7 @@ struct RunContext {
   }
 };
 
+/// "major.minor.patch"; the view ends with a null character.
+std::string_view version();
+
 }  // namespace lamina

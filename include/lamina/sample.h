@@ -21,4 +21,7 @@ struct SampleBatch {
   [[nodiscard]] std::size_t size() const { return x.size(); }
 };
 
+/// What a job does about samples it cannot use.
+enum class BadSamples { drop, refuse };
+
 }  // namespace lamina

@@ -6,21 +6,18 @@
 #include <string>
 #include <vector>
 
-#include "lamina/bad_samples.h"
 #include "lamina/clean.h"
-#include "lamina/cluster.h"
+#include "lamina/clustering.h"
+#include "lamina/frame.h"
 #include "lamina/holes.h"
 #include "lamina/length.h"
 #include "lamina/normals.h"
 #include "lamina/run.h"
+#include "lamina/sample.h"
 #include "lamina/volume_export.h"
 
 namespace lamina {
 
-enum class FrameMode {
-  pca,   ///< sweep along the dominant axis of the covariance: smallest cross-section, least memory
-  axis,  ///< sweep along the input's longest axis: the lattice stays aligned with the input's axes
-};
 enum class FitMode { plane, sphere };  ///< METHOD 3.2; algebraic sphere of Guennebaud & Gross 2007
 enum class NormalsChoice {
   file,       ///< the input's; an input without any is refused

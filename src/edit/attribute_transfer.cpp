@@ -10,10 +10,10 @@
 #include <limits>
 #include <optional>
 
+#include "base/with_threads.h"
 #include "edit/batch_pipe.h"
 #include "edit/point_tree.h"
 #include "lamina/error.h"
-#include "meshes/with_threads.h"
 
 namespace lamina {
 namespace {
@@ -186,7 +186,7 @@ TransferReport transfer_attributes(PointSource& points, TriangleMesh& mesh, cons
                                              points.info().path));
   }
   TransferReport report;
-  meshes::with_threads(run.threads, [&] { report = transfer(points, mesh, settings, run); });
+  with_threads(run.threads, [&] { report = transfer(points, mesh, settings, run); });
   return report;
 }
 

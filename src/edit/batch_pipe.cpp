@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <memory>
 
+#include "base/with_threads.h"
 #include "lamina/error.h"
-#include "meshes/with_threads.h"
 
 namespace lamina::edit {
 namespace {
@@ -42,7 +42,7 @@ void for_each_batch(PointSource& source, std::string_view stage, const RunContex
     take(*piece);
     if (run.progress) run.progress({stage, done, info.count, 0, 0});
   };
-  meshes::with_threads(run.threads, [&] {
+  with_threads(run.threads, [&] {
     tbb::parallel_pipeline(kInFlight, tbb::make_filter<void, Piece>(tbb::filter_mode::serial_in_order, begin) &
                                           tbb::make_filter<Piece, Piece>(tbb::filter_mode::parallel, middle) &
                                           tbb::make_filter<Piece, void>(tbb::filter_mode::serial_in_order, end));

@@ -8,11 +8,11 @@
 #include <cstdint>
 #include <unordered_map>
 
+#include "base/with_threads.h"
 #include "edit/compact.h"
 #include "lamina/edit_points.h"
 #include "lamina/error.h"
 #include "meshes/vec3.h"
-#include "meshes/with_threads.h"
 
 namespace lamina {
 namespace {
@@ -183,7 +183,7 @@ TriangleMesh clip_mesh(const TriangleMesh& mesh, const ClipRegion& region, Keep 
   require_sane(region);
   if (mesh.triangles.empty()) return clip_vertices(mesh, region, keep);
   Pieces pieces{mesh, std::vector<std::uint8_t>(mesh.triangles.size(), 1)};
-  meshes::with_threads(run.threads, [&] {
+  with_threads(run.threads, [&] {
     for (const HalfSpace& face : faces_of(region)) {
       if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
       cut_along(pieces, face, keep);

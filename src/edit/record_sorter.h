@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "files/background_writer.h"
-#include "slab_store/temp_file.h"
+#include "base/background_writer.h"
+#include "base/temp_file.h"
 
 namespace lamina::edit {
 

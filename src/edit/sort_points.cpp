@@ -9,11 +9,11 @@
 #include <cmath>
 #include <vector>
 
+#include "base/descriptor.h"
+#include "base/memory_limit.h"
 #include "edit/batch_pipe.h"
 #include "edit/extent.h"
 #include "edit/record_sorter.h"
-#include "files/descriptor.h"
-#include "ground/memory_limit.h"
 #include "lamina/error.h"
 #include "points/row_codec.h"
 

@@ -10,9 +10,9 @@
 #include <string>
 #include <string_view>
 
-#include "files/descriptor.h"
-#include "lamina/error.h"
+#include "base/descriptor.h"
 #include "lamina/file_ending.h"
+#include "lamina/error.h"
 #include "lamina/info.h"
 
 namespace lamina {

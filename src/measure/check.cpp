@@ -4,12 +4,12 @@
 #include <cmath>
 #include <vector>
 
+#include "base/with_threads.h"
 #include "lamina/error.h"
 #include "measure/duplicates.h"
 #include "measure/edge_table.h"
 #include "measure/union_find.h"
 #include "meshes/vec3.h"
-#include "meshes/with_threads.h"
 
 namespace lamina {
 namespace {
@@ -150,7 +150,7 @@ CheckReport check_mesh(const TriangleMesh& mesh, const RunContext& run) {
   if (mesh.triangles.size() > 0xFFFFFFFFu / 3)
     throw Error(ExitCode::unreadable, "check: meshes of more than 1,431,655,765 triangles are not supported");
   CheckReport report;
-  meshes::with_threads(run.threads, [&] { report = check(mesh); });
+  with_threads(run.threads, [&] { report = check(mesh); });
   return report;
 }
 

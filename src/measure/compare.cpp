@@ -6,11 +6,11 @@
 #include <cmath>
 #include <vector>
 
+#include "base/counter_rng.h"
+#include "base/with_threads.h"
 #include "lamina/error.h"
 #include "measure/triangle_bvh.h"
 #include "meshes/area_sampler.h"
-#include "meshes/counter_rng.h"
-#include "meshes/with_threads.h"
 
 namespace lamina {
 namespace {
@@ -107,7 +107,7 @@ CompareResult compare(const TriangleMesh& a, const TriangleMesh& b, const Compar
     throw Error(ExitCode::unreadable, "compare: neither side has triangles; one of the two must be a mesh");
   CompareResult result;
   result.diagonal = diagonal_of(b);
-  meshes::with_threads(run.threads, [&] {
+  with_threads(run.threads, [&] {
     if (!b.triangles.empty()) result.a_to_b = measure_side(a, b, settings, 0);
     if (!a.triangles.empty()) result.b_to_a = measure_side(b, a, settings, 1);
   });

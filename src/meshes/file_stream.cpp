@@ -6,7 +6,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "files/read_bytes.h"
+#include "base/read_bytes.h"
 #include "lamina/error.h"
 
 namespace lamina::meshes {

@@ -7,7 +7,7 @@
 #include <cstring>
 #include <limits>
 
-#include "files/read_bytes.h"
+#include "base/read_bytes.h"
 #include "lamina/error.h"
 #include "meshes/readers.h"
 #include "points/ply_header.h"

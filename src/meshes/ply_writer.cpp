@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "meshes/little_endian.h"
+#include "base/little_endian.h"
 
 namespace lamina::meshes {
 namespace {
@@ -72,7 +72,7 @@ bool fits_float(const TriangleMesh& mesh) {
   });
 }
 
-void write_ply(const TriangleMesh& mesh, OutputFile& out) {
+void write_ply(const TriangleMesh& mesh, ResultFile& out) {
   const bool as_float = fits_float(mesh);
   std::string bytes = fmt::format("ply\nformat binary_little_endian 1.0\nelement vertex {}\n", mesh.positions.size());
   for (const char* axis : {"x", "y", "z"})

@@ -1,7 +1,7 @@
 // Meshes to binary little-endian PLY.
 #pragma once
+#include "base/result_file.h"
 #include "lamina/mesh.h"
-#include "meshes/output_file.h"
 
 namespace lamina::meshes {
 
@@ -10,6 +10,6 @@ bool fits_float(const TriangleMesh& mesh);
 
 /// Positions as float where that loses nothing, else double; normals; attributes in their own types (rounded and
 /// clamped to them); faces as `list uchar int vertex_indices` (uint beyond 2^31 - 1 vertices).
-void write_ply(const TriangleMesh& mesh, OutputFile& out);
+void write_ply(const TriangleMesh& mesh, ResultFile& out);
 
 }  // namespace lamina::meshes

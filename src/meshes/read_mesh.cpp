@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "lamina/error.h"
 #include "lamina/file_ending.h"
+#include "lamina/error.h"
 #include "lamina/mesh.h"
 #include "meshes/readers.h"
 #include "points/line_reader.h"

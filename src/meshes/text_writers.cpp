@@ -6,8 +6,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "base/little_endian.h"
 #include "meshes/colours.h"
-#include "meshes/little_endian.h"
 #include "meshes/vec3.h"
 
 namespace lamina::meshes {
@@ -18,7 +18,7 @@ constexpr std::size_t kTextBytes = 1u << 20;
 /// Collects text and hands it on in large pieces.
 class Text {
  public:
-  explicit Text(OutputFile& out) : out_(out) {}
+  explicit Text(ResultFile& out) : out_(out) {}
   /// Numbers come in the shortest form that reads back as the same bits.
   template <class... Args>
   void add(fmt::format_string<Args...> format, Args&&... args) {
@@ -32,12 +32,12 @@ class Text {
   std::string bytes;
 
  private:
-  OutputFile& out_;
+  ResultFile& out_;
 };
 
 }  // namespace
 
-void write_obj(const TriangleMesh& mesh, OutputFile& out) {
+void write_obj(const TriangleMesh& mesh, ResultFile& out) {
   const auto colours = find_colours(mesh);
   Text text(out);
   for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
@@ -60,7 +60,7 @@ void write_obj(const TriangleMesh& mesh, OutputFile& out) {
   text.flush();
 }
 
-void write_off(const TriangleMesh& mesh, OutputFile& out) {
+void write_off(const TriangleMesh& mesh, ResultFile& out) {
   const auto colours = find_colours(mesh);
   Text text(out);
   text.add("{}{}OFF\n{} {} 0\n", colours ? "C" : "", mesh.normals.empty() ? "" : "N", mesh.positions.size(),
@@ -79,7 +79,7 @@ void write_off(const TriangleMesh& mesh, OutputFile& out) {
   text.flush();
 }
 
-void write_stl(const TriangleMesh& mesh, OutputFile& out) {
+void write_stl(const TriangleMesh& mesh, ResultFile& out) {
   std::string bytes = "binary STL";
   bytes.resize(80, ' ');
   put_little(bytes, static_cast<std::uint32_t>(mesh.triangles.size()));

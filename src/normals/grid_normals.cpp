@@ -9,7 +9,7 @@
 #include <span>
 #include <utility>
 
-#include "files/scratch_file.h"
+#include "base/scratch_file.h"
 #include "lamina/error.h"
 #include "normals/grid_faces.h"
 

@@ -10,7 +10,7 @@
 #include <optional>
 #include <utility>
 
-#include "lamina/floor_divide.h"
+#include "base/floor_divide.h"
 #include "normals/signed_forest.h"
 
 namespace lamina::normals {

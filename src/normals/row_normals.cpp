@@ -8,7 +8,7 @@
 
 #include "lamina/error.h"
 #include "normals/window_samples.h"
-#include "slab_store/unit_normal.h"
+#include "store/unit_normal.h"
 
 namespace lamina::normals {
 namespace {

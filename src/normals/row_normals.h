@@ -5,10 +5,10 @@
 #include <memory>
 #include <string>
 
+#include "base/temp_file.h"
 #include "edit/record_sorter.h"
 #include "lamina/points.h"
 #include "normals/patch_graph.h"
-#include "slab_store/temp_file.h"
 
 namespace lamina::normals {
 

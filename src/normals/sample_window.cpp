@@ -4,7 +4,7 @@
 #include <limits>
 #include <utility>
 
-#include "surface/numbered_rows.h"
+#include "store/numbered_rows.h"
 
 namespace lamina::normals {
 namespace {

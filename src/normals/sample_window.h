@@ -4,9 +4,9 @@
 #include <deque>
 #include <memory>
 
-#include "lamina/slab_store.h"
 #include "normals/sample_tree.h"
 #include "normals/window_samples.h"
+#include "store/slab_store.h"
 
 namespace lamina::normals {
 

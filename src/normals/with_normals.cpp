@@ -6,21 +6,21 @@
 #include <optional>
 #include <utility>
 
+#include "base/descriptor.h"
+#include "base/with_threads.h"
 #include "edit/record_sorter.h"
-#include "files/descriptor.h"
 #include "lamina/error.h"
 #include "lamina/normals.h"
-#include "lamina/radii.h"
-#include "meshes/with_threads.h"
 #include "normals/directions.h"
 #include "normals/grid_normals.h"
 #include "normals/patches.h"
 #include "normals/row_normals.h"
 #include "normals/sample_window.h"
 #include "normals/viewpoints.h"
-#include "surface/ingest.h"
-#include "surface/numbered_rows.h"
-#include "surface/survey.h"
+#include "samples/radii.h"
+#include "store/ingest.h"
+#include "store/numbered_rows.h"
+#include "store/survey.h"
 
 namespace lamina {
 namespace {
@@ -287,7 +287,7 @@ std::unique_ptr<PointSource> with_normals(std::unique_ptr<PointSource> source, c
   NormalsSettings search = settings;
   const std::uint64_t by_grid = take_grid_normals(source, search, run);
   std::unique_ptr<RowNormals> found;
-  meshes::with_threads(run.threads, [&] { found = Job(*source, search, report, run).work(); });
+  with_threads(run.threads, [&] { found = Job(*source, search, report, run).work(); });
   report.estimated += by_grid;
   report.by_viewpoint += by_grid;
   return give_normals(std::move(source), std::move(found));

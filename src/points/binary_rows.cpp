@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "files/read_bytes.h"
+#include "base/read_bytes.h"
 #include "lamina/error.h"
 #include "points/ply_columns.h"
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <utility>
 
-#include "files/descriptor.h"
+#include "base/descriptor.h"
 
 namespace lamina {
 

@@ -9,7 +9,7 @@
 
 #include "lamina/error.h"
 #include "points/las_records.h"
-#include "points/little_endian.h"
+#include "base/little_endian.h"
 
 namespace lamina {
 namespace {

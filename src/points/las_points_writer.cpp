@@ -8,7 +8,7 @@
 #include <limits>
 #include <memory>
 
-#include "files/record_writer.h"
+#include "base/record_writer.h"
 #include "lamina/error.h"
 #include "points/las_writer_layout.h"
 #include "points/row_codec.h"

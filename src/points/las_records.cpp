@@ -7,7 +7,7 @@
 #include <optional>
 #include <string_view>
 
-#include "points/little_endian.h"
+#include "base/little_endian.h"
 #include "points/point_columns.h"
 
 namespace lamina {

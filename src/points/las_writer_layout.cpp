@@ -9,7 +9,7 @@
 #include <set>
 
 #include "lamina/error.h"
-#include "lamina/version.h"
+#include "lamina/run.h"
 #include "points/las_header.h"
 
 namespace lamina {

@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <utility>
 
-#include "lamina/error.h"
 #include "lamina/file_ending.h"
+#include "lamina/error.h"
 #include "lamina/points_writer.h"
 #include "points/las_points_writer.h"
 #include "points/pcd_points_writer.h"

@@ -7,7 +7,7 @@
 
 #include "lamina/error.h"
 #include "points/binary_rows.h"
-#include "points/little_endian.h"
+#include "base/little_endian.h"
 #include "points/lzf.h"
 #include "points/pcd_ascii.h"
 #include "points/pcd_header.h"

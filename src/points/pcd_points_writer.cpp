@@ -10,7 +10,7 @@
 #include <set>
 #include <string_view>
 
-#include "files/record_writer.h"
+#include "base/record_writer.h"
 #include "lamina/error.h"
 #include "points/row_codec.h"
 #include "points/staged_rows.h"

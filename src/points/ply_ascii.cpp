@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "attributes/ply_type.h"
+#include "base/ply_type.h"
 #include "lamina/error.h"
 #include "points/line_reader.h"
 #include "points/number.h"

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <charconv>
 
-#include "attributes/ply_type.h"
+#include "base/ply_type.h"
 #include "lamina/error.h"
 
 namespace lamina {

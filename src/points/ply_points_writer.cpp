@@ -9,12 +9,12 @@
 #include <set>
 #include <string_view>
 
-#include "attributes/ply_type.h"
-#include "files/descriptor.h"
-#include "files/output_file.h"
-#include "files/record_writer.h"
+#include "base/descriptor.h"
+#include "base/output_file.h"
+#include "base/ply_type.h"
+#include "base/record_writer.h"
 #include "lamina/error.h"
-#include "lamina/version.h"
+#include "lamina/run.h"
 #include "points/row_codec.h"
 
 namespace lamina {

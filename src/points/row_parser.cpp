@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "attributes/ply_type.h"
+#include "base/ply_type.h"
 #include "lamina/error.h"
 #include "points/number.h"
 

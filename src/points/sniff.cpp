@@ -6,8 +6,8 @@
 #include <array>
 #include <vector>
 
-#include "lamina/error.h"
 #include "lamina/file_ending.h"
+#include "lamina/error.h"
 #include "points/line_reader.h"
 #include "points/number.h"
 #include "points/point_columns.h"

@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "files/output_file.h"
+#include "base/output_file.h"
 #include "lamina/points_writer.h"
 
 namespace lamina {

@@ -7,9 +7,9 @@
 #include <optional>
 #include <string_view>
 
-#include "attributes/ply_type.h"
-#include "lamina/error.h"
 #include "lamina/file_ending.h"
+#include "base/ply_type.h"
+#include "lamina/error.h"
 #include "points/row_parser.h"
 #include "points/text_sample.h"
 

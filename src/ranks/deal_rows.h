@@ -4,7 +4,7 @@
 
 #include "lamina/points.h"
 #include "ranks/ranks.h"
-#include "surface/ingest.h"
+#include "store/ingest.h"
 
 namespace lamina::ranks {
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "lamina/error.h"
-#include "slab_store/store_blocks.h"
+#include "store/store_blocks.h"
 
 namespace lamina::ranks {
 namespace {

@@ -3,9 +3,9 @@
 #include <string>
 #include <vector>
 
-#include "feed/sample_feed.h"
-#include "lamina/radii.h"
 #include "ranks/ranks.h"
+#include "samples/radii.h"
+#include "samples/sample_feed.h"
 
 namespace lamina::ranks {
 

@@ -6,7 +6,7 @@
 #include "lamina/frame.h"
 #include "lamina/points.h"
 #include "ranks/bytes.h"
-#include "surface/survey.h"
+#include "store/survey.h"
 
 namespace lamina::ranks {
 

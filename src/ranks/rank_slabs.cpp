@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <utility>
 
-#include "chunk/part_slabs.h"
-#include "holes/rim_bytes.h"
+#include "boundary/rim_bytes.h"
+#include "chunks/part_slabs.h"
 #include "lamina/error.h"
-#include "mesh_sink/records.h"
+#include "meshes/records.h"
 
 namespace lamina::ranks {
 namespace {

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "chunk/part_file.h"
-#include "holes/rim_finder.h"
-#include "surface/mesh_output.h"
+#include "boundary/rim_finder.h"
+#include "chunks/part_file.h"
+#include "reconstruct/mesh_output.h"
 
 namespace lamina::ranks {
 

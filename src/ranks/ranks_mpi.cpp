@@ -16,8 +16,8 @@
 #include <new>
 #include <thread>
 
-#include "files/descriptor.h"
-#include "files/output_file.h"
+#include "base/descriptor.h"
+#include "base/output_file.h"
 #include "lamina/error.h"
 #include "lamina/ranks.h"
 #include "ranks/ranks.h"

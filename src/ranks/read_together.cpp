@@ -12,8 +12,8 @@
 #include "points/sniff.h"
 #include "ranks/deal_rows.h"
 #include "ranks/packed_input.h"
-#include "slab_store/store_blocks.h"
-#include "surface/choose_normals.h"
+#include "reconstruct/choose_normals.h"
+#include "store/store_blocks.h"
 
 namespace lamina::ranks {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "ranks/ranks.h"
-#include "surface/sweep.h"
+#include "reconstruct/sweep.h"
 
 namespace lamina::ranks {
 

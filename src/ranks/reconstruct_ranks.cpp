@@ -6,9 +6,9 @@
 #include <cmath>
 #include <optional>
 
-#include "chunk/cuts.h"
-#include "chunk/job.h"
-#include "files/output_file.h"
+#include "base/output_file.h"
+#include "chunks/cuts.h"
+#include "chunks/job.h"
 #include "lamina/error.h"
 #include "lamina/ranks.h"
 #include "ranks/gather_store.h"
@@ -16,9 +16,9 @@
 #include "ranks/read_together.h"
 #include "ranks/sum_stats.h"
 #include "ranks/write_together.h"
-#include "surface/choose_support.h"
-#include "surface/kept_input.h"
-#include "surface/pipeline.h"
+#include "reconstruct/choose_support.h"
+#include "reconstruct/kept_input.h"
+#include "reconstruct/pipeline.h"
 
 namespace lamina::ranks {
 namespace {

@@ -7,14 +7,14 @@
 #include <limits>
 #include <optional>
 
-#include "chunk/merge_parts.h"
-#include "files/output_file.h"
-#include "holes/hole_closer.h"
-#include "holes/rim_bytes.h"
+#include "base/output_file.h"
+#include "boundary/hole_closer.h"
+#include "boundary/rim_bytes.h"
+#include "chunks/merge_parts.h"
 #include "lamina/error.h"
-#include "mesh_sink/mesh_header.h"
-#include "mesh_sink/records.h"
-#include "surface/sweep.h"
+#include "meshes/mesh_header.h"
+#include "meshes/records.h"
+#include "reconstruct/sweep.h"
 
 namespace lamina::ranks {
 namespace {

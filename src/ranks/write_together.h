@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "chunk/part_file.h"
+#include "chunks/part_file.h"
 #include "lamina/holes.h"
 #include "ranks/rank_slabs.h"
 #include "ranks/ranks.h"
-#include "surface/slab_span.h"
+#include "reconstruct/slab_span.h"
 
 namespace lamina::ranks {
 

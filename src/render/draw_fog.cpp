@@ -8,8 +8,8 @@
 #include "render/grid_colours.h"
 #include "render/ray_field.h"
 #include "render/shade.h"
+#include "vdb/grids.h"
 #include "volume/fog_data.h"
-#include "volume/grids.h"
 
 namespace lamina::render_detail {
 namespace {

@@ -8,9 +8,9 @@
 #include "render/grid_colours.h"
 #include "render/ray_field.h"
 #include "render/shade.h"
-#include "volume/grids.h"
+#include "vdb/grids.h"
+#include "vdb/vdb_file.h"
 #include "volume/level_set_data.h"
-#include "volume/vdb_file.h"
 
 namespace lamina::render_detail {
 namespace {

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "render/shade.h"
-#include "volume/grids.h"
+#include "vdb/grids.h"
 
 namespace lamina::render_detail {
 

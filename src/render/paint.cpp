@@ -1,4 +1,4 @@
-#include "lamina/paint.h"
+#include "lamina/render.h"
 
 #include <tbb/parallel_for.h>
 
@@ -7,9 +7,9 @@
 #include <limits>
 #include <string>
 
+#include "base/with_threads.h"
 #include "lamina/error.h"
 #include "measure/triangle_bvh.h"
-#include "meshes/with_threads.h"
 
 namespace lamina {
 namespace {
@@ -24,7 +24,7 @@ constexpr std::array<std::uint8_t, 3> kUnknown{128, 128, 128};
 std::vector<double> vertex_distances(const TriangleMesh& mesh, const TriangleMesh& truth, const RunContext& run) {
   if (truth.triangles.empty()) throw Error(ExitCode::unreadable, "the truth to measure from must be a mesh with faces");
   std::vector<double> distances(mesh.positions.size());
-  meshes::with_threads(run.threads, [&] {
+  with_threads(run.threads, [&] {
     const measure::TriangleBvh tree(truth);
     tbb::parallel_for(std::size_t{0}, distances.size(), [&](std::size_t i) {
       if (run.cancelled()) return;

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <limits>
 
+#include "base/with_threads.h"
 #include "lamina/error.h"
-#include "lamina/paint.h"
+#include "lamina/render.h"
 #include "measure/triangle_bvh.h"
-#include "meshes/with_threads.h"
 
 namespace lamina {
 
@@ -25,7 +25,7 @@ DistanceField::~DistanceField() = default;
 
 std::vector<double> DistanceField::of(const SampleBatch& points, const RunContext& run) const {
   std::vector<double> distances(points.size());
-  meshes::with_threads(run.threads, [&] {
+  with_threads(run.threads, [&] {
     tbb::parallel_for(std::size_t{0}, distances.size(), [&](std::size_t i) {
       const meshes::Vec3 p{points.x[i], points.y[i], points.z[i]};
       const bool finite = std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);

@@ -1,9 +1,9 @@
 #include <fmt/format.h>
 #include <png.h>
 
+#include "base/result_file.h"
 #include "lamina/error.h"
 #include "lamina/render.h"
-#include "meshes/output_file.h"
 
 namespace lamina {
 
@@ -20,7 +20,7 @@ void write_png(const Image& image, const std::string& path) {
     throw Error(ExitCode::internal, fmt::format("{}: the picture cannot be encoded: {}", path, header.message));
   }
   bytes.resize(size);
-  meshes::OutputFile file(path);
+  ResultFile file(path);
   file.write(bytes);
   file.commit();
 }

@@ -4,7 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include "render/view.h"
-#include "volume/grids.h"
+#include "vdb/grids.h"
 
 namespace lamina::render_detail {
 

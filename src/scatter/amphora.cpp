@@ -2,7 +2,7 @@
 #include <array>
 #include <cmath>
 
-#include "lamina/scan.h"
+#include "lamina/scatter.h"
 #include "meshes/vec3.h"
 #include "scatter/waves.h"
 

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "meshes/counter_rng.h"
+#include "base/counter_rng.h"
 #include "meshes/vec3.h"
 #include "scatter/attempt_seed.h"
 #include "scatter/shape_colour.h"

@@ -2,10 +2,10 @@
 #include <cmath>
 #include <optional>
 
+#include "base/counter_rng.h"
 #include "lamina/error.h"
 #include "lamina/scatter.h"
 #include "meshes/area_sampler.h"
-#include "meshes/counter_rng.h"
 #include "scatter/attempt_seed.h"
 #include "scatter/interpolate.h"
 

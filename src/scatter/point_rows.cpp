@@ -5,11 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "meshes/little_endian.h"
+#include "base/little_endian.h"
 
 namespace lamina::scatter_detail {
-
-using meshes::put_little;
 
 std::string ply_header(const RowLayout& layout, std::uint64_t count, const std::vector<std::string>& comments) {
   std::string h = "ply\nformat binary_little_endian 1.0\n";

@@ -1,4 +1,4 @@
-#include "lamina/scan.h"
+#include "lamina/scatter.h"
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -6,12 +6,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/counter_rng.h"
+#include "base/result_file.h"
+#include "base/with_threads.h"
 #include "lamina/error.h"
 #include "measure/triangle_bvh.h"
-#include "meshes/counter_rng.h"
-#include "meshes/output_file.h"
 #include "meshes/vec3.h"
-#include "meshes/with_threads.h"
 #include "scatter/interpolate.h"
 #include "scatter/point_rows.h"
 #include "scatter/waves.h"
@@ -142,7 +142,7 @@ ScanReport scan(const TriangleMesh& mesh, const ScanSettings& settings, const st
                 const RunContext& run) {
   require_sane(mesh, settings);
   ScanReport report;
-  meshes::with_threads(run.threads, [&] {
+  with_threads(run.threads, [&] {
     const Scanner scanner(mesh, settings);
     report.spacing = scanner.spacing_for(settings.count);
     const scatter_detail::RowLayout layout{false, scanner.has_colour(), true};
@@ -153,7 +153,7 @@ ScanReport scan(const TriangleMesh& mesh, const ScanSettings& settings, const st
           rows.add(s.position, s.normal, s.colour, s.confidence);
           ++report.samples;
         }
-    meshes::OutputFile out(path);
+    ResultFile out(path);
     out.write(scatter_detail::ply_header(layout, report.samples));
     out.write(rows.bytes());
     out.commit();

@@ -8,17 +8,15 @@
 #include <cmath>
 #include <limits>
 
+#include "base/counter_rng.h"
+#include "base/result_file.h"
+#include "base/with_threads.h"
 #include "lamina/error.h"
-#include "meshes/counter_rng.h"
-#include "meshes/output_file.h"
-#include "meshes/with_threads.h"
 #include "scatter/attempt_seed.h"
 #include "scatter/point_rows.h"
 
 namespace lamina {
 namespace {
-
-using meshes::CounterRng;
 
 constexpr std::uint64_t kChunk = 1u << 15;
 constexpr std::uint64_t kNoiseStream = 0x6E6F697365ull, kThinningStream = 0x7468696Eull;
@@ -102,7 +100,7 @@ ScatterReport scatter(const Surface& surface, const ScatterSettings& settings, c
   require_sane(settings);
   const Sampler sampler(surface, settings);
   const scatter_detail::RowLayout layout{settings.double_positions, settings.colours && surface.has_colour(), false};
-  meshes::OutputFile out(path);
+  ResultFile out(path);
   out.write(scatter_detail::ply_header(layout, settings.count));
 
   std::uint64_t next = 0;
@@ -122,7 +120,7 @@ ScatterReport scatter(const Surface& surface, const ScatterSettings& settings, c
     return rows;
   };
   const auto write = [&](const scatter_detail::RowPacker& rows) { out.write(rows.bytes()); };
-  meshes::with_threads(run.threads, [&] {
+  with_threads(run.threads, [&] {
     const auto in_flight = static_cast<std::size_t>(2 * tbb::this_task_arena::max_concurrency());
     tbb::parallel_pipeline(
         in_flight, tbb::make_filter<void, std::uint64_t>(tbb::filter_mode::serial_in_order, first_of_chunk) &

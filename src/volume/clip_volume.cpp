@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "lamina/error.h"
+#include "vdb/sign_tiles.h"
+#include "vdb/vdb_file.h"
 #include "volume/edited_grids.h"
-#include "volume/sign_tiles.h"
-#include "volume/vdb_file.h"
 
 namespace lamina {
 namespace {

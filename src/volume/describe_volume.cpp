@@ -1,12 +1,12 @@
-#include "lamina/volume_info.h"
+#include "lamina/volume_tools.h"
 
 #include <openvdb/points/PointCount.h>
 
 #include <algorithm>
 #include <map>
 
-#include "volume/point_grids.h"
-#include "volume/vdb_file.h"
+#include "vdb/point_grids.h"
+#include "vdb/vdb_file.h"
 
 namespace lamina {
 namespace {

@@ -4,12 +4,12 @@
 
 #include <utility>
 
+#include "base/with_threads.h"
 #include "lamina/error.h"
 #include "lamina/volume_points.h"
-#include "meshes/with_threads.h"
-#include "volume/point_grids.h"
-#include "volume/points_grid.h"
-#include "volume/vdb_file.h"
+#include "vdb/point_grids.h"
+#include "vdb/points_grid.h"
+#include "vdb/vdb_file.h"
 
 namespace lamina::volume {
 namespace {
@@ -60,7 +60,7 @@ VolumeEditStats edit_all(const std::string& input, const GridEdit& edit, const s
 VolumeEditStats edit_grids(const std::string& input, const GridEdit& edit, const std::string& output,
                            const RunContext& run) {
   VolumeEditStats stats;
-  meshes::with_threads(run.threads, [&] { stats = edit_all(input, edit, output, run); });
+  with_threads(run.threads, [&] { stats = edit_all(input, edit, output, run); });
   return stats;
 }
 

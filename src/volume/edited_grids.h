@@ -6,8 +6,8 @@
 
 #include "lamina/run.h"
 #include "lamina/sample.h"
-#include "lamina/volume_edit.h"
-#include "volume/grids.h"
+#include "lamina/volume_tools.h"
+#include "vdb/grids.h"
 
 namespace lamina::volume {
 

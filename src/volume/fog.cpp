@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/with_threads.h"
 #include "lamina/error.h"
-#include "meshes/with_threads.h"
+#include "vdb/vdb_file.h"
 #include "volume/level_set_data.h"
 #include "volume/open_inside.h"
-#include "volume/vdb_file.h"
 
 namespace lamina {
 
@@ -21,7 +21,7 @@ std::uint64_t write_fog(const LevelSet& level_set, const FogSettings& settings, 
   if (level_set.data().open) volume::empty_open_inside(*fog);
   const auto band = static_cast<float>(level_set.band());
   const float ramp = settings.ramp > 0 ? std::min(static_cast<float>(settings.ramp), band) : band;
-  meshes::with_threads(run.threads, [&] {
+  with_threads(run.threads, [&] {
     openvdb::tools::sdfToFogVolume(*fog, ramp);
     // Deeper than the ramp OpenVDB goes on rising.
     openvdb::tree::LeafManager<openvdb::FloatTree> leaves(fog->tree());

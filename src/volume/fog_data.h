@@ -1,8 +1,8 @@
 // What a FogVolume holds.
 #pragma once
 
-#include "lamina/volume_fog.h"
-#include "volume/grids.h"
+#include "lamina/volume.h"
+#include "vdb/grids.h"
 
 namespace lamina {
 

@@ -4,7 +4,7 @@
 #include "lamina/mesh.h"
 #include "lamina/run.h"
 #include "measure/triangle_bvh.h"
-#include "volume/grids.h"
+#include "vdb/grids.h"
 
 namespace lamina::volume {
 

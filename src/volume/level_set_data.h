@@ -1,8 +1,8 @@
 // What a LevelSet holds.
 #pragma once
 
-#include "lamina/volume_level_set.h"
-#include "volume/grids.h"
+#include "lamina/volume.h"
+#include "vdb/grids.h"
 
 namespace lamina {
 

@@ -1,4 +1,4 @@
-#include "lamina/volume_merge.h"
+#include "lamina/volume_tools.h"
 
 #include <fmt/format.h>
 #include <openvdb/tools/Composite.h>
@@ -7,13 +7,13 @@
 #include <cmath>
 #include <map>
 
+#include "base/with_threads.h"
 #include "lamina/error.h"
 #include "lamina/volume_points.h"
-#include "meshes/with_threads.h"
-#include "volume/point_grids.h"
-#include "volume/points_grid.h"
-#include "volume/sign_tiles.h"
-#include "volume/vdb_file.h"
+#include "vdb/point_grids.h"
+#include "vdb/points_grid.h"
+#include "vdb/sign_tiles.h"
+#include "vdb/vdb_file.h"
 
 namespace lamina {
 namespace {
@@ -169,7 +169,7 @@ VolumeMergeStats merge_volumes(const std::vector<std::string>& inputs, const std
                                const RunContext& run) {
   if (inputs.empty()) throw Error(ExitCode::usage, "name the .vdb files to merge");
   VolumeMergeStats stats;
-  meshes::with_threads(run.threads, [&] { stats = merge(inputs, output, run); });
+  with_threads(run.threads, [&] { stats = merge(inputs, output, run); });
   return stats;
 }
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "base/with_threads.h"
 #include "lamina/error.h"
-#include "meshes/with_threads.h"
 #include "volume/level_set_data.h"
 
 namespace lamina {
@@ -98,7 +98,7 @@ TriangleMesh mesh_level_set(const LevelSet& level_set, const MeshingSettings& se
                 fmt::format("--isovalue must lie inside the band: between -{0:g} and {0:g}", level_set.band()));
   }
   TriangleMesh mesh;
-  meshes::with_threads(run.threads, [&] { mesh = mesh_grid(*level_set.data().grid, settings); });
+  with_threads(run.threads, [&] { mesh = mesh_grid(*level_set.data().grid, settings); });
   if (mesh.triangles.empty()) {
     const std::string& path = level_set.data().path;
     throw Error(ExitCode::empty, fmt::format("{}{}grid {} has no surface at distance {:g}", path,

@@ -1,6 +1,6 @@
 // What lies behind an open surface, where nothing is known.
 #pragma once
-#include "volume/grids.h"
+#include "vdb/grids.h"
 
 namespace lamina::volume {
 

@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "lamina/error.h"
+#include "vdb/vdb_file.h"
 #include "volume/fog_data.h"
-#include "volume/vdb_file.h"
 
 namespace lamina {
 namespace {

@@ -6,8 +6,8 @@
 
 #include "lamina/error.h"
 #include "lamina/transform.h"
+#include "vdb/vdb_file.h"
 #include "volume/edited_grids.h"
-#include "volume/vdb_file.h"
 
 namespace lamina {
 namespace {

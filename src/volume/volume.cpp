@@ -5,15 +5,15 @@
 #include <algorithm>
 #include <cmath>
 
-#include "ground/memory_limit.h"
+#include "base/memory_limit.h"
+#include "base/result_file.h"
+#include "base/with_threads.h"
 #include "lamina/error.h"
 #include "measure/edge_table.h"
-#include "meshes/output_file.h"
 #include "meshes/vec3.h"
-#include "meshes/with_threads.h"
+#include "vdb/vdb_bytes.h"
+#include "vdb/vdb_file.h"
 #include "volume/level_set.h"
-#include "volume/vdb_bytes.h"
-#include "volume/vdb_file.h"
 
 namespace lamina {
 namespace {
@@ -181,7 +181,7 @@ VolumeStats convert(const TriangleMesh& mesh, const VolumeSettings& s, const std
   const auto transform = choose_transform(bounds, stats.voxel, s.band);
   if (s.half) check_half(stats.voxel, s.band, run);
   check_memory(mesh, bounds, s, stats.voxel, s.colours, run);
-  meshes::OutputFile out(path);  // an output that cannot be written is refused before the work
+  ResultFile out(path);  // an output that cannot be written is refused before the work
   stats.has_sign = decide_sign(s, edges.boundary, run);
 
   openvdb::initialize();
@@ -216,7 +216,7 @@ VolumeStats write_volume(const TriangleMesh& mesh, const VolumeSettings& setting
     throw Error(ExitCode::unreadable, "meshes of more than 715,827,882 triangles are not supported");
   check_indices(mesh);
   VolumeStats stats;
-  meshes::with_threads(run.threads, [&] { stats = convert(mesh, settings, path, run); });
+  with_threads(run.threads, [&] { stats = convert(mesh, settings, path, run); });
   return stats;
 }
 

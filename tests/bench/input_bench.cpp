@@ -4,9 +4,9 @@
 
 #include "bench/benches.h"
 #include "bench/measure.h"
-#include "lamina/radii.h"
 #include "lamina/scatter.h"
-#include "lamina/slab_store.h"
+#include "samples/radii.h"
+#include "store/slab_store.h"
 
 namespace lamina::bench {
 namespace {

@@ -6,8 +6,8 @@
 #include <cstdlib>
 #include <string_view>
 
+#include "base/temporary_folder.h"
 #include "bench/benches.h"
-#include "files/temporary_folder.h"
 
 int main(int argc, char** argv) {
   using namespace lamina;

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "surface/stopwatch.h"
+#include "reconstruct/stopwatch.h"
 
 namespace lamina::bench {
 

@@ -6,11 +6,11 @@
 #include <cstdio>
 #include <limits>
 
-#include "diffuse/diffuse.h"
-#include "project/finish.h"
-#include "refine/refine.h"
-#include "surface/final_vertices.h"
-#include "surface/slab_span.h"
+#include "mls/diffuse.h"
+#include "mls/finish.h"
+#include "octree/refine.h"
+#include "reconstruct/final_vertices.h"
+#include "reconstruct/slab_span.h"
 
 namespace lamina::bench {
 namespace {

@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "bench/scene.h"
-#include "extract/extract.h"
-#include "feed/sample_feed.h"
-#include "lamina/cluster.h"
-#include "project/project.h"
-#include "window/window.h"
+#include "clustering/cluster.h"
+#include "isosurface/extract.h"
+#include "mls/project.h"
+#include "octree/window.h"
+#include "samples/sample_feed.h"
 
 namespace lamina::bench {
 

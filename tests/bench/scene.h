@@ -5,8 +5,8 @@
 #include <string>
 
 #include "lamina/points.h"
-#include "surface/ingest.h"
-#include "surface/plan.h"
+#include "reconstruct/plan.h"
+#include "store/ingest.h"
 
 namespace lamina::bench {
 

@@ -2,7 +2,7 @@
 #include <cstdio>
 
 #include "lamina/length.h"
-#include "lamina/version.h"
+#include "lamina/run.h"
 
 int main() {
   const lamina::Length length = lamina::parse_length("0.5R");

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "files/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "lamina/error.h"
 
 namespace lamina::edit {

@@ -10,7 +10,7 @@
 #include <memory>
 #include <string>
 
-#include "files/descriptor.h"
+#include "base/descriptor.h"
 #include "lamina/error.h"
 #include "lamina/points.h"
 #include "points/input_file.h"

@@ -1,6 +1,6 @@
 // OpenVDB's reader behind our walk through the file. OpenVDB itself is not instrumented; what it asks for is: the
 // allocator's checks see every byte it writes past its arrays.
-#include "volume/vdb_file.h"
+#include "vdb/vdb_file.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "lamina/floor_divide.h"
+#include "base/floor_divide.h"
 
 #include <gtest/gtest.h>
 

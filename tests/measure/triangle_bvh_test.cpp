@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <limits>
 
+#include "base/counter_rng.h"
 #include "measure/point_triangle.h"
-#include "meshes/counter_rng.h"
 #include "meshes/mesh_files.h"
 
 namespace lamina::measure {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <optional>
 
-#include "files/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "normals/clouds.h"
 
 namespace lamina::normals {

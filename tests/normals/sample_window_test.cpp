@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <random>
 
-#include "files/temporary_folder.h"
+#include "base/temporary_folder.h"
 
 namespace lamina::normals {
 namespace {

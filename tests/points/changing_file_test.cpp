@@ -6,7 +6,7 @@
 
 #include <fstream>
 
-#include "files/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "lamina/error.h"
 #include "points/input_file.h"
 #include "support/program.h"

@@ -9,7 +9,7 @@
 #include <numbers>
 #include <random>
 
-#include "files/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "points/point_rows.h"
 
 namespace lamina {

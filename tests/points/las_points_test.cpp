@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <random>
 
-#include "files/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "points/point_rows.h"
 #include "support/paths.h"
 

@@ -9,7 +9,7 @@
 #include <random>
 #include <thread>
 
-#include "files/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "lamina/error.h"
 #include "lamina/points.h"
 #include "points/ply_files.h"

@@ -10,7 +10,7 @@
 #include <cstring>
 #include <random>
 
-#include "files/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "points/lzf.h"
 #include "points/point_rows.h"
 

@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "files/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "lamina/error.h"
 #include "lamina/points.h"
 

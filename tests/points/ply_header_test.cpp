@@ -5,7 +5,7 @@
 
 #include <sstream>
 
-#include "files/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "lamina/error.h"
 #include "lamina/points.h"
 

@@ -9,7 +9,7 @@
 #include <limits>
 #include <random>
 
-#include "files/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "lamina/error.h"
 #include "points/ply_files.h"
 

@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "files/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "points/point_rows.h"
 
 namespace lamina {

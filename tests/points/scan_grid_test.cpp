@@ -5,7 +5,7 @@
 
 #include <string>
 
-#include "files/temporary_folder.h"
+#include "base/temporary_folder.h"
 
 namespace lamina {
 namespace {

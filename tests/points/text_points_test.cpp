@@ -8,7 +8,7 @@
 #include <cmath>
 #include <random>
 
-#include "files/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "points/point_rows.h"
 
 namespace lamina {

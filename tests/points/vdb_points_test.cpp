@@ -6,7 +6,7 @@
 
 #include <filesystem>
 
-#include "files/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "lamina/volume_points.h"
 #include "points/point_rows.h"
 #include "support/paths.h"

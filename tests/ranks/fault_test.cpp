@@ -5,8 +5,8 @@
 
 #include "lamina/error.h"
 #include "ranks/launched.h"
+#include "reconstruct/clouds.h"
 #include "support/program.h"
-#include "surface/clouds.h"
 
 namespace lamina {
 namespace {

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 
 #include "ranks/launched.h"
+#include "reconstruct/clouds.h"
 #include "support/program.h"
-#include "surface/clouds.h"
 
 namespace lamina {
 namespace {

@@ -6,13 +6,13 @@
 
 #include "lamina/error.h"
 #include "lamina/render.h"
-#include "lamina/volume_fog.h"
+#include "lamina/volume.h"
 #include "render/draw.h"
 #include "render/shade.h"
 #include "support/program.h"
+#include "vdb/grids.h"
+#include "vdb/vdb_file.h"
 #include "volume/fog_data.h"
-#include "volume/grids.h"
-#include "volume/vdb_file.h"
 
 namespace lamina {
 namespace {

@@ -7,7 +7,7 @@
 
 #include "lamina/render.h"
 #include "render/draw.h"
-#include "volume/grids.h"
+#include "vdb/grids.h"
 #include "volume/level_set_data.h"
 
 namespace lamina {

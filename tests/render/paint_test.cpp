@@ -1,4 +1,4 @@
-#include "lamina/paint.h"
+#include "lamina/render.h"
 
 #include <gtest/gtest.h>
 

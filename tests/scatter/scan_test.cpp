@@ -1,4 +1,4 @@
-#include "lamina/scan.h"
+#include "lamina/scatter.h"
 
 #include <gtest/gtest.h>
 

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "window/window.h"
+#include "octree/window.h"
 
 namespace lamina::test {
 

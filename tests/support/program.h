@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "files/temporary_folder.h"
+#include "base/temporary_folder.h"
 #include "support/paths.h"
 
 namespace lamina::test {

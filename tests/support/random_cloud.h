@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "lamina/slab_store.h"
+#include "store/slab_store.h"
 
 namespace lamina::test {
 

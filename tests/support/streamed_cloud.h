@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "feed/sample_feed.h"
-#include "files/temporary_folder.h"
-#include "refine/refine.h"
-#include "window/window.h"
+#include "base/temporary_folder.h"
+#include "octree/refine.h"
+#include "octree/window.h"
+#include "samples/sample_feed.h"
 
 namespace lamina::test {
 

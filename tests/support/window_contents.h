@@ -5,7 +5,7 @@
 #include <set>
 #include <vector>
 
-#include "window/window.h"
+#include "octree/window.h"
 
 namespace lamina::test {
 

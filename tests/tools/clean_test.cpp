@@ -1,4 +1,4 @@
-#include "lamina/clean_points.h"
+#include "lamina/clean.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

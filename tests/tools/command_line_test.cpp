@@ -6,7 +6,7 @@
 #include <new>
 
 #include "lamina/error.h"
-#include "lamina/version.h"
+#include "lamina/run.h"
 #include "support/program.h"
 
 namespace lamina::tools {

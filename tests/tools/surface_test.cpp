@@ -10,8 +10,8 @@
 
 #include "lamina/mesh.h"
 #include "lamina/points.h"
+#include "reconstruct/clouds.h"
 #include "support/program.h"
-#include "surface/clouds.h"
 
 namespace lamina::tools {
 namespace {

@@ -9,14 +9,13 @@
 
 #include "lamina/error.h"
 #include "lamina/volume.h"
-#include "lamina/volume_info.h"
-#include "lamina/volume_level_set.h"
+#include "lamina/volume_tools.h"
+#include "reconstruct/clouds.h"
 #include "render/shapes.h"
 #include "support/mesh_check.h"
 #include "support/program.h"
-#include "surface/clouds.h"
-#include "volume/grids.h"
-#include "volume/vdb_file.h"
+#include "vdb/grids.h"
+#include "vdb/vdb_file.h"
 
 namespace lamina {
 namespace {

@@ -1,17 +1,16 @@
-#include "lamina/volume_merge.h"
+#include "lamina/volume_tools.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <openvdb/tools/LevelSetSphere.h>
 
 #include "lamina/error.h"
-#include "lamina/volume_info.h"
-#include "lamina/volume_level_set.h"
+#include "lamina/volume.h"
 #include "lamina/volume_points.h"
+#include "reconstruct/clouds.h"
 #include "support/program.h"
-#include "surface/clouds.h"
-#include "volume/grids.h"
-#include "volume/vdb_file.h"
+#include "vdb/grids.h"
+#include "vdb/vdb_file.h"
 
 namespace lamina {
 namespace {

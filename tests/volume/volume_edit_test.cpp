@@ -1,5 +1,5 @@
 // Volumes clipped and transformed, against what must be true of every voxel and point.
-#include "lamina/volume_edit.h"
+#include "lamina/volume_tools.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,8 +12,8 @@
 #include "lamina/transform.h"
 #include "lamina/volume_points.h"
 #include "support/program.h"
-#include "volume/grids.h"
-#include "volume/vdb_file.h"
+#include "vdb/grids.h"
+#include "vdb/vdb_file.h"
 
 namespace lamina {
 namespace {

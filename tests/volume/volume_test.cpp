@@ -14,7 +14,7 @@
 #include "measure/point_triangle.h"
 #include "render/shapes.h"
 #include "support/program.h"
-#include "volume/grids.h"
+#include "vdb/grids.h"
 
 namespace lamina {
 namespace {

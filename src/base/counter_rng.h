@@ -1,0 +1,28 @@
+// Random numbers as a function of (seed, sample, draw): any sample can be made on any thread, in any order.
+#pragma once
+#include <cstdint>
+
+namespace lamina {
+
+/// Counter-based generator: the counter goes twice through the finaliser of SplitMix64 (Steele, Lea, Flood 2014).
+class CounterRng {
+ public:
+  CounterRng(std::uint64_t seed, std::uint64_t sample) : key_(mix(mix(seed + kGolden) ^ (sample * kGolden))) {}
+  std::uint64_t bits() { return mix(key_ + ++draw_ * kGolden); }
+  /// Uniform in [0, 1), 53 bits.
+  double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
+  /// Uniform in [-1, 1).
+  double symmetric() { return 2 * uniform() - 1; }
+
+ private:
+  static constexpr std::uint64_t kGolden = 0x9E3779B97F4A7C15ull;
+  static std::uint64_t mix(std::uint64_t z) {
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9ull;
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EBull;
+    return z ^ (z >> 31);
+  }
+  std::uint64_t key_;
+  std::uint64_t draw_ = 0;
+};
+
+}  // namespace lamina

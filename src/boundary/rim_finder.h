@@ -1,0 +1,61 @@
+// Finds the rims of a mesh while it streams by.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "boundary/rim.h"
+#include "meshes/mesh_sink.h"
+
+namespace lamina::holes {
+
+/// Takes a mesh slab by slab; triangles name vertices of their slab and of the one before. Keeps the vertices of three
+/// slabs and the triangles of two.
+///
+/// Every vertex sums up, over its triangles, a hash of the next vertex less one of the vertex before: nothing remains
+/// where the triangles around it close. So only the few vertices of rims are looked at edge by edge.
+class RimFinder {
+ public:
+  using Triangles = std::vector<std::array<std::uint32_t, 3>>;
+
+  /// Of a whole mesh, whose vertices count from 0.
+  RimFinder() = default;
+  /// Of a part: triangles name its first vertex `first`, rims name it 0. `below`: the slab that it stands on, which is
+  /// of another part.
+  RimFinder(std::uint64_t first, const VertexBatch& below);
+
+  /// The next slab; adds to `out` what is known now: the rims of the slab before.
+  void add(const VertexBatch& vertices, const Triangles& triangles, RimPiece& out);
+  /// No more slabs come. `more`: those of another part follow.
+  void finish(bool more, RimPiece& out);
+
+ private:
+  struct Slab {
+    VertexBatch vertices;
+    std::uint64_t first = 0;  ///< number of the first vertex, as triangles name it
+    [[nodiscard]] std::uint64_t end() const { return first + vertices.size(); }
+  };
+  void slide(const VertexBatch& vertices, const Triangles& triangles);
+  void count(const Triangles& triangles);
+  void settle(bool loose, RimPiece& out);
+  void collect(const Triangles& triangles, const Slab& slab);
+  [[nodiscard]] bool open(std::uint64_t vertex) const { return turns_[vertex - base_] != 0; }
+  [[nodiscard]] std::array<double, 3> position(std::uint64_t vertex) const;
+  void put_vertices(const Slab& slab, RimPiece& out) const;
+
+  struct HalfEdge {
+    std::uint64_t low = 0, high = 0;
+    bool up = false;  ///< runs from low to high
+    std::array<std::uint32_t, 3> triangle{};
+  };
+
+  std::uint64_t origin_ = 0;          ///< number of the first vertex that is not `below`
+  std::array<Slab, 3> slabs_{};       ///< two before, the one before, the last
+  Triangles before_, last_;           ///< of the one before and of the last
+  std::vector<std::uint64_t> turns_;  ///< of the three slabs' vertices
+  std::uint64_t base_ = 0;            ///< vertex of turns_[0]
+  bool part_below_ = false;           ///< the slab before is another part's
+  std::vector<HalfEdge> found_;
+};
+
+}  // namespace lamina::holes

@@ -1,0 +1,57 @@
+#include "chunks/job.h"
+
+#include <fmt/format.h>
+
+#include "lamina/error.h"
+#include "lamina/run.h"
+#include "reconstruct/choose_normals.h"
+#include "samples/clean_ingested.h"
+
+namespace lamina {
+
+std::string mesh_settings(const SurfaceSettings& settings) {
+  // Every setting by name: one that is added must be dealt with here, or this does not compile. What follows `chord`
+  // does not change the mesh; names of files are not settings of it.
+  const auto& [input, more_inputs, columns, output, frame, bad_samples, normals, normal_search, radius_scale, density,
+               clean, max_radius, blend, refit, steps, step_tolerance, fit, diffuse, cell, levels, boundary, cluster,
+               chord, vertex_levels, vertex_curvature, close_holes, watertight, prune_triangles, prune_size, local,
+               window, dry_run, volume] = settings;
+  // Jobs of several runs refuse these: require_mesh_alone().
+  (void)prune_triangles, (void)prune_size, (void)local;
+  (void)input, (void)more_inputs, (void)output, (void)normals, (void)normal_search, (void)window, (void)dry_run;
+  const auto number = [](const std::optional<double>& v) { return v ? fmt::format("{}", *v) : "auto"; };
+  const std::string frame_word = frame             ? fmt::format("{}", static_cast<int>(*frame))
+                                 : volume.wanted() ? "grid"
+                                                   : "auto";
+  return fmt::format(
+      "columns {}\nframe {}\nbad_samples {}\nnormals {}\ncleaning {}\nparticlescale {}\ndensity {}\nmax_radius {}\n"
+      "blend {}\nrefit {}\nsteps {}\nstep_tolerance {}\nfit {}\ndiffuse {}\ncell {}\nlevels {}\nboundary {}\ncluster "
+      "{}\n"
+      "chord {}\nlevel {}\ncurvature {}\nclose_holes {}\nwatertight {}\n",
+      columns, frame_word, static_cast<int>(bad_samples), normals_words(settings), cleaning_words(clean), radius_scale,
+      density, to_string(max_radius), number(blend), number(refit), steps, step_tolerance, static_cast<int>(fit),
+      diffuse, cell ? to_string(*cell) : "auto", levels, boundary, static_cast<int>(cluster), chord, vertex_levels,
+      vertex_curvature, close_holes, watertight ? (*watertight ? "yes" : "no") : "auto");
+}
+
+std::uint64_t job_hash(const SurfaceSettings& settings, const std::string& input_id, const Resolved& resolved) {
+  const std::string text =
+      fmt::format("{}\n{}\n{}\nlattice {} {} radii {} {}\n", version(), input_id, mesh_settings(settings),
+                  resolved.lattice.cell, resolved.lattice.levels, resolved.radii.finest_cell, resolved.radii.levels);
+  std::uint64_t hash = 0xcbf29ce484222325U;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
+  return hash;
+}
+
+void require_mesh_alone(const SurfaceSettings& settings, const std::string& option) {
+  if (settings.volume.wanted()) {
+    throw Error(ExitCode::usage,
+                fmt::format("{} makes the mesh alone: leave --vdb and --vdb-points to a run of their own", option));
+  }
+  if (settings.prune_triangles > 0 || settings.prune_size.value > 0 || settings.local)
+    throw Error(ExitCode::usage,
+                fmt::format("{}: --prune, --prune-size and --local want the mesh from one run", option));
+  if (settings.dry_run) throw Error(ExitCode::usage, fmt::format("{} and --dry-run contradict each other", option));
+}
+
+}  // namespace lamina

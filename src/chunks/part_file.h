@@ -1,0 +1,103 @@
+// A part: the vertices and triangles of some slabs, to be joined with the parts before and after it.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/output_file.h"
+#include "boundary/rim.h"
+#include "meshes/mesh_sink.h"
+#include "reconstruct/slab_span.h"
+
+namespace lamina {
+
+/// What two parts must agree on at their border: the vertices of the slab below it.
+struct SlabMark {
+  std::uint64_t vertices = 0;
+  std::uint32_t checksum = 0;  ///< CRC-32 of their records
+  bool operator==(const SlabMark&) const = default;
+};
+
+struct PartInfo {
+  std::uint64_t job = 0;      ///< job_hash(): store and settings
+  int number = 1, count = 1;  ///< Chunk
+  SlabSpan span;
+  bool double_positions = false;
+  AttributeLayout attributes;
+  std::vector<std::string> comments;
+  HoleSettings holes;
+  std::uint64_t vertices = 0, triangles = 0;
+  SlabMark below;  ///< the slab before the first, as this part's run has it
+  SlabMark last;   ///< the last slab
+  [[nodiscard]] MeshSinkSettings layout() const { return {{}, {}, attributes, double_positions, comments}; }
+};
+
+/// Vertex numbers from the part's first vertex on; negative: of the slab before.
+using PartTriangle = std::array<std::int32_t, 3>;
+
+/// Writes slab after slab; keeps a megabyte. The file appears with commit().
+///
+/// Layout, little-endian: 16 bytes that name the format and its version; blocks of a slab's vertices (records of the
+/// final PLY), triangles (PartTriangle) or rims (rim_bytes.h, records of a byte), each as kind and count (8 bytes
+/// both), records, and their CRC-32; at the end the PartInfo as JSON, its length, its CRC-32, and 8 bytes that say that
+/// the file is complete.
+class PartWriter {
+ public:
+  /// Throws as OutputFile.
+  PartWriter(const std::string& path, const MeshSinkSettings& layout);
+  /// Throws Error(internal) for numbers that are not finite, Error(budget) when the disk is full.
+  void add(const VertexBatch& vertices, std::span<const PartTriangle> triangles);
+  /// What is known of the part's rims (RimFinder of a part).
+  void add(const holes::RimPiece& rims);
+  [[nodiscard]] std::uint64_t vertices() const { return vertices_; }
+  [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
+  [[nodiscard]] const SlabMark& last() const { return last_; }
+  /// `info`: counts and last are filled in.
+  void commit(PartInfo info);
+
+ private:
+  void put(const void* data, std::size_t bytes);
+  void begin_block(std::uint64_t kind, std::uint64_t count);
+  void flush();
+
+  OutputFile file_;
+  MeshSinkSettings layout_;
+  std::vector<std::byte> buffer_;
+  std::uint64_t written_ = 0, vertices_ = 0, triangles_ = 0;
+  std::vector<std::byte> packed_;
+  SlabMark last_;
+};
+
+/// The mark of vertices as a part would store them.
+SlabMark mark_of(const VertexBatch& vertices, const MeshSinkSettings& layout);
+
+/// Opens a complete part. Throws Error(unreadable) naming what is wrong with it.
+class PartReader {
+ public:
+  explicit PartReader(const std::string& path);
+  [[nodiscard]] const PartInfo& info() const { return info_; }
+  [[nodiscard]] const std::string& path() const { return path_; }
+  /// Hands over the vertices' records piece by piece, in order. Throws Error(unreadable) where bytes are damaged, in
+  /// the end: what was handed over before must not be used then.
+  void read_vertices(const std::function<void(std::span<const std::byte>)>& take) const;
+  void read_triangles(const std::function<void(std::span<const PartTriangle>)>& take) const;
+  /// All of them at once; in memory goes with the length of the rims.
+  [[nodiscard]] holes::RimPiece read_rims() const;
+
+ private:
+  void read_blocks(std::uint64_t kind, std::size_t record,
+                   const std::function<void(std::span<const std::byte>)>& take) const;
+  [[noreturn]] void refuse(const std::string& what) const;
+  void read(std::uint64_t offset, void* data, std::size_t bytes) const;
+
+  std::string path_;
+  Descriptor file_;
+  PartInfo info_;
+  std::uint64_t body_end_ = 0;
+};
+
+}  // namespace lamina

@@ -1,0 +1,182 @@
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+
+#include "chunks/checkpoint_folder.h"
+#include "chunks/cuts.h"
+#include "chunks/job.h"
+#include "chunks/new_folder.h"
+#include "chunks/part_slabs.h"
+#include "lamina/chunk.h"
+#include "lamina/error.h"
+#include "lamina/run.h"
+#include "reconstruct/choose_support.h"
+#include "reconstruct/kept_input.h"
+
+namespace lamina {
+namespace {
+
+/// A part at least for so many samples, some ten seconds' work.
+constexpr std::uint64_t kSamplesPerPart = 2'000'000;
+constexpr std::uint64_t kFewestParts = 4, kMostParts = 64;
+
+std::string describe_file(const std::string& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) throw Error(ExitCode::unreadable, fmt::format("{}: cannot be read", path));
+  return fmt::format("input {} of {} bytes, changed {}.{:09}\n", std::filesystem::absolute(path).string(),
+                     status.st_size, status.st_mtim.tv_sec, status.st_mtim.tv_nsec);
+}
+
+/// What a checkpoint is for: with anything else than this it is of no use.
+std::string describe_run(const SurfaceSettings& settings) {
+  std::string text = fmt::format("lamina {}\n{}", version(), mesh_settings(settings));
+  if (settings.more_inputs.empty() && is_kept_input(settings.input))
+    return text + describe_file(settings.input + "/store.json");
+  for (const PointInput& input : expand_inputs(input_names(settings))) {
+    if (input.path == "-") {
+      throw Error(ExitCode::usage,
+                  "standard input cannot be read again after a kill: give --checkpoint a file, or a "
+                  "store made by 'lamina sort - --store DIR'");
+    }
+    text += describe_file(input.path);
+    for (const auto& row : input.pose) {
+      if (input.posed) text += fmt::format("pose {} {} {} {}\n", row[0], row[1], row[2], row[3]);
+    }
+  }
+  return text;
+}
+
+/// The input as it lies in the checkpoint; read into it where it does not.
+SweepInput open_input(const SurfaceSettings& settings, const CheckpointFolder& folder, const RunContext& run,
+                      Stopwatch& watch, SurfaceStats& stats, std::string& id) {
+  if (settings.more_inputs.empty() && is_kept_input(settings.input)) {
+    id = kept_input_id(settings.input);
+    return open_kept_input(settings.input, settings);
+  }
+  if (!is_kept_input(folder.store())) {
+    NewFolder made(folder.store());
+    {
+      const SweepInput input = read_surface_input(settings, made.path(), /*keep=*/true, run, watch, stats);
+      watch.time("store", [&] { save_input(input, settings, made.path()); });
+    }
+    made.publish();
+  }
+  id = kept_input_id(folder.store());
+  SweepInput input = open_kept_input(folder.store(), settings);
+  input.info.path = settings.input;
+  return input;
+}
+
+/// Whether a part is there and whole; a damaged one is made again.
+bool is_done(const PartSlabs::Part& part, int count, std::uint64_t job, const RunContext& run) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(part.path, ignored)) return false;
+  try {
+    const PartInfo info = PartReader(part.path).info();
+    return info.job == job && info.count == count && info.number == part.number && info.span == part.span;
+  } catch (const Error& error) {
+    run.warn(fmt::format("{}; it is made again", error.what()));
+    return false;
+  }
+}
+
+class ResumableRun {
+ public:
+  ResumableRun(const SurfaceSettings& settings, const Checkpoint& checkpoint, const RunContext& run)
+      : settings_(settings), run_(run), folder_(checkpoint.directory, describe_run(settings), checkpoint.resume) {}
+
+  SurfaceStats finish() {
+    try {
+      reconstruct();
+      join();
+    } catch (const Error& error) {
+      // Nothing to go on with, or nothing that going on would change.
+      const bool useless = !any_part() && error.code() != ExitCode::internal;
+      if (useless || error.code() == ExitCode::empty) {
+        folder_.remove();
+      } else {
+        run_.info(fmt::format("{}: keeps what is done; the same command with --resume goes on", folder_.path()));
+      }
+      throw;
+    }
+    folder_.remove();
+    finish_stats(watch_, began_, stats_);
+    return stats_;
+  }
+
+ private:
+  void reconstruct() {
+    std::string id;
+    SweepInput input = open_input(settings_, folder_, run_, watch_, stats_, id);
+    const Resolved resolved = plan_surface(settings_, input, run_, watch_, Stopwatch::now().wall - began_.wall, stats_);
+    const SlabSpan all = all_slabs(resolved.lattice, input.ingested.extent);
+    const std::uint64_t total = input.ingested.store.total();
+    const auto count = static_cast<int>(std::clamp(total / kSamplesPerPart, kFewestParts, kMostParts));
+    const std::uint64_t job = job_hash(settings_, id, resolved);
+    const std::vector<SlabSpan> spans = cut(input.ingested.store, resolved.lattice, all, count);
+    std::vector<PartSlabs::Part> left;
+    int done = 0;
+    for (int number = 1; number <= count; ++number) {
+      const PartSlabs::Part part{number, spans[static_cast<std::size_t>(number - 1)], folder_.part(number)};
+      parts_.push_back(part.path);
+      if (left.empty() && is_done(part, count, job, run_)) {
+        ++done;
+      } else {
+        left.push_back(part);
+      }
+    }
+    if (folder_.resumed()) run_.info(fmt::format("{}: {} of {} parts are done", folder_.path(), done, count));
+    if (left.empty()) return;
+    const SlabSpan span{left.front().span.begin, all.end};
+    PartSlabs slabs(std::move(left), count, job, hole_settings(settings_, resolved.support),
+                    mesh_layout(settings_, input, resolved));
+    if (!span.empty()) sweep(settings_, input, resolved, span, slabs, nullptr, run_, watch_, stats_);
+    slabs.finish();
+  }
+
+  [[nodiscard]] bool any_part() const {
+    std::error_code ignored;
+    return std::any_of(parts_.begin(), parts_.end(),
+                       [&](const std::string& part) { return std::filesystem::exists(part, ignored); });
+  }
+
+  void join() {
+    try {
+      watch_.time("commit", [&] {
+        const MergedParts merged = merge_parts(parts_, settings_.output, run_);
+        stats_.vertices = merged.vertices;
+        stats_.triangles = merged.triangles;
+        stats_.holes = merged.holes;
+      });
+    } catch (const Error& error) {
+      if (error.code() != ExitCode::unreadable) throw;
+      throw Error(error.code(), fmt::format("{}; remove it and go on with --resume", error.what()));
+    }
+  }
+
+  const SurfaceSettings& settings_;
+  const RunContext& run_;
+  Stopwatch watch_;
+  Stopwatch::Moment began_ = Stopwatch::now();
+  SurfaceStats stats_;
+  CheckpointFolder folder_;
+  std::vector<std::string> parts_;
+};
+
+}  // namespace
+
+SurfaceStats reconstruct_resumable(const SurfaceSettings& settings, const Checkpoint& checkpoint,
+                                   const RunContext& run) {
+  check_settings(settings);
+  require_mesh_alone(settings, "--checkpoint");
+  require_two_files(settings);
+  { const OutputFile trial(settings.output, run.tmp_dir); }
+  SurfaceStats stats;
+  run_in_arena(run, [&] { stats = ResumableRun(settings, checkpoint, run).finish(); });
+  return stats;
+}
+
+}  // namespace lamina

@@ -1,0 +1,158 @@
+#include "clustering/hard.h"
+
+#include <algorithm>
+#include <atomic>
+#include <numeric>
+
+#include "clustering/patch.h"
+
+namespace lamina::cluster {
+namespace {
+
+std::span<const HardTriangle> triangles_of(const SlabRecord& record, const HardCluster& hard) {
+  return {record.hard_triangles.data() + hard.first, hard.count};
+}
+
+Ref corner_ref(const SlabRecord& record, const HardCluster& hard) {
+  return slab_tag(record.slab) | hard.corner;
+}
+
+/// Members in mesh order: those of the slab below first.
+void list_members(const Window& window, const SlabRecord& record, const HardCluster& hard, std::vector<Ref>& members) {
+  const Ref own = corner_ref(record, hard);
+  members.clear();
+  for (const HardTriangle& t : triangles_of(record, hard)) {
+    for (const Ref v : t.vertex) {
+      if (window.corner_of(v) == own) members.push_back(v);
+    }
+  }
+  const Ref tag = slab_tag(record.slab);
+  std::sort(members.begin(), members.end(), [tag](Ref a, Ref b) {
+    const bool a_here = (a & ~kRefIndex) == tag, b_here = (b & ~kRefIndex) == tag;
+    return a_here != b_here ? b_here : a < b;
+  });
+  members.erase(std::unique(members.begin(), members.end()), members.end());
+}
+
+std::uint32_t root(std::vector<std::uint32_t>& parent, std::uint32_t i) {
+  while (parent[i] != i) i = parent[i] = parent[parent[i]];
+  return i;
+}
+
+std::uint64_t label_of(const Window& window, Ref v) {
+  return static_cast<std::uint64_t>(window.corner_of(v)) << 16 | window.vertex(v).piece;
+}
+
+/// The isovertex relative to `corner`; differences of positions are exact.
+Eigen::Vector3d point_of(const Window& window, Ref v, const SurfaceCorner& corner) {
+  const SlabRecord& record = window.record_of(v);
+  const IsoVertex& vertex = record.iso->vertices[v & kRefIndex];
+  const auto corner_at = [&](SlabIndex i) -> const SurfaceCorner& {
+    return (i.next() ? window.at(record.slab + 1) : record).iso->corners[i.index()];
+  };
+  const SurfaceCorner& low = corner_at(vertex.low);
+  const SurfaceCorner& high = corner_at(vertex.high);
+  Eigen::Vector3d point;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::int64_t from = std::int64_t{low.position[axis]} - corner.position[axis];
+    const std::int64_t along = std::int64_t{high.position[axis]} - low.position[axis];
+    point[static_cast<Eigen::Index>(axis)] =
+        static_cast<double>(from) + static_cast<double>(vertex.t) * static_cast<double>(along);
+  }
+  return point;
+}
+
+std::array<float, 3> place(const Window& window, const SlabRecord& record, const HardCluster& hard,
+                           std::span<const StarTriangle> star, std::uint64_t own) {
+  const SurfaceCorner& corner = record.iso->corners[hard.corner];
+  std::vector<PatchTriangle> patch;
+  patch.reserve(star.size());
+  for (const StarTriangle& t : star) {
+    PatchTriangle& p = patch.emplace_back();
+    p.vertex = t.vertex;
+    for (std::size_t k = 0; k < 3; ++k) {
+      p.point[k] = point_of(window, t.vertex[k], corner);
+      p.member[k] = t.label[k] == own;
+    }
+  }
+  const Eigen::Vector3f position = place_patch(patch).cast<float>();
+  return {position.x(), position.y(), position.z()};
+}
+
+}  // namespace
+
+void split_pieces(Window& window, const SlabRecord& record, HardCluster& hard, HardScratch& scratch) {
+  std::vector<Ref>& members = scratch.members;
+  std::vector<std::uint32_t>& parent = scratch.parent;
+  list_members(window, record, hard, members);
+  const auto index_of = [&](Ref v) {
+    return static_cast<std::uint32_t>(std::find(members.begin(), members.end(), v) - members.begin());
+  };
+  parent.resize(members.size());
+  std::iota(parent.begin(), parent.end(), 0U);
+  for (const HardTriangle& t : triangles_of(record, hard)) {
+    std::uint32_t first = kNone;
+    for (const Ref v : t.vertex) {
+      const std::uint32_t i = index_of(v);
+      if (i == members.size()) continue;
+      if (first != kNone)
+        parent[std::max(root(parent, i), root(parent, first))] = std::min(root(parent, i), root(parent, first));
+      first = i;
+    }
+  }
+  std::uint16_t pieces = 0;
+  for (std::uint32_t i = 0; i < members.size(); ++i) {  // a root is its component's smallest member
+    const std::uint32_t r = root(parent, i);
+    window.vertex(members[i]).piece = r == i ? pieces++ : window.vertex(members[r]).piece;
+  }
+  hard.pieces.assign(pieces, {});
+}
+
+void veto_neighbours(Window& window, const SlabRecord& record, const HardCluster& hard, HardScratch& scratch) {
+  const Ref own = corner_ref(record, hard);
+  std::vector<std::uint64_t>& steps =
+      scratch.steps;  // neighbour cluster and the vertex of this one that begins a step of its ring
+  steps.clear();
+  for (const HardTriangle& t : triangles_of(record, hard)) {
+    const std::array<Ref, 3> corner{window.corner_of(t.vertex[0]), window.corner_of(t.vertex[1]),
+                                    window.corner_of(t.vertex[2])};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t after = (k + 1) % 3, before = (k + 2) % 3;
+      if (corner[k] == own || corner[after] != own || corner[before] == corner[k]) continue;
+      steps.push_back(static_cast<std::uint64_t>(corner[k]) << 32 | t.vertex[after]);
+    }
+  }
+  std::sort(steps.begin(), steps.end());
+  for (auto it = std::adjacent_find(steps.begin(), steps.end()); it != steps.end();
+       it = std::adjacent_find(it + 1, steps.end())) {
+    const auto corner = static_cast<Ref>(*it >> 32);
+    std::uint8_t& veto = window.record_of(corner).vetoes[corner & kRefIndex];
+    std::atomic_ref<std::uint8_t>(veto).store(1, std::memory_order_relaxed);
+  }
+}
+
+Verdict judge(const Window& window, const SlabRecord& record, HardCluster& hard, HardScratch& scratch) {
+  const Ref corner = corner_ref(record, hard);
+  std::vector<StarTriangle>&all = scratch.all, &star = scratch.star;
+  all.clear();
+  for (const HardTriangle& t : triangles_of(record, hard)) {
+    StarTriangle& s = all.emplace_back();
+    s.vertex = t.vertex;
+    for (std::size_t k = 0; k < 3; ++k) s.label[k] = label_of(window, t.vertex[k]);
+  }
+  bool any = false;
+  for (std::size_t piece = 0; piece < hard.pieces.size(); ++piece) {
+    const std::uint64_t own = static_cast<std::uint64_t>(corner) << 16 | piece;
+    star.clear();
+    std::copy_if(all.begin(), all.end(), std::back_inserter(star),
+                 [own](const StarTriangle& t) { return t.label[0] == own || t.label[1] == own || t.label[2] == own; });
+    if (!collapses(star, own, scratch.piece)) continue;
+    any = true;
+    hard.pieces[piece].collapses = true;
+    if (hard.pieces.size() > 1) hard.pieces[piece].position = place(window, record, hard, star, own);
+  }
+  if (!any) return Verdict::kept;
+  return hard.pieces.size() == 1 ? Verdict::corner : Verdict::split;
+}
+
+}  // namespace lamina::cluster

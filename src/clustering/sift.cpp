@@ -1,0 +1,169 @@
+#include "clustering/sift.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "clustering/chunks.h"
+#include "clustering/hard.h"
+#include "clustering/shape.h"
+
+namespace lamina::cluster {
+namespace {
+
+constexpr std::size_t kLeast = 1 << 13;
+constexpr std::size_t kLeastHard = 64;
+/// Folds a used vertex into its cluster's note.
+void fold(const VertexNote& vertex, CornerNote& corner) {
+  if (!vertex.used()) return;
+  const auto bit = static_cast<std::uint8_t>(1U << vertex.direction);
+  const bool beyond = vertex.balance != 0 || (corner.members & bit) != 0;
+  corner.members |= static_cast<std::uint8_t>(bit | (beyond ? CornerNote::kBeyond : 0));
+  if ((vertex.marks & VertexNote::kThree) == 0) corner.idle |= bit;
+}
+
+/// Away from boundaries the sums prove C and R: the ring takes `ring_triangles` steps, and when as many distinct
+/// neighbour clusters begin one, it is a simple cycle. That the cluster is no danger to its neighbours' Q comes with
+/// it.
+bool plainly_collapses(const CornerNote& note) {
+  return (note.members & CornerNote::kBeyond) == 0 && note.ring_triangles >= 3 &&
+         std::popcount(note.ring) == note.ring_triangles && plain_shape(note);
+}
+
+void fold_members(Window& window, std::int64_t slab) {
+  SlabRecord& here = window.at(slab);
+  const SlabRecord& below = window.at(slab - 1);
+  for (const std::uint32_t v : below.crossing) {
+    const VertexNote& vertex = below.vertices[v];
+    fold(vertex, here.corners[vertex.corner & ~SlabIndex::kNextSlab]);
+  }
+  for (const VertexNote& vertex : here.vertices) {
+    if (!vertex.crossing()) fold(vertex, here.corners[vertex.corner]);
+  }
+}
+
+void list_hard(SlabRecord& here) {
+  for (std::uint32_t c = 0; c < here.corners.size(); ++c) {
+    const CornerNote& note = here.corners[c];
+    if (note.members == 0) {
+      here.verdicts[c] = Verdict::absent;
+    } else if (plainly_collapses(note)) {
+      here.verdicts[c] = Verdict::corner;
+    } else {
+      here.verdicts[c] = Verdict::hard;
+      here.seats[c] = static_cast<std::uint32_t>(here.hard.size());
+      here.hard.push_back({.corner = c, .first = 0, .count = 0, .pieces = {}});
+    }
+  }
+}
+
+/// Marks the vertices of this slab's hard clusters, so that finding their triangles costs one look per vertex.
+void mark_vertices(Window& window, std::int64_t slab) {
+  SlabRecord& here = window.at(slab);
+  SlabRecord& below = window.at(slab - 1);
+  const auto mark = [&](VertexNote& vertex) {
+    if (here.verdicts[vertex.corner & ~SlabIndex::kNextSlab] == Verdict::hard) vertex.marks |= VertexNote::kHard;
+  };
+  for (const std::uint32_t v : below.crossing) mark(below.vertices[v]);
+  for_chunks(here.vertices.size(), chunk_count(here.vertices.size(), kLeast),
+             [&](std::size_t, std::size_t begin, std::size_t end) {
+               for (std::size_t v = begin; v < end; ++v) {
+                 if (!here.vertices[v].crossing()) mark(here.vertices[v]);
+               }
+             });
+}
+
+struct HardEntry {
+  std::uint32_t hard;
+  HardTriangle triangle;
+};
+
+/// Appends the triangle once for each hard cluster of `owner` it touches.
+void gather(const Window& window, const SlabRecord& owner, const HardTriangle& triangle,
+            std::vector<HardEntry>& entries) {
+  std::array<std::uint32_t, 3> hard{kNone, kNone, kNone};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Ref corner = window.corner_of(triangle.vertex[k]);
+    if (&window.record_of(corner) != &owner || owner.verdicts[corner & kRefIndex] != Verdict::hard) continue;
+    hard[k] = owner.seats[corner & kRefIndex];
+    if (std::find(hard.begin(), hard.begin() + k, hard[k]) == hard.begin() + k) entries.push_back({hard[k], triangle});
+  }
+}
+
+void gather_range(const Window& window, const SlabRecord& owner, std::int64_t slab,
+                  std::span<const IsoTriangle> triangles, std::vector<HardEntry>& entries) {
+  const std::array<Ref, 2> tag{slab_tag(slab), slab_tag(slab + 1)};
+  const std::array<const VertexNote*, 2> notes{window.records[tag[0] >> kRefShift].vertices.data(),
+                                               window.records[tag[1] >> kRefShift].vertices.data()};
+  for (const IsoTriangle& t : triangles) {
+    unsigned marks = 0;
+    for (const SlabIndex index : t) marks |= notes[index.bits >> 31][index.index()].marks;
+    if ((marks & VertexNote::kHard) == 0) continue;
+    HardTriangle triangle{};
+    for (std::size_t k = 0; k < 3; ++k) triangle.vertex[k] = tag[t[k].bits >> 31] | t[k].index();
+    gather(window, owner, triangle, entries);
+  }
+}
+
+/// Lists for each hard cluster of `slab` the triangles that touch it, in mesh order.
+void gather_triangles(Window& window, std::int64_t slab) {
+  SlabRecord& here = window.at(slab);
+  if (here.hard.empty()) return;
+  const std::span<const IsoTriangle> triangles(here.iso->triangles);
+  const std::size_t chunks = chunk_count(triangles.size(), kLeast);
+  std::vector<std::vector<HardEntry>> entries(chunks + 1);
+  gather_range(window, here, slab - 1, window.at(slab - 1).border, entries[0]);
+  for_chunks(triangles.size(), chunks, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    gather_range(window, here, slab, triangles.subspan(begin, end - begin), entries[chunk + 1]);
+  });
+  for (const auto& part : entries) {
+    for (const HardEntry& entry : part) ++here.hard[entry.hard].count;
+  }
+  std::uint32_t total = 0;
+  for (HardCluster& hard : here.hard) {
+    hard.first = total;
+    total += hard.count;
+    hard.count = 0;
+  }
+  here.hard_triangles.resize(total);
+  for (const auto& part : entries) {
+    for (const HardEntry& entry : part) {
+      HardCluster& hard = here.hard[entry.hard];
+      here.hard_triangles[hard.first + hard.count++] = entry.triangle;
+    }
+  }
+}
+
+template <class Fn>
+void for_hard(SlabRecord& here, const Fn& fn) {
+  for_chunks(here.hard.size(), chunk_count(here.hard.size(), kLeastHard),
+             [&](std::size_t, std::size_t begin, std::size_t end) {
+               HardScratch scratch;
+               for (std::size_t h = begin; h < end; ++h) fn(here.hard[h], scratch);
+             });
+}
+
+}  // namespace
+
+void sift(Window& window, std::int64_t slab) {
+  fold_members(window, slab);
+  SlabRecord& here = window.at(slab);
+  list_hard(here);
+  mark_vertices(window, slab);
+  gather_triangles(window, slab);
+  for_hard(here, [&](HardCluster& hard, HardScratch& scratch) {
+    split_pieces(window, here, hard, scratch);
+    veto_neighbours(window, here, hard, scratch);
+  });
+}
+
+void decide(Window& window, std::int64_t slab) {
+  SlabRecord& here = window.at(slab);
+  for (std::size_t c = 0; c < here.corners.size(); ++c) {
+    if (here.vetoes[c] != 0 && here.verdicts[c] == Verdict::corner) here.verdicts[c] = Verdict::kept;
+  }
+  for_hard(here, [&](HardCluster& hard, HardScratch& scratch) {
+    here.verdicts[hard.corner] = judge(window, here, hard, scratch);
+  });
+}
+
+}  // namespace lamina::cluster

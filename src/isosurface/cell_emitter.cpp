@@ -1,0 +1,160 @@
+#include "isosurface/cell_emitter.h"
+
+#include <algorithm>
+#include <atomic>
+#include <limits>
+
+namespace lamina {
+namespace {
+
+/// Indices of this slab's tables seen from the slab below.
+SlabIndex seen_from(SlabIndex vertex, SlabIndex corner) {
+  return {corner.bits | (vertex.bits & SlabIndex::kNextSlab)};
+}
+
+float squared_distance(const std::array<float, 3>& a, const std::array<float, 3>& b) {
+  const float x = a[0] - b[0];
+  const float y = a[1] - b[1];
+  const float z = a[2] - b[2];
+  return x * x + y * y + z * z;
+}
+
+}  // namespace
+
+CellEmitter::Point CellEmitter::locate(const CellCrossing& c, const std::array<std::int32_t, 3>& origin) {
+  const Lattice& lattice = cache_->window().lattice();
+  const CornerBlock& block = *cache_->block(c.level, c.low);
+  const int offset = offset_in_block(c.low);
+  const int z = offset >> 6;
+  Point p;
+  p.accepted = block.accepted[c.axis].test(offset);
+  if (!p.accepted) return p;
+  std::uint32_t id = block.numbers[z].vertex_base;
+  for (int a = 0; a < c.axis; ++a) id += static_cast<std::uint32_t>(std::popcount(block.accepted[a].words[z]));
+  const std::uint64_t before = (std::uint64_t{1} << (offset & 63)) - 1;
+  id += static_cast<std::uint32_t>(std::popcount(block.accepted[c.axis].words[z] & before));
+  if (lattice.slab_of_layer(c.level, c.low.z) != slab_) id |= SlabIndex::kNextSlab;
+
+  p.vertex.bits = id;
+  p.geometry.faces = cell_.faces(c);
+  const std::array<std::int32_t, 3> low = lattice.position(c.level, c.low);
+  for (int i = 0; i < 3; ++i) p.geometry.position[i] = static_cast<float>(low[i] - origin[i]);
+  p.geometry.position[c.axis] += vertex(p.vertex).t * static_cast<float>(lattice.cell_size(c.level));
+  return p;
+}
+
+/// The cell's own quadrants around an edge: in the list of open ones, or out of it. Every quadrant is one cell's, so
+/// the order of the cells does not matter.
+void CellEmitter::note_quadrants(int level, const Cell& cell, const CellCrossing& c, SlabIndex i, bool covered) const {
+  if (covered == (c.level == level)) return;  // numbering knows: open unless a cell of the edge's level takes part
+  const int u = (c.axis + 1) % 3;
+  const int v = (c.axis + 2) % 3;
+  const std::array<std::int32_t, 3> low{c.low.x, c.low.y, c.low.z};
+  const std::array<std::int32_t, 3> own{cell.x, cell.y, cell.z};
+  constexpr std::array<std::array<int, 2>, 4> kBack = {{{1, 1}, {0, 1}, {0, 0}, {1, 0}}};
+  const int shift = level - c.level;
+  unsigned bits = 0;
+  for (int q = 0; q < 4; ++q) {
+    if (((low[u] - kBack[q][0]) >> shift) == own[u] && ((low[v] - kBack[q][1]) >> shift) == own[v]) bits |= 1U << q;
+  }
+  const std::atomic_ref<std::uint8_t> open(vertex(i).open);
+  if (covered) {
+    open.fetch_and(static_cast<std::uint8_t>(~bits), std::memory_order_relaxed);
+  } else {
+    open.fetch_or(static_cast<std::uint8_t>(bits), std::memory_order_relaxed);
+  }
+}
+
+/// A point of the table of corners that comes close to the loop's mean: the nearest corner, and the one with which the
+/// line between them passes nearest.
+IsoVertex CellEmitter::centre(const std::array<std::int32_t, 3>& origin) const {
+  struct End {
+    SlabIndex corner;
+    std::array<float, 3> position;
+  };
+  std::vector<End> ends;
+  std::array<float, 3> mean{};
+  for (const Point& p : loop_) {
+    const IsoVertex& v = vertex(p.vertex);
+    const IsoSlab& slab = p.vertex.next() ? *next_ : *here_;
+    for (const SlabIndex i : {v.low, v.high}) {
+      const SurfaceCorner& c = i.next() ? next_->corners[i.index()] : slab.corners[i.index()];
+      End end{seen_from(p.vertex, i), {}};
+      for (int k = 0; k < 3; ++k) end.position[k] = static_cast<float>(c.position[k] - origin[k]);
+      ends.push_back(end);
+    }
+    for (int k = 0; k < 3; ++k) mean[k] += p.geometry.position[k] / static_cast<float>(loop_.size());
+  }
+  const End& near = *std::min_element(ends.begin(), ends.end(), [&](const End& a, const End& b) {
+    return squared_distance(a.position, mean) < squared_distance(b.position, mean);
+  });
+  IsoVertex out;
+  out.low = near.corner;
+  out.axis = IsoVertex::kCentre;
+  out.level = static_cast<std::uint8_t>(level_);
+  float best = std::numeric_limits<float>::infinity();
+  for (const End& far : ends) {
+    if (far.corner == near.corner) continue;
+    const float length = squared_distance(near.position, far.position);
+    float dot = 0;
+    for (int k = 0; k < 3; ++k) dot += (mean[k] - near.position[k]) * (far.position[k] - near.position[k]);
+    const float t = std::clamp(dot / length, 0.01F, 0.99F);
+    std::array<float, 3> at{};
+    for (int k = 0; k < 3; ++k) at[k] = near.position[k] + t * (far.position[k] - near.position[k]);
+    const float d = squared_distance(at, mean);
+    if (d >= best) continue;
+    best = d;
+    out.high = far.corner;
+    out.t = t;
+  }
+  out.near_high = out.t > 0.5F;
+  return out;
+}
+
+/// The triangles of `loop_`.
+void CellEmitter::emit_loop(const std::array<std::int32_t, 3>& origin, TriangleRun& run) {
+  outline_.clear();
+  for (const Point& p : loop_) outline_.push_back(p.geometry);
+  cut_.clear();
+  if (cut_loop(outline_, cut_)) {
+    for (const auto& t : cut_) run.triangles.push_back({loop_[t[0]].vertex, loop_[t[1]].vertex, loop_[t[2]].vertex});
+    return;
+  }
+  const SlabIndex middle{static_cast<std::uint32_t>(run.centres.size()) | TriangleRun::kCentre};
+  run.centres.push_back(centre(origin));
+  for (std::size_t i = 0; i < loop_.size(); ++i) {
+    run.triangles.push_back({middle, loop_[i].vertex, loop_[(i + 1) % loop_.size()].vertex});
+  }
+}
+
+bool CellEmitter::emit(int level, const Cell& cell, TriangleRun& run) {
+  level_ = level;
+  cell_.resolve(level, cell);
+  const std::vector<CellCrossing>& crossings = cell_.crossings();
+  if (crossings.empty()) return false;
+  const std::array<std::int32_t, 3> origin = cache_->window().lattice().position(level, cell);
+  points_.clear();
+  for (const CellCrossing& c : crossings) points_.push_back(locate(c, origin));
+  const LoopTracer& tracer = cell_.tracer();
+  for (const LoopTracer::Loop& loop : tracer.loops()) {
+    loop_.clear();
+    bool accepted = loop.closed;
+    for (std::uint32_t i = 0; i < loop.count; ++i) {
+      loop_.push_back(points_[tracer.order()[loop.first + i]]);
+      accepted = accepted && loop_.back().accepted;
+    }
+    // Two vertices leave no surface in the cell: the neighbours across the two faces meet in the same line.
+    for (std::uint32_t i = 0; i < loop.count; ++i) {
+      const std::uint32_t at = tracer.order()[loop.first + i];
+      if (points_[at].accepted) note_quadrants(level, cell, crossings[at], points_[at].vertex, accepted);
+    }
+    if (!accepted) {
+      ++run.counts.rejected_loops;
+    } else if (loop.count > 2) {
+      emit_loop(origin, run);
+    }
+  }
+  return true;
+}
+
+}  // namespace lamina

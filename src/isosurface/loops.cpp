@@ -1,0 +1,114 @@
+#include "isosurface/loops.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace lamina {
+
+void LoopTracer::clear() {
+  keys_.clear();
+  links_.clear();
+  loops_.clear();
+  order_.clear();
+}
+
+void LoopTracer::add_face(std::span<const FaceCrossing> cycle) {
+  for (std::size_t i = 0; i < cycle.size(); ++i) {
+    keys_.push_back(cycle[i].key);
+    if (cycle[i].rising) links_.emplace_back(cycle[i + 1 == cycle.size() ? 0 : i + 1].key, cycle[i].key);
+  }
+}
+
+void LoopTracer::add_unresolved(std::span<const FaceCrossing> cycle) {
+  for (const FaceCrossing& c : cycle) keys_.push_back(c.key);
+}
+
+void LoopTracer::trace() {
+  constexpr std::uint32_t kNone = ~std::uint32_t{0};
+  std::sort(keys_.begin(), keys_.end());
+  keys_.erase(std::unique(keys_.begin(), keys_.end()), keys_.end());
+  const std::size_t n = keys_.size();
+  next_.assign(n, kNone);
+  has_previous_.assign(n, 0);
+  visited_.assign(n, 0);
+  const auto index = [&](std::uint64_t key) {
+    return static_cast<std::uint32_t>(std::lower_bound(keys_.begin(), keys_.end(), key) - keys_.begin());
+  };
+  for (const auto& [from, to] : links_) {
+    const std::uint32_t target = index(to);
+    next_[index(from)] = target;
+    has_previous_[target] = 1;
+  }
+  const auto follow = [&](std::uint32_t start, bool closed) {
+    Loop loop{static_cast<std::uint32_t>(order_.size()), 0, closed};
+    for (std::uint32_t i = start; i != kNone && visited_[i] == 0; i = next_[i]) {
+      visited_[i] = 1;
+      order_.push_back(i);
+      ++loop.count;
+    }
+    loops_.push_back(loop);
+  };
+  for (std::uint32_t i = 0; i < n; ++i) {
+    if (has_previous_[i] == 0) follow(i, false);
+  }
+  for (std::uint32_t i = 0; i < n; ++i) {
+    if (visited_[i] == 0) follow(i, true);
+  }
+}
+
+namespace {
+
+/// Writes the triangles of the polygon i..j, whose best inner vertices `apex` holds.
+void emit(const std::array<std::array<std::uint8_t, kMaxChordLoop>, kMaxChordLoop>& apex, std::uint8_t i,
+          std::uint8_t j, std::vector<std::array<std::uint8_t, 3>>& triangles) {
+  if (j - i < 2) return;
+  const std::uint8_t k = apex[i][j];
+  emit(apex, i, k, triangles);
+  triangles.push_back({i, k, j});
+  emit(apex, k, j, triangles);
+}
+
+}  // namespace
+
+bool cut_loop(std::span<const LoopPoint> loop, std::vector<std::array<std::uint8_t, 3>>& triangles) {
+  const std::size_t n = loop.size();
+  if (n == 3) {
+    triangles.push_back({0, 1, 2});
+    return true;
+  }
+  if (n > kMaxChordLoop) return false;
+  constexpr float kForbidden = std::numeric_limits<float>::infinity();
+  std::array<std::array<float, kMaxChordLoop>, kMaxChordLoop>
+      cost;  // of cutting the polygon i..j, its own chord included
+  std::array<std::array<std::uint8_t, kMaxChordLoop>, kMaxChordLoop> apex;
+  for (std::size_t i = 0; i + 1 < n; ++i) cost[i][i + 1] = 0;
+  for (std::size_t span = 2; span < n; ++span) {
+    for (std::size_t i = 0; i + span < n; ++i) {
+      const std::size_t j = i + span;
+      cost[i][j] = kForbidden;
+      float chord = 0;
+      if (span + 1 < n) {
+        if ((loop[i].faces & loop[j].faces) != 0) continue;
+        const auto& a = loop[i].position;
+        const auto& b = loop[j].position;
+        const float x = a[0] - b[0];
+        const float y = a[1] - b[1];
+        const float z = a[2] - b[2];
+        chord = std::sqrt(x * x + y * y + z * z);
+      }
+      for (std::size_t k = i + 1; k < j; ++k) {
+        const float c = cost[i][k] + cost[k][j] + chord;
+        if (c < cost[i][j]) {
+          cost[i][j] = c;
+          apex[i][j] = static_cast<std::uint8_t>(k);
+        }
+      }
+    }
+  }
+  if (cost[0][n - 1] == kForbidden) return false;
+  emit(apex, 0, static_cast<std::uint8_t>(n - 1), triangles);
+  return true;
+}
+
+}  // namespace lamina

@@ -1,0 +1,236 @@
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/resize_anew.h"
+#include "isosurface/crossing.h"
+#include "isosurface/extract.h"
+#include "mls/corner_value.h"
+
+namespace lamina {
+namespace {
+
+/// Runs body(tile, cache) over all tiles, several threads at once; every tile writes its own places.
+template <typename Body>
+void for_views(const Window& window, const std::vector<TileView>& views, const Body& body) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, views.size(), 16),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      BlockCache cache(window);
+                      for (std::size_t i = range.begin(); i < range.end(); ++i) body(views[i], cache);
+                    });
+}
+
+/// The tiles in which accepted edges begin or end.
+std::vector<TileView> at_surface(const std::vector<TileView>& views) {
+  std::vector<TileView> out;
+  for (const TileView& tile : views) {
+    const unsigned layers = (1U << tile.end) - (1U << tile.begin);
+    if ((tile.leaf().surface_layers & layers) != 0) out.push_back(tile);
+  }
+  return out;
+}
+
+/// Gives every layer the base of its vertices and corners and sizes the slab's tables.
+void assign_numbers(const Window& window, const std::vector<TileView>& views, IsoSlab& out) {
+  std::uint32_t vertices = 0;
+  std::uint32_t corners = 0;
+  for (const TileView& tile : views) {
+    CornerBlock& leaf = tile.leaf();
+    for (int z = tile.begin; z < tile.end; ++z) {
+      leaf.numbers[z] = {vertices, corners};
+      for (const BlockMask& m : leaf.accepted) vertices += static_cast<std::uint32_t>(std::popcount(m.words[z]));
+      corners += static_cast<std::uint32_t>(std::popcount(leaf.surface.words[z]));
+    }
+  }
+  resize_anew(out.vertices, vertices);
+  resize_anew(out.corners, corners);
+  out.corner_attributes.resize(static_cast<std::size_t>(window.attributes()));
+  for (std::vector<float>& a : out.corner_attributes) resize_anew(a, corners);
+}
+
+/// Beyond a rim, and around things thinner than a cell, neighbours' planes lead far away from all samples: the
+/// projected point of a corner that is not trusted stays near the average of its own samples, where its record leads
+/// (at `cell`).
+void tether(const float* record, float cell, std::array<float, 3>& offset) {
+  constexpr float kLongest = 0.3F;  // cells
+  std::array<float, 3> away{};
+  float d2 = 0;
+  for (int i = 0; i < 3; ++i) {
+    away[i] = offset[i] + record[kDistance] * record[kNormalX + i];
+    d2 += away[i] * away[i];
+  }
+  const float longest = kLongest * cell;
+  if (d2 <= longest * longest) return;
+  const float back = 1.0F - longest / std::sqrt(d2);
+  for (int i = 0; i < 3; ++i) offset[i] -= back * away[i];
+}
+
+/// Fills in the tile's surface corners. Trusted corners are read here, which is what corner_value() answers for them in
+/// the finest level that holds them, without its search.
+void fill_corners(const Window& window, const TileView& tile, IsoSlab& out) {
+  const CornerBlock& leaf = tile.leaf();
+  const int attributes = window.attributes();
+  const int brick_layers = window.brick_layers(tile.level);
+  const auto size = static_cast<float>(window.lattice().cell_size(tile.level));
+  std::vector<float> extra(static_cast<std::size_t>(attributes));
+  std::uint32_t rank = 0;  // in its brick, of the layer's first corner with a value
+  for (int z = tile.begin; z < tile.end; ++z) {
+    if (z % brick_layers == 0) rank = 0;
+    const std::uint64_t near = leaf.near.words[z];
+    const std::uint64_t trusted = near & leaf.good.words[z];
+    const std::uint64_t seen = leaf.seen.words[z];
+    const CornerValues& values = leaf.values[z / brick_layers];
+    std::uint32_t id = leaf.numbers[z].corner_base;
+    for_bits(leaf.surface.words[z], [&](int bit) {
+      const Cell cell = tile.cell(z * 64 + bit);
+      const std::uint64_t one = std::uint64_t{1} << bit;
+      SurfaceCorner c;
+      c.position = window.lattice().position(tile.level, cell);
+      c.cell = size;
+      CornerValue value;
+      bool valued = true;
+      if ((trusted & one) != 0) {
+        const float* v = values.of(rank + static_cast<std::uint32_t>(std::popcount(near & (one - 1))));
+        value = {v[kDistance], {v[kNormalX], v[kNormalY], v[kNormalZ]}, v[kCurvature], v[kReach]};
+        for (int a = 0; a < attributes; ++a) extra[a] = v[kFirstAttribute + a];
+      } else {
+        valued = corner_value(window, tile.level, cell, value, extra.data());
+      }
+      if (valued) {
+        for (int i = 0; i < 3; ++i) c.offset[i] = -value.distance * value.normal[i];
+        if ((trusted & one) == 0 && (near & seen & one) != 0) {
+          tether(values.of(rank + static_cast<std::uint32_t>(std::popcount(near & (one - 1)))), size, c.offset);
+        }
+        c.normal = value.normal;
+        c.distance = value.distance;
+        c.curvature = value.curvature;
+        c.reach = (trusted & one) != 0 ? value.reach : -1.0F;
+      }
+      for (int a = 0; a < attributes; ++a) out.corner_attributes[a][id] = valued ? extra[a] : 0.0F;
+      out.corners[id++] = c;
+    });
+    rank += static_cast<std::uint32_t>(std::popcount(near));
+  }
+}
+
+/// Where the surface meets an edge. Signs are settled; distances that contradict them (or are missing) only say that
+/// it is somewhere between.
+float edge_fraction(const SurfaceCorner& low, const SurfaceCorner& high, bool low_positive) {
+  constexpr std::array<float, 3> kNone{};
+  constexpr float kMargin = 0.01F;  // isovertices stay distinct points
+  const auto unknown = [&](const SurfaceCorner& c) { return c.distance == 0 && c.normal == kNone; };
+  if (unknown(low) || unknown(high)) return 0.5F;
+  if ((low.distance >= 0) != low_positive || (high.distance >= 0) == low_positive) return 0.5F;
+  return std::clamp(low.distance / (low.distance - high.distance), kMargin, 1.0F - kMargin);
+}
+
+/// Completes a vertex whose ends are both known.
+void place(IsoVertex& v, const SurfaceCorner& low, const SurfaceCorner& high, bool low_positive) {
+  v.t = edge_fraction(low, high, low_positive);
+  v.near_high = v.t > 0.5F;
+}
+
+class Numbering {
+ public:
+  Numbering(IsoSlab& slab, BlockCache& cache) : slab_(slab), cache_(cache) {}
+
+  /// Vertices of the tile's edges; vertical edges of the slab's last layer wait for the next slab's corners.
+  void fill_vertices(const TileView& tile, std::int32_t last_layer) {
+    const CornerBlock& leaf = tile.leaf();
+    for (int z = tile.begin; z < tile.end; ++z) {
+      if ((leaf.accepted[0].words[z] | leaf.accepted[1].words[z] | leaf.accepted[2].words[z]) == 0) continue;
+      const Slice cells_below(tile, &CornerBlock::cells, z - 1);
+      const Slice cells(tile, &CornerBlock::cells, z);
+      std::uint32_t id = leaf.numbers[z].vertex_base;
+      id = fill_axis<0>(tile, z, around_edges(0, cells_below, cells), true, id);
+      id = fill_axis<1>(tile, z, around_edges(1, cells_below, cells), true, id);
+      fill_axis<2>(tile, z, around_edges(2, cells_below, cells), tile.block.z * 8 + z != last_layer, id);
+    }
+  }
+
+  /// Completes the slab below: its vertical edges that end in the tile's first layer, the slab's first plane.
+  void complete_below(const TileView& tile, IsoSlab& previous) {
+    const CornerBlock* below = tile.neighbour(0, 0, tile.begin == 0 ? -1 : 0);
+    if (below == nullptr) return;
+    const int z = (tile.begin - 1) & 7;
+    std::uint32_t id =
+        below->numbers[z].vertex_base + static_cast<std::uint32_t>(std::popcount(below->accepted[0].words[z]) +
+                                                                   std::popcount(below->accepted[1].words[z]));
+    for_bits(below->accepted[2].words[z], [&](int bit) {
+      IsoVertex& v = previous.vertices[id++];
+      const std::uint32_t high = corner_number(tile, &tile.leaf(), tile.begin * 64 + bit, {0, 0, 0});
+      v.high.bits = high | SlabIndex::kNextSlab;
+      place(v, previous.corners[v.low.index()], slab_.corners[high], below->positive.test(z * 64 + bit));
+    });
+  }
+
+ private:
+  /// Number of the corner at an offset of one of the tile's blocks, `beyond` blocks away.
+  std::uint32_t corner_number(const TileView& tile, const CornerBlock* block, int offset, const Cell& beyond) {
+    if (block != nullptr && block->surface.test(offset)) return CornerPlace{block, offset}.number();
+    const Cell c = tile.cell(offset) + Cell{beyond.x * 8, beyond.y * 8, beyond.z * 8};
+    return surface_place(cache_, tile.level, c).number();
+  }
+
+  /// Vertices of a layer's edges along an axis, the first of which is `id`; returns the number behind the last.
+  /// `full`: cells around them.
+  template <int kAxis>
+  std::uint32_t fill_axis(const TileView& tile, int z, const Quadrants& full, bool both_ends, std::uint32_t id) {
+    constexpr Cell kBeyond{kAxis == 0, kAxis == 1, kAxis == 2};
+    const CornerBlock& leaf = tile.leaf();
+    const CornerBlock* const next = tile.neighbour(kBeyond.x, kBeyond.y, kBeyond.z);
+    const std::uint64_t open = ~(full.words[0] & full.words[1] & full.words[2] & full.words[3]);
+    for_bits(leaf.accepted[kAxis].words[z], [&](int bit) {
+      const int offset = z * 64 + bit;
+      IsoVertex v;
+      v.axis = kAxis;
+      v.level = static_cast<std::uint8_t>(tile.level);
+      if (((open >> bit) & 1U) != 0) {
+        for (int q = 0; q < 4; ++q) v.open |= static_cast<std::uint8_t>(((~full.words[q] >> bit) & 1U) << q);
+      }
+      v.low.bits = corner_number(tile, &leaf, offset, {0, 0, 0});
+      if (both_ends) {
+        constexpr int kStep = 1 << (3 * kAxis);
+        constexpr int kLast = 7 * kStep;
+        const bool leaves = (offset & kLast) == kLast;
+        v.high.bits = leaves ? corner_number(tile, next, offset - kLast, kBeyond)
+                             : corner_number(tile, &leaf, offset + kStep, {0, 0, 0});
+        place(v, slab_.corners[v.low.index()], slab_.corners[v.high.index()], leaf.positive.test(offset));
+      }
+      slab_.vertices[id++] = v;
+    });
+    return id;
+  }
+
+  IsoSlab& slab_;
+  BlockCache& cache_;
+};
+
+}  // namespace
+
+void number_edges(Window& window, std::int32_t slab, IsoSlab* previous, IsoSlab& out) {
+  out.slab = slab;
+  out.triangles.clear();
+  const std::vector<TileView> views = slab_tiles(window, slab);
+  for_views(window, views, [](const TileView& tile, BlockCache&) { find_crossing(tile); });
+  for (std::size_t first = 0, end = 0; first < views.size(); first = end) {  // level by level, finest first
+    while (end < views.size() && views[end].level == views[first].level) ++end;
+    if (views[first].level == 0) continue;
+    tbb::parallel_for(first, end, [&](std::size_t i) { add_finer_busy(views[i], window); });
+  }
+  for_views(window, at_surface(views), [&](const TileView& tile, BlockCache&) { mark_surface(tile, window); });
+  // Again: a corner that a finer level holds may have been marked in a tile without edges.
+  const std::vector<TileView> surface = at_surface(views);
+  assign_numbers(window, surface, out);
+  for_views(window, surface, [&](const TileView& tile, BlockCache&) { fill_corners(window, tile, out); });
+  for_views(window, surface, [&](const TileView& tile, BlockCache& cache) {
+    Numbering numbering(out, cache);
+    const std::int32_t first = window.lattice().first_layer(tile.level, slab);
+    numbering.fill_vertices(tile, first + window.lattice().layers(tile.level) - 1);
+    if (previous != nullptr && tile.block.z * 8 + tile.begin == first) numbering.complete_below(tile, *previous);
+  });
+}
+
+}  // namespace lamina

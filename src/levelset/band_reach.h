@@ -1,0 +1,152 @@
+// Which of the voxels around it a voxel of the band gives a value, and which of them want one.
+#pragma once
+#include <xmmintrin.h>
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "levelset/brick.h"
+#include "octree/corner_block.h"
+
+namespace lamina::volume {
+
+struct Offset {
+  int x, y, z;
+  float squared;  ///< length
+};
+
+/// Rows along y, then x, then z. The middle is one of them, and out of everybody's reach.
+constexpr std::array<Offset, 27> make_offsets() {
+  std::array<Offset, 27> out{};
+  for (int i = 0; i < 27; ++i) {
+    const int x = i / 3 % 3 - 1, y = i % 3 - 1, z = i / 9 - 1;
+    out[static_cast<std::size_t>(i)] = {x, y, z, static_cast<float>(x * x + y * y + z * z)};
+  }
+  return out;
+}
+inline constexpr std::array<Offset, 27> kOffsets = make_offsets();
+
+/// Offsets come in pairs: i behind the middle, its opposite i before it.
+inline constexpr int kPairs = 13, kBehind = 14;
+constexpr std::array<int, kPairs> make_pair_steps() {
+  std::array<int, kPairs> out{};
+  for (std::size_t i = 0; i < kPairs; ++i)
+    out[i] = kOffsets[kBehind + i].x + 8 * kOffsets[kBehind + i].y + 64 * kOffsets[kBehind + i].z;
+  return out;
+}
+inline constexpr std::array<int, kPairs> kPairSteps = make_pair_steps();  ///< in a brick, to the one behind
+
+/// Bit i: the offset of pair i behind the middle, or before it.
+struct PairBits {
+  std::uint16_t behind = 0, before = 0;
+  [[nodiscard]] bool any() const { return (behind | before) != 0; }
+};
+
+/// A voxel reaches another as far as the way to it leads along its normal: squared sideways distance below this. The
+/// best of 26 directions is off by 0.35 at most; a whole voxel sideways would let the band grow over a rim.
+inline constexpr float kSideways = 0.75F;
+
+/// The pairs four at a time. What fills the last four is out of reach.
+inline constexpr int kFours = 4;
+struct FourPairs {
+  Plane x, y, z, room;  ///< `room`: what is left of kSideways
+};
+constexpr std::array<FourPairs, kFours> make_fours() {
+  std::array<FourPairs, kFours> out{};
+  for (std::size_t i = 0; i < kFours; ++i) {
+    std::array<Offset, 4> o{};
+    for (std::size_t k = 0; k < 4; ++k) o[k] = 4 * i + k < kPairs ? kOffsets[4 * i + k + kBehind] : Offset{0, 0, 0, 1};
+    const auto four = [&o](auto value) { return Plane{value(o[0]), value(o[1]), value(o[2]), value(o[3])}; };
+    out[i] = {four([](const Offset& to) { return static_cast<float>(to.x); }),
+              four([](const Offset& to) { return static_cast<float>(to.y); }),
+              four([](const Offset& to) { return static_cast<float>(to.z); }),
+              four([](const Offset& to) { return kSideways - to.squared; })};
+  }
+  return out;
+}
+inline constexpr std::array<FourPairs, kFours> kFourPairs = make_fours();
+
+/// The nearer to the normal, the more.
+inline float weight_of(float near) {
+  return near * near * near * near;
+}
+
+/// What a voxel says to those around it.
+struct Reach {
+  /// The pairs of which one is reached, and whether it is the one behind.
+  std::uint32_t pairs = 0, behind = 0;
+  /// By pair: the way to the one behind along the normal, and what kSideways leaves.
+  alignas(16) std::array<float, std::size_t{4} * kFours> up, near;
+
+  /// Away from the surface only: what lies towards it is a hole in the data, not a part of the band.
+  explicit Reach(const Plane& plane) {
+    const auto signs = [](const Plane& four) {
+      return static_cast<std::uint32_t>(_mm_movemask_ps(std::bit_cast<__m128>(four)));
+    };
+    for (std::size_t i = 0; i < kFours; ++i) {
+      const FourPairs& to = kFourPairs[i];
+      const Plane u = plane[0] * to.x + plane[1] * to.y + plane[2] * to.z;
+      const Plane left = to.room + u * u;
+      _mm_store_ps(&up[4 * i], std::bit_cast<__m128>(u));
+      _mm_store_ps(&near[4 * i], std::bit_cast<__m128>(left));
+      pairs |= signs(left) << (4 * i);
+      behind |= signs(u) << (4 * i);
+    }
+    pairs = ~pairs;
+    if (!(plane[3] < 0)) behind = ~behind;
+  }
+};
+
+/// A voxel's eight bits of a row, three places apart.
+constexpr std::array<std::uint32_t, 256> make_spread() {
+  std::array<std::uint32_t, 256> out{};
+  for (std::uint32_t row = 0; row < 256; ++row)
+    for (std::uint32_t x = 0; x < 8; ++x) out[row] |= (row >> x & 1) << (3 * x);
+  return out;
+}
+inline constexpr std::array<std::uint32_t, 256> kSpread = make_spread();
+
+/// Nine bits backwards.
+constexpr std::array<std::uint16_t, 512> make_backwards() {
+  std::array<std::uint16_t, 512> out{};
+  for (std::uint32_t nine = 0; nine < 512; ++nine)
+    for (std::uint32_t i = 0; i < 9; ++i)
+      out[nine] = static_cast<std::uint16_t>(out[nine] | (nine >> i & 1) << (8 - i));
+  return out;
+}
+inline constexpr std::array<std::uint16_t, 512> kBackwards = make_backwards();
+
+/// The voxels of a brick that want a value, laid out for those around a source to lie side by side.
+class Targets {
+ public:
+  Targets(const BlockMask& wanted, int begin, int end) {
+    for (int z = begin; z < end; ++z) {
+      if (wanted.words[z] == 0) continue;
+      for (int y = 0; y < 8; ++y) {
+        const std::uint64_t row = std::uint64_t{kSpread[wanted.words[z] >> (8 * y) & 0xFF]} << 6;
+        if (row == 0) continue;
+        rows_[at(z, y - 1)] |= row << 2;
+        rows_[at(z, y)] |= row << 1;
+        rows_[at(z, y + 1)] |= row;
+      }
+    }
+  }
+  /// The voxel may lie one beside the brick.
+  [[nodiscard]] PairBits beside(int x, int y, int z) const {
+    const int shift = 3 * (x + 1);
+    const auto nine = [&](int layer) { return static_cast<std::uint32_t>(rows_[at(layer, y)] >> shift) & 0x1FF; };
+    const std::uint32_t low = nine(z - 1), middle = nine(z), high = nine(z + 1);
+    return {static_cast<std::uint16_t>(high << 4 | middle >> 5),
+            static_cast<std::uint16_t>(std::uint32_t{kBackwards[low]} << 4 | kBackwards[middle] >> 5)};
+  }
+
+ private:
+  static constexpr int kRows = 10, kLayers = 12;  ///< y from -1, z from -2
+  static std::size_t at(int z, int y) { return static_cast<std::size_t>((z + 2) * kRows + y + 1); }
+  /// Three bits, those of the rows y - 1, y, y + 1, for each x from -2 on.
+  std::array<std::uint64_t, std::size_t{kRows} * kLayers> rows_{};
+};
+
+}  // namespace lamina::volume

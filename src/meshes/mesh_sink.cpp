@@ -1,0 +1,143 @@
+#include "meshes/mesh_sink.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "base/background_writer.h"
+#include "base/descriptor.h"
+#include "base/output_file.h"
+#include "base/record_writer.h"
+#include "lamina/error.h"
+#include "meshes/mesh_header.h"
+#include "meshes/records.h"
+
+namespace lamina {
+namespace {
+
+constexpr std::size_t kBuffers = 6;  ///< on their way to the disk
+
+MeshSinkSettings checked(MeshSinkSettings settings) {
+  require_ply_names(settings.attributes);
+  return settings;
+}
+
+}  // namespace
+
+struct MeshSink::Impl {
+  explicit Impl(MeshSinkSettings s)
+      : settings(checked(std::move(s))),
+        output(settings.path, settings.tmp_dir),
+        face_directory(settings.tmp_dir.empty() ? output.directory() : settings.tmp_dir),
+        face_file(open_unlinked(face_directory)),
+        writer(buffer_bytes(settings), kBuffers),
+        vertex_writer(writer, vertex_record_bytes(settings.attributes, settings.double_positions)),
+        face_writer(writer, kFaceRecordBytes) {
+    const std::string reserved(mesh_header_bytes(settings), ' ');
+    check_vertices(write_all(output.fd(), reserved.data(), reserved.size()));
+  }
+
+  /// Of which a vertex with very many attributes needs more.
+  static std::size_t buffer_bytes(const MeshSinkSettings& s) {
+    return std::max(RecordWriter::kBytes, vertex_record_bytes(s.attributes, s.double_positions));
+  }
+  void check_vertices(int error) const {
+    if (error != 0) report_write_error(output.name(), error);
+  }
+  /// What the background says may be about either file.
+  void check_written(int error) {
+    if (error == 0) return;
+    if (writer.failed_file() != face_file.get()) check_vertices(error);
+    report_write_error(fmt::format("{}: the temporary face file ({} bytes)", face_directory, face_writer.written()),
+                       error);
+  }
+  void require_open() const {
+    if (committed) throw Error(ExitCode::internal, output.name() + ": is committed, nothing can be added");
+  }
+
+  /// A vertex that never came would make a file no program can read.
+  void require_indices() const {
+    if (triangles > 0 && largest_index >= vertices) {
+      throw Error(ExitCode::internal, fmt::format("{}: a triangle uses vertex {}, the mesh has {} vertices",
+                                                  output.name(), largest_index, vertices));
+    }
+  }
+
+  void commit() {
+    require_open();
+    require_indices();
+    check_written(vertex_writer.flush(output.fd()));
+    check_written(face_writer.flush(face_file.get()));
+    check_written(writer.drain());
+    const std::string header = mesh_header(settings, vertices, triangles);
+    check_vertices(pwrite_all(output.fd(), header.data(), header.size(), 0));
+    if (output.streams()) {
+      Descriptor to = output.destination();
+      check_vertices(copy_all(output.fd(), header.size() + vertex_writer.written(), to.get()));
+      check_vertices(copy_all(face_file.get(), face_writer.written(), to.get()));
+      check_vertices(to.close());
+    } else {
+      check_vertices(move_all(face_file.get(), face_writer.written(), output.fd()));
+      output.publish();
+    }
+    committed = true;
+  }
+
+  MeshSinkSettings settings;
+  OutputFile output;
+  std::string face_directory;
+  Descriptor face_file;
+  BackgroundWriter writer;
+  RecordWriter vertex_writer, face_writer;
+  std::uint64_t vertices = 0, triangles = 0;
+  std::uint32_t largest_index = 0;
+  bool committed = false;
+};
+
+MeshSink::MeshSink(MeshSinkSettings settings) : impl_(std::make_unique<Impl>(std::move(settings))) {}
+MeshSink::~MeshSink() = default;
+
+void MeshSink::append_vertices(const VertexBatch& batch) {
+  Impl& s = *impl_;
+  s.require_open();
+  const AttributeLayout& attributes = s.settings.attributes;
+  const bool wide = s.settings.double_positions;
+  require_writable(batch, attributes, wide, s.vertices);
+  constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
+  if (s.vertices + batch.size() > kMost) {
+    throw Error(ExitCode::budget,
+                fmt::format("{}: the mesh has more than {} vertices, the most 32-bit indices can name; "
+                            "use a larger cell or cut the cloud",
+                            s.output.name(), kMost));
+  }
+  s.check_written(
+      s.vertex_writer.append(s.output.fd(), batch.size(), [&](std::byte* to, std::size_t first, std::size_t n) {
+        encode_vertices(batch, attributes, wide, first, n, to);
+      }));
+  s.vertices += batch.size();
+}
+
+void MeshSink::append_triangles(const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  Impl& s = *impl_;
+  s.require_open();
+  s.check_written(
+      s.face_writer.append(s.face_file.get(), triangles.size(), [&](std::byte* to, std::size_t first, std::size_t n) {
+        s.largest_index = std::max(s.largest_index, encode_faces(triangles.data() + first, n, to));
+      }));
+  s.triangles += triangles.size();
+}
+
+std::uint64_t MeshSink::vertices() const {
+  return impl_->vertices;
+}
+std::uint64_t MeshSink::triangles() const {
+  return impl_->triangles;
+}
+void MeshSink::commit() {
+  impl_->commit();
+}
+
+}  // namespace lamina

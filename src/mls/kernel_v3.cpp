@@ -1,0 +1,20 @@
+// The projection kernel for x86-64-v3 processors (flags set in src/CMakeLists.txt).
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "mls/kernel.h"
+#include "mls/kernels.h"
+
+namespace lamina::kernel_v3 {
+namespace {
+#include "mls/kernel_body.h"
+}  // namespace
+
+Kernel kernel() {
+  return {"x86-64-v3", &accumulate, &accumulate_facing, &fit, &extend};
+}
+
+}  // namespace lamina::kernel_v3

@@ -1,0 +1,176 @@
+#include "mls/refit_normals.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <tuple>
+
+#include "base/floor_divide.h"
+#include "mls/tile_samples.h"
+
+namespace lamina {
+
+/// A bucket with the normals it came with.
+struct RefitNormals::Added {
+  ActiveBucket bucket;  // no attributes
+  std::shared_ptr<const ClumpedBucket> clumped;
+  std::int32_t low = 0, high = 0;  // z
+};
+
+namespace {
+
+/// A sample in its tile, by rows of cells.
+struct Placed {
+  Block block;
+  std::uint16_t row;
+  std::uint32_t sample;
+  [[nodiscard]] auto key() const { return std::tuple(block.z, block.y, block.x, row, sample); }
+};
+
+struct TileSpan {
+  std::size_t begin, end;  // of the placed samples
+};
+
+std::vector<Placed> place(const LocalSamples& s, std::int32_t cell) {
+  const FloorDivider divide(cell);
+  std::vector<Placed> out(s.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, s.size(), 8192), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      const std::array<std::int32_t, 3> c{divide(s.x[i]), divide(s.y[i]), divide(s.z[i])};
+      // Cubes of two cells, so that successive samples see about the same rows.
+      const int row = ((c[2] & 7) >> 1) * 16 + ((c[1] & 7) >> 1) * 4 + ((c[0] & 7) >> 1);
+      out[i] = {{c[0] >> 3, c[1] >> 3, c[2] >> 3}, static_cast<std::uint16_t>(row), static_cast<std::uint32_t>(i)};
+    }
+  });
+  std::sort(out.begin(), out.end(), [](const Placed& a, const Placed& b) { return a.key() < b.key(); });
+  return out;
+}
+
+struct Scratch {
+  RowSamples rows;
+  std::array<SampleRange, RowSamples::kRows> ranges{};
+};
+
+/// Eight samples' normals, from `first` on; those without a fit keep their own.
+void fit_eight(const Kernel& kernel, const LocalSamples& s, const std::vector<Placed>& placed, std::size_t first,
+               std::size_t end, float inv, const std::array<std::uint32_t, 3>& origin, Scratch& scratch,
+               UnitNormals& out) {
+  Queries at{};
+  Queries facing{};
+  const auto relative = [&](std::int32_t v, std::size_t axis) {
+    return static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(v) - origin[axis])) * inv;
+  };
+  for (int l = 0; l < kLanes; ++l) {
+    const std::uint32_t i = placed[std::min(first + static_cast<std::size_t>(l), end - 1)].sample;
+    at.x[l] = relative(s.x[i], 0);
+    at.y[l] = relative(s.y[i], 1);
+    at.z[l] = relative(s.z[i], 2);
+    facing.x[l] = s.nx[i];
+    facing.y[l] = s.ny[i];
+    facing.z[l] = s.nz[i];
+  }
+  const auto [y_lo, y_hi] = std::minmax_element(at.y.v.begin(), at.y.v.end());
+  const auto [z_lo, z_hi] = std::minmax_element(at.z.v.begin(), at.z.v.end());
+  const int n = scratch.rows.ranges(*y_lo, *y_hi, *z_lo, *z_hi, scratch.ranges.data());
+  std::array<Lanes, kSums> sums{};
+  sums[kNearest].v.fill(1e30F);
+  kernel.accumulate_facing(scratch.rows.samples(), scratch.ranges.data(), n, at, facing, sums.data());
+  FitOutput fit{};
+  kernel.fit(sums.data(), FitInput{}, fit);
+  for (int l = 0; l < kLanes && first + static_cast<std::size_t>(l) < end; ++l) {
+    const std::uint32_t i = placed[first + static_cast<std::size_t>(l)].sample;
+    // A fit that turns a normal around, or has too few samples, is no better than what came.
+    constexpr float kFew = 6;
+    const float along = fit.nx[l] * s.nx[i] + fit.ny[l] * s.ny[i] + fit.nz[l] * s.nz[i];
+    const bool keep = !(along > 0) || sums[kSeen][l] < kFew;
+    out.x[i] = keep ? s.nx[i] : fit.nx[l];
+    out.y[i] = keep ? s.ny[i] : fit.ny[l];
+    out.z[i] = keep ? s.nz[i] : fit.nz[l];
+  }
+}
+
+}  // namespace
+
+RefitNormals::RefitNormals(const RefitSettings& settings, const Lattice& lattice, const Kernel& kernel)
+    : settings_(settings), lattice_(lattice), kernel_(kernel) {}
+
+RefitNormals::~RefitNormals() = default;
+
+double RefitNormals::reach() const {
+  return std::ceil(static_cast<double>(settings_.support) * static_cast<double>(settings_.max_radius)) + 1;
+}
+
+void RefitNormals::add(std::size_t bucket, const LocalSamples& samples, const std::vector<float>& radii) {
+  auto added = std::make_unique<Added>();
+  LocalSamples& s = added->bucket.samples;
+  s.x = samples.x;
+  s.y = samples.y;
+  s.z = samples.z;
+  s.nx = samples.nx;
+  s.ny = samples.ny;
+  s.nz = samples.nz;
+  const std::size_t n = s.size();
+  added->bucket.support.resize(n);
+  added->bucket.weight.resize(n);
+  added->bucket.level.assign(n, static_cast<std::uint8_t>(settings_.level));
+  const auto unit = static_cast<float>(lattice_.cell);
+  for (std::size_t i = 0; i < n; ++i) {
+    const float q = radii[i] > 0 ? unit / radii[i] : 0.0F;
+    added->bucket.support[i] = settings_.support * std::min(radii[i], settings_.max_radius);
+    added->bucket.weight[i] = q * q * (samples.quality.empty() ? 1.0F : samples.quality[i]);
+  }
+  const auto [low, high] = std::minmax_element(s.z.begin(), s.z.end());
+  added->low = *low;
+  added->high = *high;
+  added->clumped = std::make_shared<const ClumpedBucket>(clump(added->bucket, lattice_));
+  added_[bucket] = std::move(added);
+}
+
+UnitNormals RefitNormals::find(std::size_t bucket) {
+  const Added& own = *added_.at(bucket);
+  const LocalSamples& s = own.bucket.samples;
+  ClumpedBatch around;
+  for (const auto& [number, other] : added_) {
+    if (static_cast<double>(other->high) + reach() >= own.low && static_cast<double>(other->low) - reach() <= own.high)
+      around.push_back(other->clumped);
+  }
+  const std::int32_t cell = lattice_.cell_size(settings_.level);
+  const std::vector<Placed> placed = place(s, cell);
+  std::vector<TileSpan> tiles;
+  std::vector<Block> blocks;
+  for (std::size_t i = 0; i < placed.size(); ++i) {
+    if (i == 0 || placed[i].block != placed[i - 1].block) {
+      if (!tiles.empty()) tiles.back().end = i;
+      tiles.push_back({i, placed.size()});
+      blocks.push_back(placed[i].block);
+    }
+  }
+  // Samples lie up to a cell beside the points that tiles are made for.
+  const Reach reach{settings_.level, floor_div(own.low, cell), floor_div(own.high, cell) + 1, static_cast<float>(cell),
+                    0};
+  const TileRuns bins = bin_clumps(lattice_, reach, around, blocks);
+  UnitNormals out;
+  for (auto* v : {&out.x, &out.y, &out.z}) v->resize(s.size());
+  tbb::enumerable_thread_specific<Scratch> scratch;
+  tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t t) {
+    Scratch& local = scratch.local();
+    constexpr float kNoBand = 1e4F;
+    local.rows.gather(lattice_, reach, blocks[t], bins.of(t), kNoBand);
+    const std::uint32_t edge = 8U * static_cast<std::uint32_t>(cell);
+    const std::array<std::uint32_t, 3> origin{static_cast<std::uint32_t>(blocks[t].x) * edge,
+                                              static_cast<std::uint32_t>(blocks[t].y) * edge,
+                                              static_cast<std::uint32_t>(blocks[t].z) * edge};
+    for (std::size_t i = tiles[t].begin; i < tiles[t].end; i += kLanes)
+      fit_eight(kernel_, s, placed, i, tiles[t].end, 1.0F / static_cast<float>(cell), origin, local, out);
+  });
+  return out;
+}
+
+void RefitNormals::forget_below(std::int64_t z) {
+  while (!added_.empty() && added_.begin()->second->high < z) added_.erase(added_.begin());
+}
+
+}  // namespace lamina

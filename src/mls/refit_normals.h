@@ -1,0 +1,39 @@
+// Every sample's normal replaced by that of the sphere fitted to the samples around it: noise averages out, and what
+// the projection sums up are normals that agree.
+#pragma once
+#include <map>
+#include <memory>
+
+#include "lattice/lattice.h"
+#include "mls/clumps.h"
+#include "mls/kernel.h"
+#include "samples/normal_filter.h"
+
+namespace lamina {
+
+struct RefitSettings {
+  float support = 4;     ///< radii within which a sample acts, > 0
+  float max_radius = 0;  ///< a longer radius acts as this, steps, > 0: how far is known before streaming
+  int level = 0;         ///< whose cells are about a radius long: only time depends on it
+};
+
+/// The fit is the projection's (kernel.h) at the sample's own place, with the weights of projection, without the
+/// samples whose normals point away from its own. A function of the samples within reach() alone.
+class RefitNormals final : public NormalFilter {
+ public:
+  RefitNormals(const RefitSettings& settings, const Lattice& lattice, const Kernel& kernel);
+  ~RefitNormals() override;
+  [[nodiscard]] double reach() const override;
+  void add(std::size_t bucket, const LocalSamples& samples, const std::vector<float>& radii) override;
+  UnitNormals find(std::size_t bucket) override;
+  void forget_below(std::int64_t z) override;
+
+ private:
+  struct Added;
+  RefitSettings settings_;
+  Lattice lattice_;
+  Kernel kernel_;
+  std::map<std::size_t, std::unique_ptr<Added>> added_;
+};
+
+}  // namespace lamina

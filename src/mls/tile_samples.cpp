@@ -1,0 +1,255 @@
+#include "mls/tile_samples.h"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <tuple>
+
+namespace lamina {
+namespace {
+
+struct Entry {
+  std::uint32_t tile;
+  std::uint32_t clump;
+};
+
+std::int32_t ceil_cell(double x) {
+  return static_cast<std::int32_t>(std::ceil(x));
+}
+std::int32_t floor_cell(double x) {
+  return static_cast<std::int32_t>(std::floor(x));
+}
+
+/// Finds tiles by their block: in a dense table of their box where that is not much larger than their number.
+class TileTable {
+ public:
+  static constexpr std::uint32_t kNone = ~std::uint32_t{0};
+
+  explicit TileTable(std::span<const Block> tiles) : tiles_(tiles) {
+    if (tiles.empty()) return;
+    low_ = high_ = tiles.front();
+    for (const Block& b : tiles) {
+      low_ = {std::min(low_.x, b.x), std::min(low_.y, b.y), std::min(low_.z, b.z)};
+      high_ = {std::max(high_.x, b.x), std::max(high_.y, b.y), std::max(high_.z, b.z)};
+    }
+    nx_ = std::int64_t{high_.x} - low_.x + 1;
+    ny_ = std::int64_t{high_.y} - low_.y + 1;
+    const double volume = static_cast<double>(nx_) * static_cast<double>(ny_) * (1.0 + high_.z - low_.z);
+    if (volume > 4096 + 256.0 * static_cast<double>(tiles.size())) return;
+    numbers_.assign(static_cast<std::size_t>(volume), kNone);
+    for (std::size_t t = 0; t < tiles.size(); ++t) numbers_[place(tiles[t])] = static_cast<std::uint32_t>(t);
+  }
+  [[nodiscard]] std::uint32_t find(const Block& b) const {
+    if (b.x < low_.x || b.y < low_.y || b.z < low_.z || b.x > high_.x || b.y > high_.y || b.z > high_.z) return kNone;
+    if (!numbers_.empty()) return numbers_[place(b)];
+    const auto key = [](const Block& k) { return std::tuple(k.z, k.y, k.x); };
+    const auto at = std::lower_bound(tiles_.begin(), tiles_.end(), b,
+                                     [&](const Block& l, const Block& r) { return key(l) < key(r); });
+    return at != tiles_.end() && *at == b ? static_cast<std::uint32_t>(at - tiles_.begin()) : kNone;
+  }
+
+ private:
+  [[nodiscard]] std::size_t place(const Block& b) const {
+    return static_cast<std::size_t>(((b.z - low_.z) * ny_ + (b.y - low_.y)) * nx_ + (b.x - low_.x));
+  }
+
+  std::span<const Block> tiles_;
+  Block low_{0, 0, 0}, high_{-1, -1, -1};
+  std::int64_t nx_ = 0, ny_ = 0;
+  std::vector<std::uint32_t> numbers_;
+};
+
+/// Lattice points of an axis that a clump reaches.
+struct Points {
+  std::int32_t first, last;
+};
+
+Points points_of(const Clump& c, int axis, const Reach& reach, double inv) {
+  const double low = (double{static_cast<double>(c.low[axis])} - static_cast<double>(reach.margin)) * inv;
+  const double high = (double{static_cast<double>(c.high[axis])} + static_cast<double>(reach.margin)) * inv;
+  return {ceil_cell(low - static_cast<double>(reach.shift)), floor_cell(high - static_cast<double>(reach.shift))};
+}
+
+void bin_bucket(const Lattice& lattice, const Reach& reach, const ClumpedBucket& bucket, std::span<const Block> tiles,
+                const TileTable& table, std::vector<Entry>& out) {
+  const double inv = 1.0 / lattice.cell_size(reach.level);
+  for (std::uint32_t i = 0; i < bucket.clumps.size(); ++i) {
+    const Clump& c = bucket.clumps[i];
+    const Points z = points_of(c, 2, reach, inv);
+    const std::int32_t z0 = std::max(z.first, reach.first);
+    const std::int32_t z1 = std::min(z.last, reach.end - 1);
+    if (z0 > z1) continue;
+    const Points x = points_of(c, 0, reach, inv);
+    const Points y = points_of(c, 1, reach, inv);
+    const Block low{x.first >> 3, y.first >> 3, z0 >> 3};
+    const Block high{x.last >> 3, y.last >> 3, z1 >> 3};
+    // A support far larger than a tile reaches more places than there are tiles.
+    if ((double{1} + high.x - low.x) * (double{1} + high.y - low.y) > static_cast<double>(tiles.size())) {
+      for (std::uint32_t t = 0; t < tiles.size(); ++t) {
+        const Block& b = tiles[t];
+        if (b.x < low.x || b.x > high.x || b.y < low.y || b.y > high.y || b.z < low.z || b.z > high.z) continue;
+        out.push_back({t, i});
+      }
+      continue;
+    }
+    for (std::int32_t bz = low.z; bz <= high.z; ++bz) {
+      for (std::int32_t by = low.y; by <= high.y; ++by) {
+        for (std::int32_t bx = low.x; bx <= high.x; ++bx) {
+          const std::uint32_t tile = table.find({bx, by, bz});
+          if (tile != TileTable::kNone) out.push_back({tile, i});
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+
+TileRuns bin_clumps(const Lattice& lattice, const Reach& reach, const ClumpedBatch& batch,
+                    std::span<const Block> tiles) {
+  const TileTable table(tiles);
+  std::vector<std::vector<Entry>> entries(batch.size());
+  tbb::parallel_for(std::size_t{0}, batch.size(),
+                    [&](std::size_t b) { bin_bucket(lattice, reach, *batch[b], tiles, table, entries[b]); });
+  TileRuns bins;
+  bins.begin.assign(tiles.size() + 1, 0);
+  for (const auto& bucket : entries) {
+    for (const Entry& e : bucket) ++bins.begin[e.tile + 1];
+  }
+  for (std::size_t t = 0; t < tiles.size(); ++t) bins.begin[t + 1] += bins.begin[t];
+  bins.runs.resize(bins.begin.back());
+  std::vector<std::uint32_t> cursor(bins.begin.begin(), bins.begin.end() - 1);
+  for (std::size_t b = 0; b < batch.size(); ++b) {
+    for (const Entry& e : entries[b]) {
+      const Clump& c = batch[b]->clumps[e.clump];
+      bins.runs[cursor[e.tile]++] = {batch[b].get(), c.begin, c.end};
+    }
+  }
+  return bins;
+}
+
+void RowSamples::gather(const Lattice& lattice, const Reach& reach, const Block& block, std::span<const Run> runs,
+                        float band) {
+  select(lattice, reach, block, runs);
+  place(lattice, reach.level, runs, band);
+}
+
+void RowSamples::select(const Lattice& lattice, const Reach& reach, const Block& block, std::span<const Run> runs) {
+  constexpr std::size_t kPiece = 64;
+  const std::int32_t a = lattice.cell_size(reach.level);
+  const float inv = 1.0F / static_cast<float>(a);
+  // Differences are taken in integers: exact however far the tile lies from the origin.
+  const auto origin = [a](std::int32_t b) {
+    return static_cast<std::uint32_t>(b) * 8U * static_cast<std::uint32_t>(a);
+  };
+  const std::uint32_t ox = origin(block.x);
+  const std::uint32_t oy = origin(block.y);
+  const std::uint32_t oz = origin(block.z);
+  // Points of the block: their middle, and how far they lie from it at most, rounding included.
+  const float margin = reach.margin * inv + 1e-4F;
+  const auto z_first = static_cast<float>(std::max(reach.first - block.z * 8, 0)) + reach.shift;
+  const auto z_last = static_cast<float>(std::min(reach.end - 1 - block.z * 8, 7)) + reach.shift;
+  const float middle = 3.5F + reach.shift;
+  const float half = 3.5F + margin;
+  const float z_middle = 0.5F * (z_first + z_last);
+  const float z_half = 0.5F * (z_last - z_first) + margin;
+
+  found_.resize(found_.capacity());
+  std::size_t n = 0;
+  struct Piece {
+    std::array<float, kPiece> x, y, z, support;
+    std::array<std::int32_t, kPiece> row, keep;
+  } p;
+  for (std::uint32_t r = 0; r < runs.size(); ++r) {
+    const ClumpedBucket& from = *runs[r].from;
+    for (std::size_t begin = runs[r].begin; begin < runs[r].end; begin += kPiece) {
+      const std::size_t count = std::min<std::size_t>(kPiece, runs[r].end - begin);
+      const std::int32_t* const px = from.x.data() + begin;
+      const std::int32_t* const py = from.y.data() + begin;
+      const std::int32_t* const pz = from.z.data() + begin;
+      const float* const ps = from.support.data() + begin;
+      for (std::size_t i = 0; i < count; ++i) {
+        const float x = static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(px[i]) - ox)) * inv;
+        const float y = static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(py[i]) - oy)) * inv;
+        const float z = static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(pz[i]) - oz)) * inv;
+        const float s = ps[i] * inv;
+        p.x[i] = x;
+        p.y[i] = y;
+        p.z[i] = z;
+        p.support[i] = s;
+        p.keep[i] = static_cast<int>(std::abs(x - middle) <= half + s) &
+                    static_cast<int>(std::abs(y - middle) <= half + s) &
+                    static_cast<int>(std::abs(z - z_middle) <= z_half + s);
+        // Rows by the very coordinates the sums use: what ranges() cuts off lies beyond the support in these, too.
+        constexpr float kLast = kRows - 1;
+        const float row_y = std::min(std::max(std::floor(y) - static_cast<float>(kLow), 0.0F), kLast);
+        const float row_z = std::min(std::max(std::floor(z) - static_cast<float>(kLow), 0.0F), kLast);
+        p.row[i] = static_cast<std::int32_t>(row_z) * kRows + static_cast<std::int32_t>(row_y);
+      }
+      if (n + count > found_.size()) found_.resize(2 * found_.size() + count);
+      for (std::size_t i = 0; i < count; ++i) {
+        found_[n] = {p.x[i], p.y[i], p.z[i], p.support[i], p.row[i], r, static_cast<std::uint32_t>(begin + i)};
+        n += static_cast<std::size_t>(p.keep[i]);
+      }
+    }
+  }
+  found_.resize(n);
+}
+
+void RowSamples::place(const Lattice& lattice, int level, std::span<const Run> runs, float band) {
+  const float inv = 1.0F / static_cast<float>(lattice.cell_size(level));
+  const std::size_t attributes = runs.empty() ? 0 : runs.front().from->attributes.size();
+  samples_.resize(found_.size(), attributes);
+  row_begin_.assign(kRows * kRows + 1, 0);
+  for (const Found& f : found_) ++row_begin_[static_cast<std::size_t>(f.row) + 1];
+  for (std::size_t r = 0; r < kRows * kRows; ++r) row_begin_[r + 1] += row_begin_[r];
+  std::array<std::uint32_t, kRows * kRows> cursor{};
+  std::copy_n(row_begin_.begin(), kRows * kRows, cursor.begin());
+  max_support_ = 0;
+  for (const Found& f : found_) {
+    const std::uint32_t to = cursor[static_cast<std::size_t>(f.row)]++;
+    const ClumpedBucket& from = *runs[f.run].from;
+    samples_.x[to] = f.x;
+    samples_.y[to] = f.y;
+    samples_.z[to] = f.z;
+    samples_.nx[to] = from.nx[f.sample];
+    samples_.ny[to] = from.ny[f.sample];
+    samples_.nz[to] = from.nz[f.sample];
+    samples_.support[to] = f.support;
+    samples_.weight[to] = from.weight[f.sample];
+    samples_.inv_band2[to] = from.cell[f.sample];
+    for (std::size_t c = 0; c < attributes; ++c) samples_.attributes[c][to] = from.attributes[c][f.sample];
+    max_support_ = std::max(max_support_, f.support);
+  }
+  samples_.banded = false;
+  for (std::size_t k = 0; k < found_.size(); ++k) {
+    const float reach = band * samples_.inv_band2[k] * inv;
+    samples_.inv_support2[k] = 1.0F / (samples_.support[k] * samples_.support[k]);
+    samples_.inv_band2[k] = 1.0F / (reach * reach);
+    samples_.banded |= reach < samples_.support[k];
+  }
+}
+
+int RowSamples::ranges(float y_lo, float y_hi, float z_lo, float z_hi, SampleRange* out) const {
+  const auto row = [](float v) {
+    return static_cast<int>(std::clamp(std::floor(v) - static_cast<float>(kLow), 0.0F, static_cast<float>(kRows - 1)));
+  };
+  const int y0 = row(y_lo - max_support_);
+  const int y1 = row(y_hi + max_support_);
+  const int z1 = row(z_hi + max_support_);
+  int n = 0;
+  for (int z = row(z_lo - max_support_); z <= z1; ++z) {
+    const std::uint32_t begin = row_begin_[static_cast<std::size_t>(z * kRows + y0)];
+    const std::uint32_t end = row_begin_[static_cast<std::size_t>(z * kRows + y1 + 1)];
+    if (begin == end) continue;
+    if (n > 0 && out[n - 1].end == begin) {
+      out[n - 1].end = end;
+    } else {
+      out[n++] = {begin, end};
+    }
+  }
+  return n;
+}
+
+}  // namespace lamina

@@ -1,0 +1,133 @@
+// An 8^3 block of cells and of the corners at their lower ends: what a leaf of the window's trees holds. Masks tell
+// what exists, one array per slab holds the values of the corners that have any.
+#pragma once
+#include <array>
+#include <bit>
+#include <cstdint>
+#include <memory>
+#include <new>
+#include <utility>
+#include <vector>
+
+#include "lattice/block_mask.h"
+
+namespace lamina {
+
+/// What a valued corner holds after projection, in channels (lengths in fixed-point steps).
+/// Distance is signed (positive outside), the normal is the fit's at the projected point, which lies at corner -
+/// distance * normal; curvature is the fit's signed curvature there (1/steps, positive where the surface bends away
+/// from its normal, as a sphere seen from outside); reach is |projected point - weighted average| in units of the local
+/// support radius. Of a corner that is not trusted the projected point is that average itself (its reach is the fit's).
+enum Channel : int { kDistance = 0, kNormalX, kNormalY, kNormalZ, kCurvature, kReach, kFirstAttribute };
+
+/// Leaves what it allocates as it is, for values that are written next.
+template <typename T>
+struct RawAllocator : std::allocator<T> {
+  template <typename U>
+  struct rebind {
+    using other = RawAllocator<U>;
+  };
+  template <typename U>
+  void construct(U* at) noexcept {
+    ::new (static_cast<void*>(at)) U;
+  }
+  template <typename U, typename... Args>
+  void construct(U* at, Args&&... args) {
+    ::new (static_cast<void*>(at)) U(std::forward<Args>(args)...);
+  }
+};
+
+/// Values of the `near` corners of one slab's layers inside a leaf: a record of channels per corner, in mask order.
+/// Stages ask for all of a corner, so that records touch fewer lines of the cache than an array per channel would.
+struct CornerValues {
+  std::vector<float, RawAllocator<float>> data;
+  std::uint32_t count = 0;  ///< corners
+  std::uint32_t channels = 0;
+
+  /// One channel of all corners.
+  template <typename T>
+  struct Strided {
+    T* first;
+    std::uint32_t stride;
+    T& operator[](std::size_t i) const { return first[i * stride]; }
+  };
+
+  /// Room for values yet to be written.
+  void allocate(std::uint32_t corners, int channel_count) {
+    count = corners;
+    channels = static_cast<std::uint32_t>(channel_count);
+    data.clear();
+    data.resize(std::size_t{count} * channels);
+  }
+  [[nodiscard]] float* of(std::uint32_t corner) { return data.data() + std::size_t{corner} * channels; }
+  [[nodiscard]] const float* of(std::uint32_t corner) const { return data.data() + std::size_t{corner} * channels; }
+  [[nodiscard]] Strided<float> channel(int c) { return {data.data() + c, channels}; }
+  [[nodiscard]] Strided<const float> channel(int c) const { return {data.data() + c, channels}; }
+};
+
+/// Numbers of the isovertices and surface corners of one layer, written by extraction. Tables are per slab
+/// (IsoSlab::vertices, IsoSlab::corners); the number of an accepted edge is its layer's base plus its rank in the
+/// layer's word of axis x, then y, then z; that of a corner is the base plus its rank in `surface`.
+struct LayerNumbers {
+  std::uint32_t vertex_base = 0;
+  std::uint32_t corner_base = 0;
+};
+
+/// Points of a block that are projected, and what came of it.
+struct Projected {
+  BlockMask near;  ///< worth projecting, close enough to samples; once projected: carry values (CornerValues)
+  BlockMask seen;  ///< subset of near: samples contributed; an edge with such an end is valid
+  BlockMask good;  ///< subset of seen: own value is trusted; other corners are extended from good neighbours
+  std::array<CornerValues, 8> values;  ///< by slab inside the leaf, Window::brick_of()
+
+  /// Index of a corner in CornerValues of its brick (`brick_layers` = layers of a slab inside a leaf, a power of two <=
+  /// 8). Meaningful only where near.test(offset).
+  [[nodiscard]] std::uint32_t value_index(int offset, int brick_layers) const {
+    const int z = offset >> 6;
+    std::uint32_t n = 0;
+    for (int w = z & ~(brick_layers - 1); w < z; ++w) n += static_cast<std::uint32_t>(std::popcount(near.words[w]));
+    return n + static_cast<std::uint32_t>(std::popcount(near.words[z] & ((std::uint64_t{1} << (offset & 63)) - 1)));
+  }
+};
+
+struct CornerBlock : Projected {
+  /// The blocks around this one in its level, itself in the middle, null where there is none; kept by the window.
+  std::array<CornerBlock*, 27> around{};
+  static constexpr int towards(int dx, int dy, int dz) { return 13 + dx + 3 * dy + 9 * dz; }
+
+  // Layers in which extraction has something to look at, bit z for layer z: most leaves lie off the surface.
+  std::uint8_t busy_layers = 0;      ///< `busy` is not empty
+  std::uint8_t doubtful_layers = 0;  ///< an edge is in `crossing` and not in `accepted`
+  std::uint8_t surface_layers = 0;   ///< `surface` may hold corners: an accepted edge begins or ends there
+  bool inherits = false;             ///< `above` is not empty
+
+  // Cells of the octree. A cell of this level exists when its parent is split (or at the coarsest level when touched).
+  BlockMask home;     ///< cells that hold a sample of this level
+  BlockMask touched;  ///< cells that a sample of this level reaches: within three cells of its home
+  BlockMask close;    ///< where cells are split: within one cell of the home of a sample of this or a coarser level
+  BlockMask above;    ///< cells within one cell of the home of a sample of a coarser level
+  BlockMask reached;  ///< cells that a sample of this or a coarser level reaches
+  BlockMask split;    ///< subdivided cells
+  BlockMask cells;    ///< leaf cells that take part: existing, not split, reached by a sample
+
+  // Corners.
+  BlockMask acted_on;  ///< corners up to two cells from a sample of this level, and not beyond its support
+  BlockMask corners;   ///< of the leaf cells in `cells`, of this level
+  BlockMask shared;    ///< subset of corners: held by a finer level too, whose value counts
+  BlockMask positive;  ///< sign (outside): once projected, of the seen corners' own distances; once finished, of all
+  // Set when the slab is finished.
+  BlockMask valued;   ///< subset of corners: the sign rests on samples, its own or its neighbours'; others are a guess
+  BlockMask carried;  ///< corners with samples of their own, or with trusted neighbours on all sides
+
+  // Minimal edges with a sign change, by axis, keyed by their lower corner; written by extraction.
+  std::array<BlockMask, 3> crossing;
+  std::array<BlockMask, 3> accepted;  ///< subset of crossing: the isovertex is valid
+  BlockMask busy;     ///< cells with an accepted edge of this or a finer level at or above their low corner
+  BlockMask surface;  ///< corners at an end of an accepted edge
+  std::array<LayerNumbers, 8> numbers{};
+
+  /// Cell centres, where diffusion projects those instead of the corners; shared so that a block can be copied.
+  std::shared_ptr<Projected> centres;
+};
+
+}  // namespace lamina

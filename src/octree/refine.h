@@ -1,0 +1,39 @@
+// Adaptive refinement: which cells of which level exist, and which corners are worth projecting (METHOD 3.4).
+#pragma once
+#include <cstdint>
+#include <span>
+
+#include "octree/window.h"
+
+namespace lamina {
+
+/// Where a sample lies and the level its radius asks for.
+struct Mark {
+  std::int32_t x, y, z;  ///< fixed-point position
+  std::uint8_t level;    ///< coarsest level whose cells are small enough for the sample
+  float reach;           ///< how far it acts on corners, steps, > 0
+};
+
+/// Notes samples' home cells and the corners they act on among those up to two cells away (on each axis the two below
+/// and the two above). Any order, from several threads at once, slabs at will ahead of refine_slab(); quick where one
+/// sample after the other lies in the same block.
+void mark_samples(Window& window, std::span<const Mark> marks);
+
+/// Fixes the octree of one slab: cells that samples reach, subdivision, taking part. Samples must be marked up to three
+/// slabs further, and the slab below be refined. A cell is split when a sample of a finer level lies within three
+/// of that level's cells (METHOD 3.4 with a wider ball, taken as the cells it can meet).
+void refine_slab(Window& window, std::int32_t slab);
+
+/// Cells of the block's layers [begin, end) within one cell of the home of a sample of this or a coarser level, to
+/// `out` from its front. The slab must be refined.
+void close_cells(const CornerBlock& leaf, int begin, int end, std::uint64_t* out);
+
+/// Fixes the corners of one slab (its layers of corners, the first plane included) and of them the ones to project:
+/// those that samples were found to act on, and those of cells close to a sample of a coarser level. The slab and the
+/// one below must be refined.
+void place_corners(Window& window, std::int32_t slab);
+
+/// Leaf cells of a slab at a level.
+std::uint64_t count_cells(const Window& window, int level, std::int32_t slab);
+
+}  // namespace lamina

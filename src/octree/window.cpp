@@ -1,0 +1,282 @@
+#include "octree/window.h"
+
+#include <algorithm>
+#include <atomic>
+#include <deque>
+#include <limits>
+#include <mutex>
+#include <set>
+#include <tuple>
+
+#include "octree/corner_leaf.h"
+
+namespace lamina {
+namespace {
+
+openvdb::Coord leaf_origin(const Block& b) {
+  return {b.z * 8, b.y * 8, b.x * 8};
+}
+
+/// Beyond this many entries a layer's lookup table costs more memory than it saves time.
+constexpr std::int64_t kTableLimit = std::int64_t{1} << 22;
+
+std::size_t value_bytes(const Projected& points) {
+  std::size_t bytes = 0;
+  for (const CornerValues& v : points.values) bytes += sizeof(float) * v.data.capacity();
+  return bytes;
+}
+
+using Upper = CornerTree::RootNodeType::ChildNodeType;
+using Lower = Upper::ChildNodeType;
+
+/// Inner nodes that had leaves, by origin: in order of the sweep.
+using Branches = std::set<openvdb::Coord>;
+
+bool before(const Tile& a, const Tile& b) {
+  return std::tie(a.block.y, a.block.x) < std::tie(b.block.y, b.block.x);
+}
+
+/// Removes the inner nodes that end at or below a layer of cells.
+template <typename Node>
+void retire_branches(CornerTree& tree, Branches& branches, std::int32_t end) {
+  while (!branches.empty() && branches.begin()->x() + static_cast<std::int32_t>(Node::DIM) <= end) {
+    delete tree.stealNode<Node>(*branches.begin(), false, false);
+    branches.erase(branches.begin());
+  }
+}
+
+}  // namespace
+
+struct Window::Trees {
+  /// The leaves of one layer of blocks: as a list, put in order when it is asked for, and by place for quick lookup.
+  struct Layer {
+    std::vector<Tile> tiles;
+    std::size_t ordered = 0;  ///< so many of the tiles are in canonical order
+    std::vector<CornerBlock*> table;
+  };
+  struct Level {
+    CornerTree tree{false};
+    std::deque<Layer> layers;  ///< block layers z_base, z_base + 1, ...
+    std::int32_t z_base = 0;
+    Branches lower, upper;                        ///< inner nodes with retired leaves
+    std::int32_t x0 = 0, y0 = 0, nx = 0, ny = 0;  ///< extent of the tables in blocks
+  };
+  std::vector<Level> levels;
+  std::vector<std::unique_ptr<CornerLeaf>> spare;  ///< retired leaves, used again: leaves come and go all the time
+  std::mutex creation;
+
+  /// Entry of the lookup table, null where the block lies outside of it.
+  static CornerBlock** slot(Level& level, const Block& b) {
+    const std::int32_t x = b.x - level.x0;
+    const std::int32_t y = b.y - level.y0;
+    const std::int32_t z = b.z - level.z_base;
+    if (x < 0 || y < 0 || z < 0 || x >= level.nx || y >= level.ny ||
+        z >= static_cast<std::int32_t>(level.layers.size())) {
+      return nullptr;
+    }
+    return &level.layers[z].table[static_cast<std::size_t>(y) * level.nx + x];
+  }
+
+  CornerBlock* find(int l, const Block& b) {
+    Level& level = levels[l];
+    if (CornerBlock** s = slot(level, b)) return *s;
+    // Every leaf has its layer.
+    if (b.z < level.z_base || b.z - level.z_base >= static_cast<std::int32_t>(level.layers.size())) return nullptr;
+    CornerLeaf* leaf = level.tree.probeLeaf(leaf_origin(b));
+    return leaf == nullptr ? nullptr : &leaf->block;
+  }
+
+  void cover(Level& level, std::int32_t z) {
+    if (level.layers.empty()) level.z_base = z;
+    const auto entries = static_cast<std::size_t>(level.nx) * static_cast<std::size_t>(level.ny);
+    while (z < level.z_base) {
+      level.layers.emplace_front().table.assign(entries, nullptr);
+      --level.z_base;
+    }
+    while (z >= level.z_base + static_cast<std::int32_t>(level.layers.size())) {
+      level.layers.emplace_back().table.assign(entries, nullptr);
+    }
+  }
+
+  CornerBlock& create(int l, const Block& b) {
+    Level& level = levels[l];
+    cover(level, b.z);
+    CornerLeaf* leaf = new_leaf(leaf_origin(b));
+    level.tree.addLeaf(leaf);
+    CornerBlock& block = leaf->block;
+    level.layers[b.z - level.z_base].tiles.push_back({b, &block});
+    introduce(l, b, block);
+    if (CornerBlock** s = slot(level, b)) std::atomic_ref(*s).store(&block, std::memory_order_release);
+    return block;
+  }
+
+  CornerLeaf* new_leaf(const openvdb::Coord& origin) {
+    if (spare.empty()) return new CornerLeaf(origin);
+    CornerLeaf* leaf = spare.back().release();
+    spare.pop_back();
+    leaf->setOrigin(origin);
+    std::destroy_at(&leaf->block);
+    std::construct_at(&leaf->block);
+    return leaf;
+  }
+
+  void retire(Level& level, const Tile& t) {
+    take_leave(*t.leaf);
+    for (CornerValues& v : t.leaf->values) v = {};
+    t.leaf->centres.reset();
+    spare.emplace_back(level.tree.stealNode<CornerLeaf>(leaf_origin(t.block), false, false));
+  }
+
+  /// Stages look at a leaf's neighbours far more often than leaves come and go.
+  void introduce(int l, const Block& b, CornerBlock& block) {
+    for (int i = 0; i < 27; ++i) {
+      CornerBlock* other = i == 13 ? &block : find(l, {b.x + i % 3 - 1, b.y + i / 3 % 3 - 1, b.z + i / 9 - 1});
+      block.around[i] = other;
+      if (other != nullptr) other->around[26 - i] = &block;
+    }
+  }
+
+  /// Of the neighbours only those above outlive a layer.
+  static void take_leave(const CornerBlock& block) {
+    for (int i = 18; i < 27; ++i) {
+      if (block.around[i] != nullptr) block.around[i]->around[26 - i] = nullptr;
+    }
+  }
+
+  static std::span<const Tile> in_order(Layer& layer) {
+    if (layer.ordered == layer.tiles.size()) return layer.tiles;
+    const auto added = layer.tiles.begin() + static_cast<std::ptrdiff_t>(layer.ordered);
+    std::sort(added, layer.tiles.end(), before);
+    std::inplace_merge(layer.tiles.begin(), added, layer.tiles.end(), before);
+    layer.ordered = layer.tiles.size();
+    return layer.tiles;
+  }
+};
+
+Window::Window(const Lattice& lattice, int attributes, const Bounds& bounds)
+    : lattice_(lattice), attributes_(attributes), trees_(std::make_unique<Trees>()) {
+  trees_->levels.resize(static_cast<std::size_t>(lattice.levels));
+  for (int l = 0; l < lattice.levels; ++l) {
+    Trees::Level& level = trees_->levels[l];
+    // Cells reach 2^28 steps, eight of them more than an int; one block holds every bound then, whatever its end.
+    const std::int32_t block = std::min(lattice.cell_size(l), std::numeric_limits<std::int32_t>::max() / 8) * 8;
+    if (bounds.x_max < bounds.x_min) continue;
+    const std::int32_t x0 = floor_div(bounds.x_min, block) - 1;
+    const std::int32_t y0 = floor_div(bounds.y_min, block) - 1;
+    const std::int32_t nx = floor_div(bounds.x_max, block) + 2 - x0;
+    const std::int32_t ny = floor_div(bounds.y_max, block) + 2 - y0;
+    if (std::int64_t{nx} * ny > kTableLimit) continue;
+    std::tie(level.x0, level.y0, level.nx, level.ny) = std::tie(x0, y0, nx, ny);
+  }
+}
+
+Window::~Window() = default;
+
+const CornerBlock* Window::probe(int level, const Block& b) const {
+  return trees_->find(level, b);
+}
+
+CornerBlock* Window::probe(int level, const Block& b) {
+  return trees_->find(level, b);
+}
+
+CornerBlock& Window::touch(int level, const Block& b) {
+  if (CornerBlock* block = trees_->find(level, b)) return *block;
+  return trees_->create(level, b);
+}
+
+void Window::cover(std::int32_t slab) {
+  for (int l = 0; l < levels(); ++l) {
+    const std::int32_t first = lattice_.first_layer(l, slab);
+    trees_->cover(trees_->levels[l], first >> 3);
+    trees_->cover(trees_->levels[l], (first + lattice_.layers(l) - 1) >> 3);
+  }
+}
+
+CornerBlock& Window::touch_shared(int level, const Block& b) {
+  if (CornerBlock** slot = Trees::slot(trees_->levels[level], b)) {
+    if (CornerBlock* block = std::atomic_ref(*slot).load(std::memory_order_acquire)) return *block;
+  }
+  const std::lock_guard lock(trees_->creation);
+  return touch(level, b);
+}
+
+Tiles Window::tiles(int level, std::int32_t slab) const {
+  const std::int32_t first = lattice_.first_layer(level, slab);
+  const std::int32_t last = first + lattice_.layers(level) - 1;
+  Trees::Level& l = trees_->levels[level];
+  const std::int32_t z_end = std::min(last >> 3, l.z_base + static_cast<std::int32_t>(l.layers.size()) - 1);
+  const std::int32_t z_begin = std::max(first >> 3, l.z_base);
+  if (z_begin > z_end) return Tiles(std::span<const Tile>{});
+  if (z_begin == z_end) return Tiles(Trees::in_order(l.layers[z_begin - l.z_base]));
+  std::vector<Tile> joined;
+  for (std::int32_t z = z_begin; z <= z_end; ++z) {
+    const std::span<const Tile> layer = Trees::in_order(l.layers[z - l.z_base]);
+    joined.insert(joined.end(), layer.begin(), layer.end());
+  }
+  return Tiles(std::move(joined));
+}
+
+void Window::retire_values(std::int32_t slab) {
+  for (int level = 0; level < levels(); ++level) {
+    const int brick = brick_of(level, lattice_.first_layer(level, slab) & 7);
+    for (const Tile& t : tiles(level, slab)) {
+      t.leaf->values[brick] = {};
+      if (t.leaf->centres != nullptr) t.leaf->centres->values[brick] = {};
+    }
+  }
+}
+
+void Window::retire_below(std::int32_t slab) {
+  for (int l = 0; l < levels(); ++l) {
+    Trees::Level& level = trees_->levels[l];
+    const std::int32_t first = lattice_.first_layer(l, slab);
+    while (!level.layers.empty() && level.z_base * 8 + 8 <= first) {
+      openvdb::Coord last = openvdb::Coord::max();
+      for (const Tile& t : level.layers.front().tiles) {
+        const openvdb::Coord origin = leaf_origin(t.block);
+        trees_->retire(level, t);
+        const openvdb::Coord lower = origin & ~(static_cast<std::int32_t>(Lower::DIM) - 1);
+        if (lower == last) continue;  // neighbours mostly share their inner nodes
+        last = lower;
+        level.lower.insert(lower);
+        level.upper.insert(origin & ~(static_cast<std::int32_t>(Upper::DIM) - 1));
+      }
+      level.layers.pop_front();
+      ++level.z_base;
+    }
+    retire_branches<Lower>(level.tree, level.lower, first);
+    const std::size_t before = level.upper.size();
+    retire_branches<Upper>(level.tree, level.upper, first);
+    if (level.upper.size() < before) level.tree.root().eraseBackgroundTiles();
+  }
+  // A slab behind the widest cross-section gives its memory back.
+  if (const std::size_t used = leaf_count(); trees_->spare.size() > used) trees_->spare.resize(used);
+}
+
+std::size_t Window::leaf_count() const {
+  std::size_t n = 0;
+  for (const auto& level : trees_->levels) {
+    for (const auto& layer : level.layers) n += layer.tiles.size();
+  }
+  return n;
+}
+
+std::size_t Window::memory() const {
+  std::size_t bytes = trees_->spare.size() * sizeof(CornerLeaf);
+  for (const auto& level : trees_->levels) {
+    const std::vector<openvdb::Index32> nodes = level.tree.nodeCount();
+    bytes += nodes[Lower::LEVEL] * sizeof(Lower) + nodes[Upper::LEVEL] * sizeof(Upper);
+    for (const auto& layer : level.layers) {
+      bytes += layer.table.capacity() * sizeof(CornerBlock*);
+      for (const Tile& t : layer.tiles) {
+        bytes += sizeof(CornerLeaf);
+        bytes += value_bytes(*t.leaf);
+        if (t.leaf->centres != nullptr) bytes += sizeof(Projected) + value_bytes(*t.leaf->centres);
+      }
+    }
+  }
+  return bytes;
+}
+
+}  // namespace lamina

@@ -1,0 +1,83 @@
+#include "reconstruct/mesh_output.h"
+
+#include <tbb/task_arena.h>
+
+#include <utility>
+
+#include "reconstruct/final_vertices.h"
+
+namespace lamina {
+
+MeshOutput::MeshOutput(const ClusterSettings& settings, float chord, double finest, const RadiusRule& radii,
+                       bool curvature, const Frame& frame, SlabSink& sink)
+    : chord_(chord),
+      finest_(finest),
+      radii_(radii),
+      curvature_(curvature),
+      frame_(frame),
+      sink_(sink),
+      clusterer_(settings) {}
+
+MeshOutput::~MeshOutput() {
+  tasks_.cancel();
+  try {
+    tasks_.wait();
+  } catch (...) {  // the caller has its own reason to leave
+  }
+}
+
+void MeshOutput::push(std::shared_ptr<IsoSlab> slab) {
+  queued_.push_back(std::move(slab));
+}
+
+void MeshOutput::start() {
+  tasks_.wait();
+  if (queued_.empty()) return;
+  if (tbb::this_task_arena::max_concurrency() == 1) {
+    work(std::exchange(queued_, {}), false);
+    return;
+  }
+  tasks_.run([this, slabs = std::exchange(queued_, {})] { work(slabs, false); });
+}
+
+void MeshOutput::wait() {
+  tasks_.wait();
+  work(std::exchange(queued_, {}), false);
+}
+
+void MeshOutput::finish() {
+  tasks_.wait();
+  work(std::exchange(queued_, {}), true);
+}
+
+std::shared_ptr<IsoSlab> MeshOutput::spare() {
+  const std::lock_guard lock(mutex_);
+  if (spares_.empty()) return std::make_shared<IsoSlab>();
+  std::shared_ptr<IsoSlab> slab = std::move(spares_.back());
+  spares_.pop_back();
+  return slab;
+}
+
+void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
+  for (std::shared_ptr<IsoSlab>& slab : slabs) {
+    clusterer_.push(slab);
+    clustered_.push_back(std::move(slab));
+  }
+  if (last) clusterer_.finish();
+  while (clusterer_.pop(done_)) {
+    const IsoSlab* next = clustered_.size() > 1 ? clustered_[1].get() : nullptr;
+    place_vertices(done_, *clustered_.front(), next, frame_, chord_, vertices_);
+    if (finest_ > 0) place_levels(done_, *clustered_.front(), next, finest_, vertices_);
+    if (curvature_) place_curvatures(done_, *clustered_.front(), next, frame_.step, vertices_);
+    place_radii(done_, *clustered_.front(), next, radii_, vertices_);
+    sink_.write(done_, vertices_);
+    triangles_ += done_.triangles.size();
+    if (clustered_.front().use_count() == 1) {
+      const std::lock_guard lock(mutex_);
+      spares_.push_back(std::move(clustered_.front()));
+    }
+    clustered_.pop_front();
+  }
+}
+
+}  // namespace lamina

@@ -1,0 +1,95 @@
+// The end of the pipeline: triangulated slabs are clustered, placed and written while the window goes on.
+#pragma once
+#include <tbb/task_group.h>
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "clustering/cluster.h"
+#include "isosurface/iso_mesh.h"
+#include "lamina/frame.h"
+#include "meshes/mesh_sink.h"
+#include "reconstruct/final_vertices.h"
+
+namespace lamina {
+
+/// Where finished slabs go, in ascending order, by one thread at a time.
+class SlabSink {
+ public:
+  SlabSink() = default;
+  virtual ~SlabSink() = default;
+  SlabSink(const SlabSink&) = delete;
+  SlabSink& operator=(const SlabSink&) = delete;
+  /// `vertices` are those of `slab`; its triangles name them, and those of the slab before, by numbers from the first
+  /// vertex written on.
+  virtual void write(const FinalSlab& slab, const VertexBatch& vertices) = 0;
+};
+
+/// One mesh file.
+class MeshFileSlabs : public SlabSink {
+ public:
+  explicit MeshFileSlabs(MeshSink& sink) : sink_(sink) {}
+  void write(const FinalSlab& slab, const VertexBatch& vertices) override {
+    sink_.append_vertices(vertices);
+    sink_.append_triangles(slab.triangles);
+  }
+
+ private:
+  MeshSink& sink_;
+};
+
+/// Slabs go in by ascending number; what comes out does not depend on when. With one thread everything happens inside
+/// start().
+class MeshOutput {
+ public:
+  /// `chord`: SurfaceSettings::chord. `finest`: the finest level's cell where vertices are to have their level as the
+  /// last attribute, else 0. `radii`: of cells.
+  /// `curvature`: vertices have it as the last attribute.
+  /// The sink is the caller's; nobody else may write to it.
+  MeshOutput(const ClusterSettings& settings, float chord, double finest, const RadiusRule& radii, bool curvature,
+             const Frame& frame, SlabSink& sink);
+  /// Drops what is not written yet.
+  ~MeshOutput();
+  MeshOutput(const MeshOutput&) = delete;
+  MeshOutput& operator=(const MeshOutput&) = delete;
+
+  /// Hands over the next slab; the caller must not touch it again.
+  void push(std::shared_ptr<IsoSlab> slab);
+  /// Waits for what was started before, then starts on the slabs handed over since. Throws what the sink threw.
+  void start();
+  /// Works off the slabs handed over since and waits: all that they decide is in the sink when this returns.
+  void wait();
+  /// Everything is in the sink when this returns: no more slabs come.
+  void finish();
+  /// An empty slab, with the storage of one that was written where there is any.
+  std::shared_ptr<IsoSlab> spare();
+  /// Written so far; at any time.
+  [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
+  /// After finish().
+  [[nodiscard]] const ClusterCounts& counts() const { return clusterer_.counts(); }
+
+ private:
+  void work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last);
+
+  float chord_;
+  double finest_;
+  RadiusRule radii_;
+  bool curvature_;
+  const Frame& frame_;
+  SlabSink& sink_;
+  Clusterer clusterer_;
+  std::vector<std::shared_ptr<IsoSlab>> queued_;
+  std::deque<std::shared_ptr<IsoSlab>> clustered_;  ///< by the clusterer, not yet written
+  FinalSlab done_;                                  ///< lent to the clusterer and back: its storage is kept
+  VertexBatch vertices_;
+  std::mutex mutex_;  ///< of spares_
+  std::vector<std::shared_ptr<IsoSlab>> spares_;
+  std::atomic<std::uint64_t> triangles_ = 0;
+  tbb::task_group tasks_;
+};
+
+}  // namespace lamina

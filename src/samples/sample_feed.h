@@ -1,0 +1,120 @@
+// Hands the stages their samples: buckets of the store with radii, levels and weights, read again whenever they are
+// needed and kept only within a budget (METHOD 3.4: samples are re-streamed, never stored per cell).
+#pragma once
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <unordered_map>
+#include <vector>
+
+#include "lattice/lattice.h"
+#include "samples/bucket_cache.h"
+#include "samples/normal_filter.h"
+#include "samples/radii.h"
+#include "store/slab_store.h"
+
+namespace lamina {
+
+using Batch = std::vector<std::shared_ptr<const ActiveBucket>>;
+
+struct FeedSettings {
+  float radius_scale = 1;               ///< multiplies estimated radii; given ones are scaled when read in
+  float blend = 1;                      ///< H
+  double cell_ratio = 0.9;              ///< a cell is split while larger than this times its smallest radius
+  bool cell_follows_support = true;     ///< the smallest R_i = H r_i counts, else the smallest r_i
+  bool thin_cells = false;              ///< a level less where normals cancel (feed/thin_cells.h)
+  bool fixed_cell = false;              ///< every sample asks for the finest level
+  float max_radius = 0;                 ///< samples with a larger r_i are left out, steps; 0: none
+  std::size_t cache_bytes = 64u << 20;  ///< memory for samples kept between uses
+  /// Samples looked at together: large enough to keep every thread busy, small enough to stay in memory whatever H is.
+  std::uint64_t batch_samples = 1u << 18;
+};
+
+/// Largest influence a sample can have, steps.
+float support_limit(const FeedSettings& settings, const Lattice& lattice);
+
+struct FeedCounts {
+  std::uint64_t samples = 0;       ///< that have got a radius
+  std::uint64_t undersampled = 0;  ///< left out by max_radius
+  std::uint64_t clamped = 0;       ///< radius reduced to what the coarsest level can serve
+  std::uint64_t bucket_reads = 0;  ///< times a bucket was decompressed
+};
+
+/// Buckets [begin, end).
+struct BucketSpan {
+  std::size_t begin = 0, end = 0;
+};
+
+/// The buckets that a feed reads which begins at `from` (begin_at(); nothing: at the bottom) and prepares all below
+/// `to`: it may look for two more, but does without them. `filter_reach`: NormalFilter::reach(), 0 without one.
+BucketSpan buckets_read(const SlabStore& store, const RadiiSettings& radii, bool given_radii,
+                        std::optional<std::int64_t> from, std::int64_t to, double filter_reach = 0);
+
+/// Buckets go by ascending z: prepare() runs ahead, release() follows behind. Inside a bucket samples are sorted by
+/// blocks of cells (feed/block_order.h): successive ones lie close to each other, which the stages may rely on for
+/// speed. The next buckets are read while the stages work.
+class SampleFeed {
+ public:
+  /// Gives buckets released back to the store.
+  SampleFeed(SlabStore& store, const Lattice& lattice, const FeedSettings& settings, const RadiiSettings& radii,
+             bool given_radii);
+
+  /// Normals come from this filter, which must outlive the feed. Called before anything else.
+  void filter_normals(NormalFilter& filter) { filter_ = &filter; }
+
+  /// Leaves out what lies below, before anything else is asked for: buckets with a sample at or above z get the radii,
+  /// and so come in the batches, of a feed that begins at the bottom; buckets below may have other radii.
+  void begin_at(std::int64_t z);
+
+  /// Called for every bucket in ascending order once its radii are known.
+  using OnReady = std::function<void(const ActiveBucket&)>;
+  /// Makes sure the radii of all samples with z < limit are known.
+  void prepare(std::int64_t z_limit, const OnReady& on_ready);
+  /// Samples whose influence meets z in [lo, hi), batch after batch; how they are cut into batches depends on the cloud
+  /// alone. `margin` enlarges every influence (steps).
+  [[nodiscard]] std::vector<std::vector<std::size_t>> batches(std::int64_t lo, std::int64_t hi, float margin) const;
+  [[nodiscard]] Batch load(const std::vector<std::size_t>& batch);
+  /// Forgets buckets that end below z.
+  void release(std::int64_t z);
+  [[nodiscard]] std::uint64_t released() const { return released_; }              ///< samples forgotten so far
+  [[nodiscard]] std::uint64_t disk_bytes() const { return store_.disk_bytes(); }  ///< of the store, now
+  [[nodiscard]] FeedCounts counts() const;
+  /// Largest influence a sample can have, steps: the look-ahead that prepare() needs.
+  [[nodiscard]] float support_limit() const { return support_limit_; }
+
+ private:
+  struct Known {
+    std::vector<float> radius;  ///< r_i, steps
+    float max_support = 0;
+    UnitNormals normals;  ///< where they are filtered
+  };
+  void annotate(std::size_t bucket, ActiveBucket& out) const;
+  /// The next bucket with samples from `bucket` on, the number of buckets when there is none.
+  [[nodiscard]] std::size_t next_filled(std::size_t bucket) const;
+  std::shared_ptr<const ActiveBucket> fetch(std::size_t bucket);
+  void learn(std::vector<float> radii);
+  /// Whether the filter knows all that acts on a bucket with radii.
+  [[nodiscard]] bool is_surrounded(std::size_t bucket) const;
+  void make_ready(const OnReady& on_ready);
+
+  SlabStore& store_;
+  Lattice lattice_;
+  FeedSettings settings_;
+  std::int64_t counting_height_;                ///< of the coarsest counting cells, steps
+  std::unique_ptr<RadiusEstimator> estimator_;  ///< null when the input gave radii
+  float support_limit_;
+  float radius_limit_;
+  std::size_t pushed_ = 0;     ///< buckets handed to the estimator
+  std::size_t announced_ = 0;  ///< buckets the store knows are wanted
+  std::size_t measured_ = 0;   ///< buckets with known radii
+  std::size_t ready_ = 0;      ///< of these, with their final normals
+  std::size_t first_ = 0;      ///< first bucket not released
+  NormalFilter* filter_ = nullptr;
+  std::unordered_map<std::size_t, Known> known_;
+  BucketCache cache_;
+  std::uint64_t released_ = 0;
+  FeedCounts counts_;
+};
+
+}  // namespace lamina

@@ -1,0 +1,230 @@
+#include "store/ingest.h"
+
+#include <tbb/parallel_pipeline.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <mutex>
+#include <tuple>
+#include <vector>
+
+#include "lamina/error.h"
+
+namespace lamina {
+namespace {
+
+constexpr std::size_t kChunk = 1u << 15;            ///< rows a piece
+constexpr std::uint64_t kBucketSamples = 1u << 15;  ///< samples a bucket should hold
+constexpr std::uint64_t kMaxBuckets = 4096;
+
+/// Fixed-point coordinates may reach a little beyond the box surveyed, and qualities beyond the greatest seen.
+constexpr double kMostSteps = (1 << 29) + (1 << 25);
+constexpr double kMostQuality = 1 << 20;
+
+constexpr std::int32_t kMax = std::numeric_limits<std::int32_t>::max();
+constexpr std::int32_t kMin = std::numeric_limits<std::int32_t>::min();
+constexpr Extent kNothing{{kMax, kMin, kMax, kMin}, kMax, kMin};
+
+struct IngestPiece {
+  SampleBatch rows;
+  LocalSamples local;
+  Extent extent = kNothing;
+  Census census;
+  bool within = true;  ///< every sample lies where it may
+};
+
+/// Pieces in use by the pipeline; their memory goes from one to the next.
+class PiecePool {
+ public:
+  IngestPiece* take() {
+    const std::lock_guard lock(mutex_);
+    if (idle_.empty()) {
+      pieces_.push_back(std::make_unique<IngestPiece>());
+      return pieces_.back().get();
+    }
+    IngestPiece* const piece = idle_.back();
+    idle_.pop_back();
+    return piece;
+  }
+  void give_back(IngestPiece* piece) {
+    const std::lock_guard lock(mutex_);
+    idle_.push_back(piece);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<IngestPiece>> pieces_;
+  std::vector<IngestPiece*> idle_;
+};
+
+/// Factor that brings the greatest quality to at most 1, so that sums of weights cannot overflow. A power of two: the
+/// surface does not depend on it. 0 where every quality is 0, which tells no weights: MeshLab writes such.
+double quality_scale(const Survey& survey) {
+  if (!(survey.max_quality > 0)) return 0;
+  return std::exp2(-std::ceil(std::log2(double{survey.max_quality})));
+}
+
+/// A radius in steps: a smaller one than a step reaches nothing but itself, a greater one than the cloud everything.
+float radius_in_steps(double radius) {
+  constexpr double kDiagonal = 1 << 30;
+  return static_cast<float>(std::clamp(radius, 1.0, kDiagonal));
+}
+
+void resize(LocalSamples& out, const SampleBatch& rows, std::size_t n) {
+  for (auto* values : {&out.x, &out.y, &out.z}) values->resize(n);
+  for (auto* values : {&out.nx, &out.ny, &out.nz}) values->resize(n);
+  out.radius.resize(rows.radius.empty() ? 0 : n);
+  out.quality.resize(rows.quality.empty() ? 0 : n);
+  out.attributes.resize(rows.attributes.size());
+  for (auto& values : out.attributes) values.resize(n);
+}
+
+std::pair<std::int32_t, std::int32_t> range_of(const std::vector<std::int32_t>& values) {
+  std::int32_t low = kMax;
+  std::int32_t high = kMin;
+  for (const std::int32_t v : values) {
+    low = std::min(low, v);
+    high = std::max(high, v);
+  }
+  return {low, high};
+}
+
+/// Fills the rest of a piece from `piece.rows`.
+void to_local(IngestPiece& piece, const AttributeLayout& layout, const Frame& frame, double radius_scale,
+              double quality_scale, const RowPick& pick) {
+  const SampleBatch& rows = piece.rows;
+  LocalSamples& out = piece.local;
+  Census& census = piece.census;
+  census = {};
+  census.count_attributes(rows, layout);
+  resize(out, rows, rows.size());
+  const Eigen::Matrix3d turn = frame.rotation;
+  const Eigen::Matrix3d scale = frame.rotation / frame.step;
+  const double radius = radius_scale / frame.step;
+  double farthest = 0;
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (!census.takes(pick, rows, i)) continue;
+    const Defect defect = defect_of(rows, i);
+    if (defect != Defect::none) {
+      census.reject(defect, rows.first + i);
+      continue;
+    }
+    const Eigen::Vector3d at(rows.x[i], rows.y[i], rows.z[i]);
+    census.low = census.low.cwiseMin(at);
+    census.high = census.high.cwiseMax(at);
+    const Eigen::Vector3d p = scale * (at - frame.origin);
+    const Eigen::Vector3d normal = (turn * Eigen::Vector3d(rows.nx[i], rows.ny[i], rows.nz[i])).normalized();
+    farthest = std::max(farthest, p.cwiseAbs().maxCoeff());
+    const Eigen::Vector3d q = p.cwiseMax(-kMostSteps).cwiseMin(kMostSteps);
+    out.x[n] = static_cast<std::int32_t>(std::lrint(q.x()));
+    out.y[n] = static_cast<std::int32_t>(std::lrint(q.y()));
+    out.z[n] = static_cast<std::int32_t>(std::lrint(q.z()));
+    out.nx[n] = static_cast<float>(normal.x());
+    out.ny[n] = static_cast<float>(normal.y());
+    out.nz[n] = static_cast<float>(normal.z());
+    if (!rows.radius.empty()) out.radius[n] = radius_in_steps(rows.radius[i] * radius);
+    if (!rows.quality.empty()) {
+      census.max_quality = std::max(census.max_quality, rows.quality[i]);
+      out.quality[n] = quality_scale > 0 ? static_cast<float>(rows.quality[i] * quality_scale) : 1.0F;
+    }
+    for (std::size_t c = 0; c < rows.attributes.size(); ++c) {
+      out.attributes[c][n] = usable_attribute(rows.attributes[c][i]);
+    }
+    ++n;
+  }
+  census.usable = n;
+  const bool weighs = quality_scale > 0 ? census.max_quality * quality_scale <= kMostQuality : census.max_quality == 0;
+  piece.within = farthest <= kMostSteps && weighs;
+  resize(out, rows, n);
+  std::tie(piece.extent.x_min, piece.extent.x_max) = range_of(out.x);
+  std::tie(piece.extent.y_min, piece.extent.y_max) = range_of(out.y);
+  std::tie(piece.extent.z_min, piece.extent.z_max) = range_of(out.z);
+}
+
+void widen(Extent& b, const Extent& by) {
+  b.x_min = std::min(b.x_min, by.x_min);
+  b.x_max = std::max(b.x_max, by.x_max);
+  b.y_min = std::min(b.y_min, by.y_min);
+  b.y_max = std::max(b.y_max, by.y_max);
+  b.z_min = std::min(b.z_min, by.z_min);
+  b.z_max = std::max(b.z_max, by.z_max);
+}
+
+StoreSettings store_settings(const Survey& survey, const Frame& frame, const StorePlace& place) {
+  // The rotated bounding box bounds the samples' z.
+  const Eigen::Vector3d half = 0.5 * (survey.high - survey.low) / frame.step;
+  constexpr double kMargin = 1.0625;  // where only a part of the samples has been seen, others lie a little outside
+  const double reach = kMargin * frame.rotation.row(2).cwiseAbs().dot(half.transpose()) + 1;
+  StoreSettings s;
+  s.directory = place.directory;
+  s.keep = place.keep;
+  s.z_min = static_cast<std::int32_t>(-std::ceil(reach));
+  const std::uint64_t wanted = std::clamp<std::uint64_t>(survey.usable / kBucketSamples, 1, kMaxBuckets);
+  s.bucket_height = static_cast<std::int32_t>(std::ceil(2 * reach / static_cast<double>(wanted))) + 1;
+  s.buckets = static_cast<std::size_t>(std::ceil(2 * reach / s.bucket_height)) + 1;
+  return s;
+}
+
+}  // namespace
+
+Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, double radius_scale,
+                const StorePlace& place, const RunContext& run, const RowPick& pick, const RowSpan& rows) {
+  const PointSourceInfo& info = source.info();
+  const StoreSettings buckets = store_settings(survey, frame, place);
+  SlabStoreWriter writer({info.has_radius, info.has_quality, info.attributes}, buckets);
+  Extent extent = kNothing;
+  Census census;
+  bool complete = true;
+  const double quality = quality_scale(survey);
+  const std::int64_t top = buckets.z_min + static_cast<std::int64_t>(buckets.buckets) * buckets.bucket_height;
+  PiecePool pool;
+  const std::uint64_t end = std::min(rows.end, info.count);
+  std::uint64_t next = std::min(rows.first, end);
+  const std::uint64_t count = end - next;
+  std::uint64_t done = 0;
+  std::atomic<bool> stopped = false;
+  const auto read = [&](SampleBatch& out) {
+    source.read(out.first, std::min<std::uint64_t>(kChunk, end - out.first), out);
+  };
+  const auto take = [&](tbb::flow_control& flow) -> IngestPiece* {
+    if (next >= end || stopped || run.cancelled()) {
+      flow.stop();
+      return nullptr;
+    }
+    IngestPiece* const piece = pool.take();
+    piece->rows.first = next;
+    if (!info.random_access) read(piece->rows);
+    next += kChunk;
+    return piece;
+  };
+  const auto convert = [&](IngestPiece* piece) {
+    if (info.random_access) read(piece->rows);
+    to_local(*piece, info.attributes, frame, radius_scale, quality, pick);
+    return piece;
+  };
+  const auto append = [&](IngestPiece* piece) {
+    widen(extent, piece->extent);
+    census.merge(piece->census);
+    // Buckets at the ends that swallow whatever lies beyond them would be tall, and full.
+    complete =
+        complete && piece->within && (census.usable == 0 || (extent.z_min >= buckets.z_min && extent.z_max < top));
+    stopped = !complete;
+    if (complete) writer.append(piece->local);
+    done += piece->rows.size();
+    if (run.progress) run.progress({"read", done, count, 0, 0});
+    pool.give_back(piece);
+  };
+  constexpr std::size_t kInFlight = 8;
+  tbb::parallel_pipeline(kInFlight,
+                         tbb::make_filter<void, IngestPiece*>(tbb::filter_mode::serial_in_order, take) &
+                             tbb::make_filter<IngestPiece*, IngestPiece*>(tbb::filter_mode::parallel, convert) &
+                             tbb::make_filter<IngestPiece*, void>(tbb::filter_mode::serial_in_order, append));
+  if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+  return {writer.finish(), extent, census, complete};
+}
+
+}  // namespace lamina

@@ -1,0 +1,144 @@
+#include "store/slab_store.h"
+
+#include <fmt/format.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "lamina/error.h"
+#include "store/store_impl.h"
+
+namespace lamina {
+namespace {
+
+template <class T>
+void compact(std::vector<T>& values, const std::vector<bool>& keep) {
+  if (values.empty()) return;
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < keep.size(); ++i) {
+    if (keep[i]) values[n++] = values[i];
+  }
+  values.resize(n);
+}
+
+void compact(LocalSamples& s, const std::vector<bool>& keep) {
+  for (auto* v : {&s.x, &s.y, &s.z}) compact(*v, keep);
+  for (auto* v : {&s.nx, &s.ny, &s.nz, &s.radius, &s.quality}) compact(*v, keep);
+  for (auto& v : s.attributes) compact(v, keep);
+}
+
+}  // namespace
+
+SlabStore::SlabStore(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+SlabStore::~SlabStore() = default;
+SlabStore::SlabStore(SlabStore&&) noexcept = default;
+SlabStore& SlabStore::operator=(SlabStore&&) noexcept = default;
+
+const StoreLayout& SlabStore::layout() const {
+  return impl_->layout;
+}
+std::size_t SlabStore::buckets() const {
+  return impl_->buckets.size();
+}
+std::uint64_t SlabStore::count(std::size_t bucket) const {
+  return impl_->buckets[bucket].count;
+}
+std::int32_t SlabStore::z_lower(std::size_t bucket) const {
+  return impl_->buckets[bucket].z_lower;
+}
+std::int32_t SlabStore::z_upper(std::size_t bucket) const {
+  return impl_->buckets[bucket].z_upper;
+}
+std::uint64_t SlabStore::total() const {
+  return impl_->total;
+}
+std::uint64_t SlabStore::disk_bytes() const {
+  std::uint64_t bytes = 0;
+  for (const TempFile& file : impl_->files) bytes += file.size();
+  return bytes;
+}
+
+std::size_t SlabStore::files() const {
+  return impl_->files.size();
+}
+
+void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
+  const auto& blocks = impl_->buckets[bucket].blocks;
+  const auto& checksums = impl_->buckets[bucket].checksums;
+  const auto& keep = impl_->buckets[bucket].keep;
+  const auto& columns = impl_->columns;
+  const TempFile& file = impl_->file_of(bucket);
+  std::vector<std::size_t> first(blocks.size());
+  std::uint64_t here = 0;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    first[i] = here;
+    here += blocks[i].count;
+  }
+  if (here != (keep.empty() ? count(bucket) : keep.size()))
+    throw Error(ExitCode::internal, fmt::format("slab store: bucket {} lies in other stores", bucket));
+  columns.resize(out, here);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size()), [&](const auto& range) {
+    std::vector<std::byte> bytes;
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      bytes.resize(blocks[i].bytes);
+      file.read(blocks[i].offset, bytes);
+      const bool whole = checksums.empty() || block_checksum(bytes) == checksums[i];
+      if (!whole || !decode_block(columns, bytes, blocks[i].count, out, first[i]))
+        file.report_damage(blocks[i].offset, fmt::format("samples of bucket {}", bucket));
+    }
+  });
+  if (!keep.empty()) compact(out, keep);
+}
+
+void SlabStore::keep_only(std::vector<std::vector<bool>> keep) {
+  LocalSamples samples;
+  for (std::size_t b = 0; b < keep.size(); ++b) {
+    if (std::find(keep[b].begin(), keep[b].end(), false) == keep[b].end()) continue;
+    BucketIndex& index = impl_->buckets[b];
+    impl_->total -= index.count;
+    if (index.keep.empty()) {
+      index.keep = std::move(keep[b]);
+    } else {
+      std::size_t n = 0;
+      for (auto&& stays : index.keep) stays = stays && keep[b][n++];
+    }
+    read(b, samples);
+    index.count = samples.size();
+    const BucketIndex none;
+    index.z_lower = none.z_lower;
+    index.z_upper = none.z_upper;
+    for (const std::int32_t z : samples.z) {
+      index.z_lower = std::min(index.z_lower, z);
+      index.z_upper = std::max(index.z_upper, z);
+    }
+    impl_->total += index.count;
+  }
+}
+
+void SlabStore::will_read(std::size_t bucket) const {
+  const TempFile& file = impl_->file_of(bucket);
+  std::uint64_t begin = 0;
+  std::uint64_t end = 0;
+  // Blocks next to each other are one request.
+  for (const BlockEntry& block : impl_->buckets[bucket].blocks) {
+    if (block.offset != end) {
+      file.will_read(begin, end - begin);
+      begin = block.offset;
+    }
+    end = block.offset + block.bytes;
+  }
+  file.will_read(begin, end - begin);
+}
+
+void SlabStore::release_before(std::size_t bucket) {
+  if (!impl_->directory.empty()) return;
+  while (impl_->released < impl_->files.size()) {
+    const std::size_t end =
+        ((impl_->released + 1) * impl_->buckets.size() + impl_->files.size() - 1) / impl_->files.size();
+    if (end > bucket) return;
+    impl_->files[impl_->released++].discard();
+  }
+}
+
+}  // namespace lamina

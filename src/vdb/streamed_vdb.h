@@ -1,0 +1,83 @@
+// A .vdb file written leaf by leaf, in any order: OpenVDB's own writer wants the whole tree in memory.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/staged_file.h"
+#include "base/temp_file.h"
+#include "vdb/grids.h"
+#include "vdb/tile_signs.h"
+
+namespace lamina::volume {
+
+/// A leaf as it will stand in the file.
+struct PackedLeaf {
+  openvdb::Coord origin;
+  std::array<std::int8_t, 6> faces{};  ///< LeafVotes::faces
+  std::uint32_t active = 0;
+  openvdb::CoordBBox box;  ///< of the active voxels
+  std::string bytes;
+};
+
+/// How a leaf's faces vote for the tiles beside them (LeafVotes::faces).
+std::array<std::int8_t, 6> face_votes(const openvdb::FloatTree::LeafNodeType& leaf);
+
+/// Packs a leaf (its values outside of the mask are +- the background, or 0 where that is). Safe from several threads.
+PackedLeaf pack(const openvdb::FloatTree::LeafNodeType& leaf, float background, bool half);
+PackedLeaf pack(const openvdb::Vec3STree::LeafNodeType& leaf, bool half);
+
+/// Leaves wait, compressed, in an unnamed temporary file; memory holds some forty bytes for each. finish() puts the
+/// file together, commit() gives it its name. Without commit() nothing is left.
+class StreamedVdb {
+ public:
+  StreamedVdb(std::string path, const std::string& tmp_dir);
+  StreamedVdb(const StreamedVdb&) = delete;
+  StreamedVdb& operator=(const StreamedVdb&) = delete;
+
+  /// An empty FloatGrid or Vec3SGrid that carries name, background, transform and metadata; returns its number. A float
+  /// grid's tiles get the signs of the leaves around (tile_signs.h) when it is a level set.
+  std::size_t add_grid(const openvdb::GridBase::Ptr& empty);
+  /// Each place once. Those of a node of 128^3 voxels are read fastest when they came one after the other.
+  void add(std::size_t grid, const PackedLeaf& leaf);
+  [[nodiscard]] std::uint64_t leaves() const;
+  /// Writes everything, with a tag made from the contents. Throws Error(budget) when the disk does not take it.
+  void finish();
+  void commit(const std::string& final_name);
+  [[nodiscard]] std::uint64_t active_voxels(std::size_t grid) const { return grids_[grid].active; }
+  [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
+  [[nodiscard]] openvdb::GridBase& grid(std::size_t number) { return *grids_[number].empty; }
+
+ private:
+  static constexpr std::size_t kBuffersInFlight = 16;
+  struct Record {
+    LeafVotes place;
+    std::uint32_t size = 0;
+    std::uint64_t at = 0;
+  };
+  struct Grid {
+    openvdb::GridBase::Ptr empty;
+    std::vector<Record> leaves;
+    std::uint64_t active = 0;
+    openvdb::CoordBBox box;
+  };
+  void write(std::ostream& os);
+  void write_buffers(std::ostream& os, const Grid& grid) const;
+  template <class Tree>
+  void write_topology(std::ostream& os, const Grid& grid) const;
+  static std::size_t end_of_node(const Grid& grid, std::size_t begin, int shift);
+  template <class Visit>
+  void visit_records(std::span<const Record> records, const Visit& visit) const;
+  [[noreturn]] void fail(const char* what) const;
+
+  std::string path_;
+  StagedFile staged_;
+  TempFile spool_;
+  BackgroundWriter disk_{TempFile::kBufferBytes, kBuffersInFlight};  ///< ends before the file it writes to
+  std::vector<Grid> grids_;
+  std::uint64_t bytes_ = 0;
+};
+
+}  // namespace lamina::volume

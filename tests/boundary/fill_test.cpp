@@ -1,0 +1,192 @@
+// Fillings of rims on surfaces whose truth is known.
+#include "boundary/fill.h"
+
+#include <gtest/gtest.h>
+
+#include <rapidcheck/gtest.h>
+#include <Eigen/Geometry>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "support/mesh_check.h"
+
+namespace lamina::holes {
+namespace {
+
+constexpr double kTurn = 2 * std::numbers::pi;
+
+/// A rim of n vertices around the pole of the unit sphere, `angle` away from it: filled anticlockwise from outside.
+Loop sphere_rim(std::uint32_t n, double angle, double radius, double jitter = 0, std::uint32_t seed = 1) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<> uniform(-jitter, jitter);
+  Loop loop;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const double a = kTurn * (i + 0.4 * uniform(random)) / n, b = angle * (1 + uniform(random));
+    const std::array<double, 3> p{std::sin(b) * std::cos(a), std::sin(b) * std::sin(a), std::cos(b)};
+    RimVertex v;
+    v.number = 10 * i;
+    v.position = p;
+    v.normal = {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
+    v.radius = static_cast<float>(radius);
+    loop.vertices.push_back(v);
+    loop.facing.push_back(p);
+    loop.attributes.push_back(static_cast<float>(p[2]));
+  }
+  return loop;
+}
+
+void reverse(Loop& loop) {
+  std::reverse(loop.vertices.begin(), loop.vertices.end());
+  std::reverse(loop.facing.begin(), loop.facing.end());
+}
+
+/// A disc whose rim is the loop.
+void expect_disc(const Loop& loop, const Filling& filling) {
+  ASSERT_EQ(filling.verdict, Verdict::filled) << describe(filling.verdict);
+  const auto n = static_cast<std::uint32_t>(loop.vertices.size());
+  const test::MeshFacts facts = test::check_mesh(filling.triangles);
+  EXPECT_TRUE(facts.is_manifold());
+  EXPECT_EQ(facts.euler, std::vector<long>{1});
+  EXPECT_EQ(facts.boundary.size(), n);
+  for (const auto& [from, to] : facts.boundary) EXPECT_EQ(to, (from + 1) % n);
+}
+
+TEST(Fill, OfASphereLiesOnTheSphere) {
+  const Loop loop = sphere_rim(16, 0.3, 0.2);
+  const Filling filling = fill_loop(loop, 12);
+  expect_disc(loop, filling);
+  ASSERT_GT(filling.positions.size(), 4U);
+  for (std::size_t i = 0; i < filling.positions.size(); ++i) {
+    const auto& p = filling.positions[i];
+    EXPECT_NEAR(std::hypot(p[0], p[1], p[2]), 1, 1e-6);
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(static_cast<double>(filling.normals[i][k]), p[k], 1e-5);
+    EXPECT_NEAR(static_cast<double>(filling.attributes[i]), std::cos(0.3), 1e-5);
+  }
+}
+
+RC_GTEST_PROP(Fill, RaggedRimsBecomeDiscsNearTheSphere, ()) {
+  const auto n = *rc::gen::inRange<std::uint32_t>(3, 40);
+  const Loop loop = sphere_rim(n, 0.25, 0.2, 0.15, *rc::gen::arbitrary<std::uint32_t>());
+  const Filling filling = fill_loop(loop, 100);
+  RC_ASSERT(filling.verdict == Verdict::filled);
+  expect_disc(loop, filling);
+  for (const auto& p : filling.positions) RC_ASSERT(std::abs(std::hypot(p[0], p[1], p[2]) - 1) < 1e-4);
+}
+
+TEST(Fill, NotBeyondTheBound) {
+  const Loop loop = sphere_rim(16, 0.3, 0.2);  // the rim is 9.2 radii long
+  EXPECT_EQ(fill_loop(loop, 9).verdict, Verdict::too_long);
+  EXPECT_EQ(fill_loop(loop, 9.5).verdict, Verdict::filled);
+}
+
+TEST(Fill, NotOutsideOfASurface) {
+  Loop loop = sphere_rim(12, 0.3, 0.2);
+  reverse(loop);
+  EXPECT_EQ(fill_loop(loop, 100).verdict, Verdict::outer_rim);
+}
+
+TEST(Fill, NotTheEndOfATube) {
+  Loop loop = sphere_rim(12, 0.3, 0.2);
+  for (std::size_t i = 0; i < 12; ++i) {
+    const double a = kTurn * static_cast<double>(i) / 12;
+    loop.vertices[i].normal = {static_cast<float>(std::cos(a)), static_cast<float>(std::sin(a)), 0};
+  }
+  EXPECT_NE(fill_loop(loop, 100).verdict, Verdict::filled);
+}
+
+TEST(Fill, NotTheBackOfALoneTriangle) {
+  Loop loop = sphere_rim(3, 0.2, 0.3);
+  ASSERT_EQ(fill_loop(loop, 100).verdict, Verdict::filled);
+  loop.facing.assign(3, {0, 0, -1});
+  EXPECT_EQ(fill_loop(loop, 100).verdict, Verdict::outer_rim);
+}
+
+TEST(Fill, UsesNoEdgeOfTheMesh) {
+  Loop loop = sphere_rim(4, 0.2, 0.3);
+  loop.taken = {{0, 2}};
+  const Filling filling = fill_loop(loop, 100);
+  expect_disc(loop, filling);
+  for (const auto& t : filling.triangles)
+    EXPECT_EQ(std::count(t.begin(), t.end(), 0U) + std::count(t.begin(), t.end(), 2U), 1);
+  loop.taken = {{0, 2}, {1, 3}};
+  EXPECT_EQ(fill_loop(loop, 100).verdict, Verdict::bent);
+}
+
+double area_of(const Loop& loop, const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+  const auto at = [&](std::uint32_t v) { return Eigen::Vector3d(loop.vertices[v].position.data()); };
+  double sum = 0;
+  for (const auto& t : triangles) sum += (at(t[1]) - at(t[0])).cross(at(t[2]) - at(t[0])).norm() / 2;
+  return sum;
+}
+
+/// Oracle: the least area of all triangulations of the vertices from i to k.
+double least_area(const Loop& loop, std::uint32_t i, std::uint32_t k) {
+  if (k < i + 2) return 0;
+  double least = 1e300;
+  for (std::uint32_t j = i + 1; j < k; ++j)
+    least = std::min(least, least_area(loop, i, j) + least_area(loop, j, k) + area_of(loop, {{i, j, k}}));
+  return least;
+}
+
+/// A rim that no plane shows without crossings.
+Loop winding_rim(std::uint32_t n, std::uint32_t seed) {
+  Loop loop = sphere_rim(n, 0.5, 0.2);
+  std::mt19937 random(seed);
+  std::normal_distribution<> normal;
+  for (RimVertex& v : loop.vertices) v.position = {normal(random), normal(random), normal(random)};
+  return loop;
+}
+
+RC_GTEST_PROP(FillAny, IsADiscOfLeastArea, ()) {
+  const auto n = *rc::gen::inRange<std::uint32_t>(3, 9);
+  const Loop loop = winding_rim(n, *rc::gen::arbitrary<std::uint32_t>());
+  RC_PRE(!(n == 3 && fill_any(loop).verdict == Verdict::outer_rim));
+  const Filling filling = fill_any(loop);
+  expect_disc(loop, filling);
+  RC_ASSERT(filling.positions.empty());
+  RC_ASSERT(std::abs(area_of(loop, filling.triangles) - least_area(loop, 0, n - 1)) < 1e-9);
+}
+
+TEST(FillAny, ClosesWhatNothingSupports) {
+  Loop outer = sphere_rim(12, 0.3, 0.2);
+  reverse(outer);
+  expect_disc(outer, fill_any(outer));
+  const Loop winding = winding_rim(30, 3);
+  EXPECT_NE(fill_loop(winding, 1000).verdict, Verdict::filled);
+  expect_disc(winding, fill_any(winding));
+}
+
+TEST(FillAny, GoesAroundANewVertexWhereEdgesAreTaken) {
+  Loop loop = sphere_rim(4, 0.2, 0.3);
+  loop.taken = {{0, 2}, {1, 3}};
+  const Filling filling = fill_any(loop);
+  expect_disc(loop, filling);
+  ASSERT_EQ(filling.positions.size(), 1U);
+  EXPECT_EQ(filling.attributes.size(), 1U);
+  EXPECT_NEAR(filling.positions[0][2], std::cos(0.2), 1e-9);
+  EXPECT_NEAR(static_cast<double>(filling.normals[0][2]), 1, 1e-6);
+}
+
+TEST(FillAny, GivesNoLoneTriangleABack) {
+  Loop loop = sphere_rim(3, 0.2, 0.3);
+  expect_disc(loop, fill_any(loop));
+  loop.facing.assign(3, {0, 0, -1});
+  EXPECT_EQ(fill_any(loop).verdict, Verdict::outer_rim);
+}
+
+TEST(Fill, IsOccupiedByVerticesInItOnly) {
+  const Loop loop = sphere_rim(12, 0.3, 0.2);
+  const Filling filling = fill_loop(loop, 100);
+  ASSERT_EQ(filling.verdict, Verdict::filled);
+  RimVertex other;
+  other.position = {0.02, 0.01, 1.05};
+  EXPECT_TRUE(occupies(other, loop, filling));
+  other.position = {0.02, 0.01, 0.7};
+  EXPECT_FALSE(occupies(other, loop, filling)) << "another sheet";
+  other.position = {0.4, 0.01, 0.9};
+  EXPECT_FALSE(occupies(other, loop, filling)) << "beside it";
+}
+
+}  // namespace
+}  // namespace lamina::holes

@@ -1,0 +1,358 @@
+#include "meshes/mesh_sink.h"
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sched.h>
+#include <sys/mount.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+
+#include <cmath>
+#include <csignal>
+#include <cstring>
+#include <functional>
+#include <random>
+
+#include "base/temporary_folder.h"
+#include "lamina/error.h"
+#include "lamina/points.h"
+
+namespace lamina {
+namespace {
+
+using testing::HasSubstr;
+using Triangles = std::vector<std::array<std::uint32_t, 3>>;
+
+const AttributeLayout kColours{{"red", ScalarType::uint8}, {"depth", ScalarType::uint16}, {"w", ScalarType::float32}};
+
+VertexBatch some_vertices(std::size_t first, std::size_t count) {
+  VertexBatch batch;
+  batch.attributes.resize(kColours.size());
+  for (std::size_t i = first; i < first + count; ++i) {
+    const auto v = static_cast<float>(i);
+    batch.x.push_back(std::sin(v));
+    batch.y.push_back(4e6 + v / 7);
+    batch.z.push_back(-v);
+    batch.nx.push_back(v / 3);
+    batch.ny.push_back(1);
+    batch.nz.push_back(-v);
+    batch.attributes[0].push_back(static_cast<float>(i % 256));
+    batch.attributes[1].push_back(static_cast<float>(i % 65536));
+    batch.attributes[2].push_back(v / 11);
+  }
+  return batch;
+}
+
+Triangles some_triangles(std::size_t first, std::size_t count, std::size_t vertices) {
+  Triangles triangles;
+  for (std::size_t i = first; i < first + count; ++i) {
+    triangles.push_back({static_cast<std::uint32_t>(i % vertices), static_cast<std::uint32_t>((i * 7 + 1) % vertices),
+                         static_cast<std::uint32_t>((i * 31 + 2) % vertices)});
+  }
+  return triangles;
+}
+
+/// Runs `work` and gives its error's message, "code: message".
+std::string outcome(const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const Error& e) {
+    return std::to_string(static_cast<int>(e.code())) + ": " + e.what();
+  }
+  return "nothing";
+}
+
+/// The same in a process of its own, whose limits and mounts end with it.
+std::string outcome_in_child(const std::function<void()>& work) {
+  int ends[2];
+  if (::pipe(ends) != 0) return "no pipe";
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const std::string text = outcome(work);
+    const ssize_t n = ::write(ends[1], text.data(), text.size());
+    ::_exit(n == static_cast<ssize_t>(text.size()) ? 0 : 1);
+  }
+  ::close(ends[1]);
+  std::string text;
+  char buffer[512];
+  for (ssize_t n = 0; (n = ::read(ends[0], buffer, sizeof buffer)) > 0;)
+    text.append(buffer, static_cast<std::size_t>(n));
+  ::close(ends[0]);
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return status == 0 ? text : "the child died";
+}
+
+void write_mesh_to(const MeshSinkSettings& settings, std::size_t vertices, std::size_t triangles) {
+  MeshSink sink(settings);
+  sink.append_vertices(some_vertices(0, vertices));
+  sink.append_triangles(some_triangles(0, triangles, vertices));
+  sink.commit();
+}
+
+TEST(MeshSink, WritesWhatWasAppended) {
+  constexpr std::size_t kVertices = 30'000;  // beyond the buffers
+  constexpr std::size_t kTriangles = 60'000;
+  const test::TemporaryFolder folder;
+  for (const bool wide : {false, true}) {
+    const MeshSinkSettings settings{.path = folder / "mesh.ply", .attributes = kColours, .double_positions = wide};
+    write_mesh_to(settings, kVertices, kTriangles);
+    EXPECT_EQ(folder.entries(), 1);
+
+    const auto source = open_points(folder / "mesh.ply");  // checks the faces' number and the file's length
+    EXPECT_EQ(source->info().count, kVertices);
+    EXPECT_EQ(source->info().double_precision, wide);
+    EXPECT_EQ(source->info().attributes, kColours);
+    SampleBatch read;
+    source->read(0, kVertices, read);
+    const VertexBatch expected = some_vertices(0, kVertices);
+    for (std::size_t i = 0; i < kVertices; ++i) {
+      ASSERT_EQ(read.y[i], wide ? expected.y[i] : static_cast<double>(static_cast<float>(expected.y[i])));
+    }
+    EXPECT_EQ(read.nz, expected.nz);
+    EXPECT_EQ(read.attributes, expected.attributes);
+
+    const std::string bytes = test::read_file(folder / "mesh.ply");
+    const Triangles triangles = some_triangles(0, kTriangles, kVertices);
+    const char* face = bytes.data() + bytes.size() - 13 * kTriangles;
+    for (std::size_t i = 0; i < kTriangles; ++i, face += 13) {
+      ASSERT_EQ(face[0], 3);
+      ASSERT_EQ(std::memcmp(face + 1, triangles[i].data(), 12), 0);
+    }
+  }
+}
+
+TEST(MeshSink, BytesDoNotDependOnTheBatches) {
+  constexpr std::size_t kVertices = 25'000;
+  constexpr std::size_t kTriangles = 50'000;
+  const test::TemporaryFolder folder;
+  write_mesh_to({.path = folder / "whole.ply", .attributes = kColours}, kVertices, kTriangles);
+  const std::string whole = test::read_file(folder / "whole.ply");
+  for (unsigned seed = 0; seed < 5; ++seed) {
+    std::mt19937 random(seed);
+    MeshSink sink({.path = folder / "parts.ply", .attributes = kColours});
+    while (sink.vertices() < kVertices || sink.triangles() < kTriangles) {
+      if (random() % 2 != 0) {
+        const std::size_t n = std::min<std::size_t>(random() % 3000, kVertices - sink.vertices());
+        sink.append_vertices(some_vertices(sink.vertices(), n));
+      } else {
+        const std::size_t n = std::min<std::size_t>(random() % 6000, kTriangles - sink.triangles());
+        sink.append_triangles(some_triangles(sink.triangles(), n, kVertices));
+      }
+    }
+    sink.commit();
+    EXPECT_EQ(sink.vertices(), kVertices);
+    EXPECT_EQ(test::read_file(folder / "parts.ply"), whole);
+  }
+}
+
+TEST(MeshSink, EmptyMeshIsAFileToo) {
+  const test::TemporaryFolder folder;
+  MeshSink({.path = folder / "mesh.ply"}).commit();
+  EXPECT_EQ(open_points(folder / "mesh.ply")->info().count, 0);
+}
+
+TEST(MeshSink, WithoutCommitNothingIsLeftAndTheOldFileStays) {
+  const test::TemporaryFolder folder;
+  const test::TemporaryFolder tmp;
+  const std::string path = test::write_file(folder / "mesh.ply", "old");
+  {
+    MeshSink sink({.path = path, .tmp_dir = tmp.path(), .attributes = kColours});
+    sink.append_vertices(some_vertices(0, 50'000));
+    sink.append_triangles(some_triangles(0, 100'000, 50'000));
+    EXPECT_EQ(folder.entries(), 1);  // what is staged has no name
+    EXPECT_EQ(tmp.entries(), 0);
+    EXPECT_EQ(test::read_file(path), "old");
+  }
+  EXPECT_EQ(folder.entries(), 1);
+  EXPECT_EQ(test::read_file(path), "old");
+  write_mesh_to({.path = path, .attributes = kColours}, 3, 1);
+  EXPECT_EQ(folder.entries(), 1);
+  EXPECT_THAT(test::read_file(path), testing::StartsWith("ply\n"));
+}
+
+TEST(MeshSink, PermissionsFollowTheMask) {
+  const test::TemporaryFolder folder;
+  const mode_t old = ::umask(027);
+  write_mesh_to({.path = folder / "mesh.ply", .attributes = kColours}, 3, 1);
+  ::umask(old);
+  struct stat status {};
+  ASSERT_EQ(::stat((folder / "mesh.ply").c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777U, 0640U);
+}
+
+TEST(MeshSink, LinksStayAndTheirFileIsReplaced) {
+  const test::TemporaryFolder folder;
+  const test::TemporaryFolder elsewhere;
+  std::filesystem::create_symlink(elsewhere / "mesh.ply", folder / "link.ply");
+  for (int i = 0; i < 2; ++i) {  // dangling, then not
+    write_mesh_to({.path = folder / "link.ply", .attributes = kColours}, 3, 1);
+    EXPECT_TRUE(std::filesystem::is_symlink(folder / "link.ply"));
+    EXPECT_EQ(open_points(elsewhere / "mesh.ply")->info().count, 3);
+    EXPECT_EQ(elsewhere.entries(), 1);
+  }
+}
+
+TEST(MeshSink, SinksOfOneNameDoNotMeet) {
+  const test::TemporaryFolder folder;
+  const std::string name(250, 'n');  // the hidden name must still fit
+  MeshSink first({.path = folder / name, .attributes = kColours});
+  MeshSink second({.path = folder / name, .attributes = kColours});
+  first.append_vertices(some_vertices(0, 5));
+  second.append_vertices(some_vertices(0, 6));
+  first.commit();
+  EXPECT_EQ(open_points(folder / name)->info().count, 5);
+  second.commit();
+  EXPECT_EQ(open_points(folder / name)->info().count, 6);
+  EXPECT_EQ(folder.entries(), 1);
+}
+
+TEST(MeshSink, PlacesThatCannotBeWritten) {
+  const test::TemporaryFolder folder;
+  const auto opened = [&](const std::string& path, const std::string& tmp_dir = {}) {
+    return outcome([&] { const MeshSink sink({.path = path, .tmp_dir = tmp_dir}); });
+  };
+  EXPECT_THAT(opened(folder / "none/mesh.ply"),
+              HasSubstr("4: " + (folder / "none/mesh.ply") + ": cannot be written: the folder"));
+  EXPECT_THAT(opened(folder.path()), HasSubstr("4: " + folder.path() + ": cannot be written: it is a directory"));
+  EXPECT_THAT(opened(folder / "new/"), HasSubstr("it is a directory"));
+  EXPECT_THAT(opened(""), HasSubstr("4: the output: cannot be written: its name is empty"));
+  EXPECT_THAT(opened("/proc/mesh.ply"), HasSubstr("4: /proc/mesh.ply: cannot be written: "));
+  EXPECT_THAT(opened(folder / "mesh.ply", folder / "none"),
+              HasSubstr("4: " + (folder / "none") + ": cannot make a temporary file"));
+  const std::string file = test::write_file(folder / "file", "");
+  EXPECT_THAT(opened(file + "/mesh.ply"), HasSubstr("cannot be written"));
+  EXPECT_EQ(folder.entries(), 1);
+}
+
+TEST(MeshSink, ProtectedFilesAndFoldersAreNotReplaced) {
+  const test::TemporaryFolder folder;
+  const std::string path = test::write_file(folder / "mesh.ply", "old");
+  ::chmod(path.c_str(), 0444);
+  ::chmod(folder.path().c_str(), 0777);
+  const auto as_nobody = [&](const std::string& name) {
+    return outcome_in_child([&] {
+      if (::geteuid() == 0 && ::seteuid(65534) != 0) throw std::runtime_error("cannot change user");
+      const MeshSink sink({.path = folder / name});
+    });
+  };
+  EXPECT_THAT(as_nobody("mesh.ply"), HasSubstr("mesh.ply: cannot be written: Permission denied"));
+  ::chmod(folder.path().c_str(), 0555);
+  EXPECT_THAT(as_nobody("new.ply"), HasSubstr("new.ply: cannot be written: Permission denied"));
+  ::chmod(folder.path().c_str(), 0755);
+  EXPECT_EQ(folder.entries(), 1);
+}
+
+TEST(MeshSink, DefectsOfTheCallerAreNamed) {
+  const test::TemporaryFolder folder;
+  {
+    MeshSink sink({.path = folder / "mesh.ply", .attributes = kColours});
+    sink.append_vertices(some_vertices(0, 10));
+    VertexBatch bad = some_vertices(0, 10);
+    bad.z[4] = std::nan("");
+    EXPECT_THAT(outcome([&] { sink.append_vertices(bad); }), HasSubstr("1: vertex 14 of the mesh would get z = nan"));
+    sink.append_triangles({{0, 1, 10}});
+    EXPECT_THAT(outcome([&] { sink.commit(); }), HasSubstr("a triangle uses vertex 10, the mesh has 10 vertices"));
+    sink.append_vertices(some_vertices(0, 1));
+    sink.commit();
+    EXPECT_THAT(outcome([&] { sink.append_triangles({}); }), HasSubstr("is committed"));
+    EXPECT_THAT(outcome([&] { sink.commit(); }), HasSubstr("is committed"));
+  }
+  EXPECT_EQ(folder.entries(), 1);
+}
+
+TEST(MeshSink, FileSizeLimitIsReportedAndNothingLeft) {
+  const test::TemporaryFolder folder;
+  const std::string text = outcome_in_child([&] {
+    std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit limit{1'000'000, 1'000'000};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    write_mesh_to({.path = folder / "mesh.ply", .attributes = kColours}, 100'000, 10);
+  });
+  EXPECT_THAT(text, HasSubstr("4: " + (folder / "mesh.ply") + ": cannot be written: File too large"));
+  EXPECT_EQ(folder.entries(), 0);
+}
+
+/// In a small file system of its own, seen by the child process alone.
+std::string outcome_on_small_disk(const std::string& where, const std::function<void()>& work) {
+  return outcome_in_child([&] {
+    if (::unshare(CLONE_NEWNS) != 0 || ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
+        ::mount("none", where.c_str(), "tmpfs", 0, "size=1m") != 0) {
+      throw Error(ExitCode::internal, "no mount");
+    }
+    work();
+  });
+}
+
+TEST(MeshSink, FullDiskIsReportedWhereverItFills) {
+  const test::TemporaryFolder small;
+  const test::TemporaryFolder large;
+  // Vertices too many; faces too many for the temporary folder; each fits but not both together.
+  const std::string vertices = outcome_on_small_disk(
+      small.path(), [&] { write_mesh_to({.path = small / "mesh.ply", .attributes = kColours}, 100'000, 9); });
+  if (vertices == "1: no mount") GTEST_SKIP() << "may not mount";
+  EXPECT_THAT(vertices, HasSubstr("4: " + (small / "mesh.ply") +
+                                  ": cannot be written: No space left on device; free some space"));
+  const std::string faces = outcome_on_small_disk(small.path(), [&] {
+    write_mesh_to({.path = large / "mesh.ply", .tmp_dir = small.path(), .attributes = kColours}, 9, 200'000);
+  });
+  EXPECT_THAT(faces, HasSubstr("4: " + small.path() + ": the temporary face file"));
+  EXPECT_THAT(faces, HasSubstr("No space left on device"));
+  EXPECT_EQ(large.entries(), 0);
+  const std::string both = outcome_on_small_disk(small.path(), [&] {
+    const auto count = [&] { return std::distance(std::filesystem::directory_iterator(small.path()), {}); };
+    const std::string text =
+        outcome([&] { write_mesh_to({.path = small / "mesh.ply", .attributes = kColours}, 15'000, 40'000); });
+    throw Error(ExitCode::internal, text + " left " + std::to_string(count()));
+  });
+  EXPECT_THAT(both, HasSubstr("mesh.ply: cannot be written: No space left on device"));
+  EXPECT_THAT(both, HasSubstr("left 0"));
+}
+
+TEST(MeshSink, StandardOutputGetsTheSameBytes) {
+  const test::TemporaryFolder folder;
+  write_mesh_to({.path = folder / "mesh.ply", .attributes = kColours}, 20'000, 40'000);
+  const std::string expected = test::read_file(folder / "mesh.ply");
+  for (const int flags : {O_WRONLY, O_WRONLY | O_APPEND}) {
+    const std::string path = test::write_file(folder / "out", "");
+    const int out = ::open(path.c_str(), flags);
+    {
+      const test::Redirected standard_output(STDOUT_FILENO, out);
+      write_mesh_to({.path = "-", .tmp_dir = folder.path(), .attributes = kColours}, 20'000, 40'000);
+    }
+    ::close(out);
+    EXPECT_TRUE(test::read_file(path) == expected);
+  }
+}
+
+TEST(MeshSink, UncommittedOrFullStandardOutput) {
+  const test::TemporaryFolder folder;
+  const std::string path = test::write_file(folder / "out", "");
+  const int out = ::open(path.c_str(), O_WRONLY);
+  {
+    const test::Redirected standard_output(STDOUT_FILENO, out);
+    MeshSink sink({.path = "-", .attributes = kColours});
+    sink.append_vertices(some_vertices(0, 10));
+  }
+  ::close(out);
+  EXPECT_EQ(test::read_file(path), "");
+  const int full = ::open("/dev/full", O_WRONLY);
+  const std::string text = outcome([&] {
+    const test::Redirected standard_output(STDOUT_FILENO, full);
+    write_mesh_to({.path = "-", .attributes = kColours}, 10, 1);
+  });
+  ::close(full);
+  EXPECT_THAT(text, HasSubstr("4: standard output: cannot be written: No space left on device"));
+}
+
+TEST(MeshSink, DevicesAreWrittenNotReplaced) {
+  write_mesh_to({.path = "/dev/null", .attributes = kColours}, 10, 1);
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+  EXPECT_THAT(outcome([] { write_mesh_to({.path = "/dev/full", .attributes = kColours}, 10, 1); }),
+              HasSubstr("4: /dev/full: cannot be written: No space left on device"));
+}
+
+}  // namespace
+}  // namespace lamina

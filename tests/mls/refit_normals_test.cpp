@@ -1,0 +1,169 @@
+// Normals fitted again, against surfaces whose normals are known.
+#include "mls/refit_normals.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+namespace lamina {
+namespace {
+
+using Vector = std::array<double, 3>;
+
+constexpr double kUnit = 1e7;  ///< steps
+
+struct Scene {
+  LocalSamples samples;
+  std::vector<Vector> truth;
+  double radius = 0;  ///< two spacings, steps
+
+  void add(const Vector& position, const Vector& normal) {
+    samples.x.push_back(static_cast<std::int32_t>(std::lround(kUnit * position[0])));
+    samples.y.push_back(static_cast<std::int32_t>(std::lround(kUnit * position[1])));
+    samples.z.push_back(static_cast<std::int32_t>(std::lround(kUnit * position[2])));
+    truth.push_back(normal);
+  }
+  /// Each component by up to `error` either way.
+  void perturb(double error) {
+    std::mt19937 random(7);
+    std::uniform_real_distribution<> u(-error, error);
+    for (const Vector& n : truth) {
+      const Vector p{n[0] + u(random), n[1] + u(random), n[2] + u(random)};
+      const double l = std::hypot(p[0], p[1], p[2]);
+      samples.nx.push_back(static_cast<float>(p[0] / l));
+      samples.ny.push_back(static_cast<float>(p[1] / l));
+      samples.nz.push_back(static_cast<float>(p[2] / l));
+    }
+  }
+};
+
+Scene sphere(std::size_t count) {
+  std::mt19937 random(3);
+  std::normal_distribution<> normal;
+  Scene scene;
+  scene.radius = 2 * kUnit * std::sqrt(4 * std::numbers::pi / static_cast<double>(count));
+  for (std::size_t i = 0; i < count; ++i) {
+    Vector v{normal(random), normal(random), normal(random)};
+    const double l = std::hypot(v[0], v[1], v[2]);
+    for (double& c : v) c /= l;
+    scene.add(v, v);
+  }
+  return scene;
+}
+
+UnitNormals refitted(const Scene& scene, float support) {
+  const auto radius = static_cast<float>(scene.radius);
+  RefitNormals refit({support, radius, 0}, {static_cast<std::int32_t>(radius), 4}, select_kernel());
+  refit.add(0, scene.samples, std::vector<float>(scene.samples.size(), radius));
+  return refit.find(0);
+}
+
+/// Root mean square of the angle to the truth.
+double error_of(const std::vector<Vector>& truth, const std::vector<float>& x, const std::vector<float>& y,
+                const std::vector<float>& z) {
+  double sum = 0;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const Vector n{static_cast<double>(x[i]), static_cast<double>(y[i]), static_cast<double>(z[i])};
+    const double along = n[0] * truth[i][0] + n[1] * truth[i][1] + n[2] * truth[i][2];
+    const double across =
+        std::hypot(n[0] - along * truth[i][0], n[1] - along * truth[i][1], n[2] - along * truth[i][2]);
+    sum += std::pow(std::atan2(across, along), 2);
+  }
+  return std::sqrt(sum / static_cast<double>(truth.size()));
+}
+
+TEST(RefitNormals, OfASphereComeNearTheTruth) {
+  Scene scene = sphere(6000);
+  scene.perturb(0.5);
+  const double before = error_of(scene.truth, scene.samples.nx, scene.samples.ny, scene.samples.nz);
+  EXPECT_GT(before, 0.3);
+  double last = before;
+  for (const float support : {2.0F, 4.0F}) {
+    const UnitNormals n = refitted(scene, support);
+    const double after = error_of(scene.truth, n.x, n.y, n.z);
+    EXPECT_LT(after, 0.6 * last) << support;  // four times the samples: half the error
+    last = after;
+    for (std::size_t i = 0; i < n.x.size(); ++i) EXPECT_NEAR(std::hypot(n.x[i], n.y[i], n.z[i]), 1, 1e-3);
+  }
+}
+
+TEST(RefitNormals, OfAnExactSphereStayExact) {
+  Scene scene = sphere(6000);
+  scene.perturb(0);
+  for (const float support : {2.0F, 4.0F}) {
+    const UnitNormals n = refitted(scene, support);
+    EXPECT_LT(error_of(scene.truth, n.x, n.y, n.z), 2e-3) << support;
+  }
+}
+
+/// Half a radius apart and facing away from each other: each side is fitted to its own.
+TEST(RefitNormals, OfTwoSidesOfASheet) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<> u(-1, 1);
+  Scene scene;
+  const std::size_t count = 4000;
+  scene.radius = 2 * kUnit * std::sqrt(4.0 / (count / 2.0));
+  for (std::size_t i = 0; i < count; ++i) {
+    const double side = i % 2 == 0 ? 1 : -1;
+    const double height = 0.25 * side * scene.radius / kUnit;
+    scene.add({height, u(random), u(random)}, {side, 0, 0});
+  }
+  scene.perturb(0.5);
+  const double before = error_of(scene.truth, scene.samples.nx, scene.samples.ny, scene.samples.nz);
+  const UnitNormals n = refitted(scene, 3);
+  EXPECT_LT(error_of(scene.truth, n.x, n.y, n.z), 0.4 * before);
+}
+
+TEST(RefitNormals, StayWhereTooFewSamplesAreNear) {
+  Scene scene;
+  scene.radius = 0.01 * kUnit;
+  for (int i = 0; i < 40; ++i) scene.add({0.1 * i, 0, 0.05 * (i % 3)}, {0, 1, 0});
+  scene.perturb(0.3);
+  const UnitNormals n = refitted(scene, 4);
+  EXPECT_EQ(n.x, scene.samples.nx);
+  EXPECT_EQ(n.y, scene.samples.ny);
+  EXPECT_EQ(n.z, scene.samples.nz);
+}
+
+/// Buckets that come and go give the normals that all together give, up to the order of sums.
+TEST(RefitNormals, DoNotDependOnBuckets) {
+  Scene scene = sphere(6000);
+  scene.perturb(0.5);
+  const UnitNormals whole = refitted(scene, 3);
+  const auto radius = static_cast<float>(scene.radius);
+  RefitNormals refit({3, radius, 0}, {static_cast<std::int32_t>(radius), 4}, select_kernel());
+  constexpr int kBuckets = 20;
+  std::array<LocalSamples, kBuckets> buckets;
+  std::array<std::vector<std::size_t>, kBuckets> numbers;
+  const auto bottom = [](int b) { return -kUnit + 2 * kUnit * b / kBuckets; };
+  for (std::size_t i = 0; i < scene.samples.size(); ++i) {
+    const LocalSamples& s = scene.samples;
+    int b = 0;
+    while (b + 1 < kBuckets && s.z[i] >= bottom(b + 1)) ++b;
+    LocalSamples& to = buckets[static_cast<std::size_t>(b)];
+    to.x.push_back(s.x[i]), to.y.push_back(s.y[i]), to.z.push_back(s.z[i]);
+    to.nx.push_back(s.nx[i]), to.ny.push_back(s.ny[i]), to.nz.push_back(s.nz[i]);
+    numbers[static_cast<std::size_t>(b)].push_back(i);
+  }
+  std::size_t added = 0;
+  for (std::size_t b = 0; b < kBuckets; ++b) {
+    while (added < kBuckets && bottom(static_cast<int>(added)) <= bottom(static_cast<int>(b) + 1) + refit.reach()) {
+      refit.add(added, buckets[added], std::vector<float>(buckets[added].size(), radius));
+      ++added;
+    }
+    const UnitNormals n = refit.find(b);
+    refit.forget_below(static_cast<std::int64_t>(bottom(static_cast<int>(b)) - refit.reach()) - 1);
+    for (std::size_t i = 0; i < numbers[b].size(); ++i) {
+      const std::size_t at = numbers[b][i];
+      EXPECT_NEAR(n.x[i], whole.x[at], 1e-4);
+      EXPECT_NEAR(n.y[i], whole.y[at], 1e-4);
+      EXPECT_NEAR(n.z[i], whole.z[at], 1e-4);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lamina

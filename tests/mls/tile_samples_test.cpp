@@ -1,0 +1,276 @@
+#include "mls/tile_samples.h"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <cmath>
+#include <map>
+#include <optional>
+#include <random>
+#include <set>
+
+#include "support/random_cloud.h"
+
+namespace lamina::test {
+namespace {
+
+/// Buckets with random supports; some samples are left out.
+Batch random_batch(std::uint64_t seed, const Lattice& lattice, int buckets, std::size_t samples) {
+  std::mt19937_64 random(seed);
+  Batch out;
+  for (int b = 0; b < buckets; ++b) {
+    auto bucket = std::make_shared<ActiveBucket>();
+    bucket->samples =
+        random_cloud({Shape::scatter, samples, {0, 0, 0}, 20.0 * lattice.cell, 100, 100, 1, 0, 2}, seed + b);
+    for (std::size_t i = 0; i < samples; ++i) {
+      const std::uint64_t size = random() % 20;  // a few reach more places than there are tiles
+      const double cells = std::uniform_real_distribution<double>(0.5, size == 0 ? 90 : size < 3 ? 9 : 3)(random);
+      bucket->support.push_back(random() % 8 == 0 ? 0.0F : static_cast<float>(cells * lattice.cell));
+      bucket->weight.push_back(static_cast<float>(random() % 100 + 1));
+      bucket->level.push_back(static_cast<std::uint8_t>(random() % static_cast<unsigned>(lattice.levels)));
+    }
+    out.push_back(bucket);
+  }
+  return out;
+}
+
+ClumpedBatch clumped(const Batch& batch, const Lattice& lattice) {
+  ClumpedBatch out;
+  for (const auto& bucket : batch) out.push_back(std::make_shared<const ClumpedBucket>(clump(*bucket, lattice)));
+  return out;
+}
+
+/// Random attributes tell samples apart.
+using Name = std::pair<float, float>;
+Name name_of(const std::vector<std::vector<float>>& attributes, std::size_t i) {
+  return {attributes[0][i], attributes[1][i]};
+}
+
+/// Distance from a sample to the nearest point of a tile's layers along an axis, in steps.
+double away(std::int32_t at, std::int32_t first, std::int32_t last, double shift, double cell) {
+  const double low = (first + shift) * cell;
+  const double high = (last + shift) * cell;
+  if (at >= low && at <= high) return std::abs(std::remainder(at - low, cell));
+  return at < low ? low - at : at - high;
+}
+
+TEST(Clumps, HoldEverySampleOnceInsideTheirBox) {
+  const Lattice lattice{48, 3};
+  for (std::uint64_t seed = 0; seed < 8; ++seed) {
+    const Batch batch = random_batch(seed, lattice, 1, 300);
+    const ActiveBucket& bucket = *batch.front();
+    const ClumpedBucket c = clump(bucket, lattice);
+    std::map<Name, std::size_t> left;
+    for (std::size_t i = 0; i < bucket.samples.size(); ++i) {
+      if (bucket.support[i] > 0) left[name_of(bucket.samples.attributes, i)] = i;
+    }
+    ASSERT_EQ(c.x.size(), left.size());
+    std::uint32_t end = 0;
+    for (const Clump& k : c.clumps) {
+      ASSERT_EQ(k.begin, end);
+      ASSERT_LT(k.begin, k.end);
+      end = k.end;
+      std::optional<std::size_t> before;
+      for (std::uint32_t i = k.begin; i < k.end; ++i) {
+        const auto found = left.find(name_of(c.attributes, i));
+        ASSERT_NE(found, left.end());
+        const std::size_t s = found->second;
+        left.erase(found);
+        ASSERT_TRUE(!before || *before < s) << "order";
+        before = s;
+        EXPECT_EQ(c.x[i], bucket.samples.x[s]);
+        EXPECT_EQ(c.nz[i], bucket.samples.nz[s]);
+        EXPECT_EQ(c.support[i], bucket.support[s]);
+        EXPECT_EQ(c.weight[i], bucket.weight[s]);
+        EXPECT_EQ(c.cell[i], static_cast<float>(lattice.cell_size(bucket.level[s])));
+        EXPECT_EQ(c.cell[i], c.cell[k.begin]) << "one level";
+        const std::array<std::int32_t, 3> p{c.x[i], c.y[i], c.z[i]};
+        for (int a = 0; a < 3; ++a) {
+          EXPECT_LE(k.low[a], static_cast<double>(p[a]) - static_cast<double>(c.support[i]));
+          EXPECT_GE(k.high[a], static_cast<double>(p[a]) + static_cast<double>(c.support[i]));
+        }
+      }
+    }
+    EXPECT_EQ(end, c.x.size());
+    EXPECT_TRUE(left.empty());
+  }
+}
+
+TEST(Clumps, OfAbsurdExtentsAndCells) {
+  // Corners of the whole fixed-point range, with the smallest and the largest cells.
+  for (const Lattice lattice : {Lattice{1, 3}, Lattice{1 << 20, 9}}) {
+    ActiveBucket bucket;
+    for (int i = 0; i < 16; ++i) {
+      const auto end = [i](int bit) { return ((i >> bit) & 1) != 0 ? (1 << 29) : -(1 << 29); };
+      bucket.samples.x.push_back(end(0));
+      bucket.samples.y.push_back(end(1));
+      bucket.samples.z.push_back(end(2));
+      for (auto* n : {&bucket.samples.nx, &bucket.samples.ny, &bucket.samples.nz}) n->push_back(1);
+      bucket.support.push_back(i == 0 ? 3e9F : 10);
+      bucket.weight.push_back(1);
+      bucket.level.push_back(static_cast<std::uint8_t>(i % lattice.levels));
+    }
+    const ClumpedBucket c = clump(bucket, lattice);
+    EXPECT_EQ(c.x.size(), 16U);
+    EXPECT_EQ(c.clumps.back().end, 16U);
+    for (const Clump& k : c.clumps) {
+      for (std::uint32_t i = k.begin; i < k.end; ++i) EXPECT_LE(k.low[0], c.x[i]);
+    }
+  }
+}
+
+TEST(TileSamples, HoldWhatReachesTheTile) {
+  const Lattice lattice{48, 3};
+  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+    const Batch batch = random_batch(seed, lattice, 1 + static_cast<int>(seed % 3), 150);
+    const ClumpedBatch in_clumps = clumped(batch, lattice);
+    for (int level = 0; level < 2; ++level) {
+      // Every second block takes part.
+      std::vector<Block> blocks;
+      for (int i = 0; i < 216; i += 2) blocks.push_back({i % 6 - 3, i / 6 % 6 - 3, i / 36 - 3});
+      Reach reach;
+      reach.level = level;
+      reach.first = -4;
+      reach.end = reach.first + lattice.layers(level);
+      reach.margin = seed % 2 == 0 ? 0.0F : 60.0F;
+      reach.shift = seed < 3 ? 0.0F : 0.5F;
+      const TileRuns bins = bin_clumps(lattice, reach, in_clumps, blocks);
+      ASSERT_EQ(bins.begin.size(), blocks.size() + 1);
+      ASSERT_EQ(bins.begin.back(), bins.runs.size());
+      std::size_t held = 0;
+      RowSamples rows;
+      for (std::size_t t = 0; t < blocks.size(); ++t) {
+        const Block& b = blocks[t];
+        const std::int32_t z_first = std::max(b.z * 8, reach.first);
+        const std::int32_t z_last = std::min(b.z * 8 + 7, reach.end - 1);
+        if (z_first > z_last) {
+          ASSERT_TRUE(bins.of(t).empty());
+          continue;
+        }
+        rows.gather(lattice, reach, b, bins.of(t), 1.75F);
+        std::multiset<Name> in;
+        for (std::size_t k = 0; k < rows.samples().x.size(); ++k) in.insert(name_of(rows.samples().attributes, k));
+        held += in.size();
+        const double cell = lattice.cell_size(level);
+        const double shift = static_cast<double>(reach.shift);
+        for (const auto& bucket : batch) {
+          for (std::size_t i = 0; i < bucket->samples.size(); ++i) {
+            const double support = static_cast<double>(bucket->support[i]);
+            const double far = support + static_cast<double>(reach.margin);
+            const LocalSamples& s = bucket->samples;
+            // To the nearest point of the tile's lattice, and to the box of its points.
+            const double x = away(s.x[i], b.x * 8, b.x * 8 + 7, shift, cell);
+            const double y = away(s.y[i], b.y * 8, b.y * 8 + 7, shift, cell);
+            const double z = away(s.z[i], z_first, z_last, shift, cell);
+            const std::size_t times = in.count(name_of(s.attributes, i));
+            ASSERT_LE(times, 1U);
+            if (support > 0 && std::hypot(x, y, z) < far) {
+              ASSERT_EQ(times, 1U) << "a sample in reach is missing";
+            }
+            const double slack = 0.01 * cell;
+            const auto outside = [&](double v, double first, double last) {
+              return v < (first + shift) * cell - far - slack || v > (last + shift) * cell + far + slack;
+            };
+            const bool beyond = outside(s.x[i], b.x * 8, b.x * 8 + 7) || outside(s.y[i], b.y * 8, b.y * 8 + 7) ||
+                                outside(s.z[i], z_first, z_last);
+            ASSERT_TRUE(times == 0 || (support > 0 && !beyond)) << "a sample out of reach";
+          }
+        }
+      }
+      EXPECT_GT(held, 15U);
+    }
+  }
+}
+
+TEST(TileSamples, BinsDoNotDependOnThreads) {
+  const Lattice lattice{48, 3};
+  const ClumpedBatch batch = clumped(random_batch(1, lattice, 8, 4'000), lattice);
+  std::vector<Block> blocks;
+  for (int i = 0; i < 8; ++i) blocks.push_back({(i & 1) - 1, ((i >> 1) & 1) - 1, (i >> 2) - 1});
+  std::vector<TileRuns> found;
+  for (const std::size_t n : {1U, 2U, 4U}) {
+    const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, n);
+    found.push_back(bin_clumps(lattice, {0, -4, 0, 0, 0}, batch, blocks));
+    EXPECT_EQ(found.back().begin, found.front().begin);
+    ASSERT_EQ(found.back().runs.size(), found.front().runs.size());
+    for (std::size_t r = 0; r < found.back().runs.size(); ++r) {
+      const lamina::Run& a = found.back().runs[r];
+      const lamina::Run& b = found.front().runs[r];
+      ASSERT_TRUE(a.from == b.from && a.begin == b.begin && a.end == b.end);
+    }
+    EXPECT_GT(found.back().runs.size(), 500U);
+  }
+}
+
+TEST(TileSamples, RowsHoldSamplesInCells) {
+  const Lattice lattice{48, 3};
+  std::mt19937_64 random(3);
+  for (int level = 0; level < 3; ++level) {
+    const Batch batch = random_batch(10 + level, lattice, 3, 400);
+    const ClumpedBatch in_clumps = clumped(batch, lattice);
+    const Block block{-1, 0, level - 1};
+    Reach reach;
+    reach.level = level;
+    reach.first = block.z * 8;
+    reach.end = reach.first + 8;
+    std::map<Name, std::pair<const ActiveBucket*, std::size_t>> places;
+    for (const auto& b : batch) {
+      for (std::size_t i = 0; i < b->samples.size(); ++i) places[name_of(b->samples.attributes, i)] = {b.get(), i};
+    }
+    std::vector<lamina::Run> runs;
+    for (const auto& b : in_clumps) {
+      for (const Clump& c : b->clumps) runs.push_back({b.get(), c.begin, c.end});
+    }
+    RowSamples rows;
+    rows.gather(lattice, reach, block, runs, 1.75F);
+    const TileSamples& t = rows.samples();
+    ASSERT_GT(t.x.size(), 20U);
+    const double a = lattice.cell_size(level);
+    double largest = 0;
+    for (std::size_t k = 0; k < t.x.size(); ++k) {
+      const auto& [bucket, i] = places.at(name_of(t.attributes, k));
+      const double support = static_cast<double>(bucket->support[i]) / a;
+      const double band = 1.75 * lattice.cell_size(bucket->level[i]) / a;
+      largest = std::max(largest, support);
+      EXPECT_NEAR(t.x[k], bucket->samples.x[i] / a - block.x * 8, 1e-5);
+      EXPECT_NEAR(t.y[k], bucket->samples.y[i] / a - block.y * 8, 1e-5);
+      EXPECT_NEAR(t.z[k], bucket->samples.z[i] / a - block.z * 8, 1e-5);
+      EXPECT_EQ(t.nx[k], bucket->samples.nx[i]);
+      EXPECT_EQ(t.ny[k], bucket->samples.ny[i]);
+      EXPECT_EQ(t.nz[k], bucket->samples.nz[i]);
+      EXPECT_NEAR(t.support[k], support, 1e-6 * support);
+      EXPECT_NEAR(t.inv_support2[k], 1 / (support * support), 1e-6 / (support * support));
+      EXPECT_NEAR(t.inv_band2[k], 1 / (band * band), 1e-6 / (band * band));
+      EXPECT_EQ(t.weight[k], bucket->weight[i]);
+    }
+    for (int round = 0; round < 200; ++round) {
+      const auto number = [&](double low, double high) {
+        return static_cast<float>(std::uniform_real_distribution<double>(low, high)(random));
+      };
+      const float y = number(-2, 9);
+      const float z = number(-2, 9);
+      const float y_high = y + number(0, 3);
+      const float z_high = z + number(0, 1);
+      std::array<SampleRange, RowSamples::kRows> ranges{};
+      const int n = rows.ranges(y, y_high, z, z_high, ranges.data());
+      ASSERT_LE(n, RowSamples::kRows);
+      std::vector<bool> covered(t.x.size(), false);
+      for (int r = 0; r < n; ++r) {
+        ASSERT_LT(ranges[r].begin, ranges[r].end);
+        ASSERT_LE(ranges[r].end, t.x.size());
+        if (r > 0) {
+          ASSERT_LT(ranges[r - 1].end, ranges[r].begin);
+        }
+        for (std::uint32_t k = ranges[r].begin; k < ranges[r].end; ++k) covered[k] = true;
+      }
+      for (std::size_t k = 0; k < t.x.size(); ++k) {
+        const bool inside =
+            t.y[k] > y - largest && t.y[k] < y_high + largest && t.z[k] > z - largest && t.z[k] < z_high + largest;
+        ASSERT_TRUE(!inside || covered[k]) << "y " << t.y[k] << " z " << t.z[k];
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace lamina::test

@@ -1,0 +1,105 @@
+// Noise against what was put in: samples `spacing` apart, moved along the normal by up to k spacings either way.
+#include "samples/survey_noise.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+namespace lamina {
+namespace {
+
+constexpr double kSide = 1e8;  ///< steps
+
+struct Scene {
+  LocalSamples samples;
+  double radius = 0;  ///< two spacings, steps
+};
+
+void add(LocalSamples& samples, double x, double y, double z) {
+  samples.x.push_back(static_cast<std::int32_t>(std::lround(x)));
+  samples.y.push_back(static_cast<std::int32_t>(std::lround(y)));
+  samples.z.push_back(static_cast<std::int32_t>(std::lround(z)));
+}
+
+/// A square that stands askew.
+Scene noisy_plane(std::size_t count, double k) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<> u(-0.5, 0.5);
+  const double spacing = kSide / std::sqrt(static_cast<double>(count));
+  Scene scene;
+  scene.radius = 2 * spacing;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double along = kSide * u(random), off = 2 * k * spacing * u(random);
+    add(scene.samples, 0.8 * along - 0.6 * off, 0.6 * along + 0.8 * off, kSide * u(random));
+  }
+  return scene;
+}
+
+Scene noisy_sphere(std::size_t count, double k) {
+  std::mt19937 random(2);
+  std::normal_distribution<> normal;
+  std::uniform_real_distribution<> u(-0.5, 0.5);
+  const double spacing = 0.5 * kSide * std::sqrt(4 * std::numbers::pi / static_cast<double>(count));
+  Scene scene;
+  scene.radius = 2 * spacing;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double x = normal(random), y = normal(random), z = normal(random);
+    const double to = (0.5 * kSide + 2 * k * spacing * u(random)) / std::hypot(x, y, z);
+    add(scene.samples, x * to, y * to, z * to);
+  }
+  return scene;
+}
+
+double noise_of(const Scene& scene, std::size_t buckets) {
+  const auto height = static_cast<std::int32_t>(2 * kSide / static_cast<double>(buckets)) + 1;
+  SlabStoreWriter writer({}, {::testing::TempDir(), static_cast<std::int32_t>(-kSide), height, buckets, 1 << 20});
+  LocalSamples full = scene.samples;
+  for (auto* a : {&full.nx, &full.ny, &full.nz}) a->assign(full.size(), 0);
+  writer.append(full);
+  const SlabStore store = writer.finish();
+  const ReadBucket read = [&](std::size_t b, LocalSamples& out) { store.read(b, out); };
+  return static_cast<double>(survey_noise(store, read, static_cast<float>(scene.radius)));
+}
+
+/// Of a uniform distribution, half lies within half its reach: k / 2 spacings, k / 4 radii.
+constexpr double expected(double k) {
+  return k / 4;
+}
+
+TEST(SurveyNoise, OfAPlane) {
+  EXPECT_LT(noise_of(noisy_plane(20'000, 0), 50), 1e-3);
+  for (const double k : {0.1, 0.5, 1.0})
+    EXPECT_NEAR(noise_of(noisy_plane(20'000, k), 50), expected(k), 0.15 * expected(k)) << k;
+}
+
+TEST(SurveyNoise, OfASphereIsNotItsCurvature) {
+  EXPECT_LT(noise_of(noisy_sphere(20'000, 0), 50), 0.002);
+  EXPECT_LT(noise_of(noisy_sphere(1000, 0), 50), 0.02);
+  EXPECT_NEAR(noise_of(noisy_sphere(20'000, 0.5), 50), expected(0.5), 0.15 * expected(0.5));
+  // Of a spacing either way, the neighbours are those of a place beside the surface.
+  EXPECT_NEAR(noise_of(noisy_sphere(20'000, 1), 50), expected(1), 0.3 * expected(1));
+}
+
+/// So thick a layer has no plane, and is not mistaken for a clean one.
+TEST(SurveyNoise, OfALayerAsThickAsItsNeighbourhoods) {
+  for (const double k : {2.0, 4.0}) EXPECT_GT(noise_of(noisy_plane(20'000, k), 50), 0.3) << k;
+}
+
+TEST(SurveyNoise, LargeCloudsAreSeenInParts) {
+  for (const std::size_t buckets : {8U, 300U})
+    EXPECT_NEAR(noise_of(noisy_plane(160'000, 0.5), buckets), expected(0.5), 0.15 * expected(0.5)) << buckets;
+}
+
+TEST(SurveyNoise, IsZeroWhereNothingTells) {
+  EXPECT_EQ(noise_of({}, 3), 0);
+  Scene one_place;
+  for (int i = 0; i < 500; ++i) add(one_place.samples, 5, 6, 7);
+  EXPECT_EQ(noise_of(one_place, 3), 0);
+  one_place.radius = 1000;
+  EXPECT_EQ(noise_of(one_place, 3), 0);
+}
+
+}  // namespace
+}  // namespace lamina
