@@ -24,7 +24,7 @@ struct RecordSorter::Run {
   std::size_t at = 0;  ///< of the first record in `piece` not given back
 
   /// False when the run has ended.
-  bool load(const TempFile& file, std::size_t bytes) {
+  bool load(const SpillFile& file, std::size_t bytes) {
     if (at < piece.size()) return true;
     piece.resize(static_cast<std::size_t>(std::min<std::uint64_t>(bytes, end - next)));
     at = 0;

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/background_writer.h"
-#include "base/temp_file.h"
+#include "base/spill_file.h"
 
 namespace lamina::edit {
 
@@ -41,8 +41,8 @@ class RecordSorter {
   std::unique_ptr<std::byte[]> records_;
   std::vector<std::uint64_t> keys_;
   std::vector<std::uint32_t> order_;  ///< of the held records, once sorted
-  TempFile file_;
-  BackgroundWriter writer_{TempFile::kBufferBytes, 4};  // ends before the file does
+  SpillFile file_;
+  BackgroundWriter writer_{SpillFile::kBufferBytes, 4};  // ends before the file does
   std::vector<Run> runs_;
 };
 

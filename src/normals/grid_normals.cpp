@@ -9,7 +9,7 @@
 #include <span>
 #include <utility>
 
-#include "base/scratch_file.h"
+#include "base/spill_file.h"
 #include "lamina/error.h"
 #include "normals/grid_faces.h"
 
@@ -22,7 +22,7 @@ constexpr std::size_t kPiece = std::size_t{1} << 15;  ///< rows
 /// The source's rows with the normals of a file that holds one for each.
 class WithGridNormals final : public PointSource {
  public:
-  WithGridNormals(std::unique_ptr<PointSource> source, ScratchFile file)
+  WithGridNormals(std::unique_ptr<PointSource> source, SpillFile file)
       : source_(std::move(source)), file_(std::move(file)) {
     info_ = source_->info();
     info_.has_normals = true;
@@ -41,7 +41,7 @@ class WithGridNormals final : public PointSource {
 
  private:
   std::unique_ptr<PointSource> source_;
-  ScratchFile file_;
+  SpillFile file_;
 };
 
 /// The source's rows one by one, in order.
@@ -98,24 +98,20 @@ class GridJob {
     }
   }
 
-  ScratchFile finish(std::uint64_t& found) {
-    file_.write(std::as_bytes(std::span(waiting_)));
+  SpillFile finish(std::uint64_t& found) {
+    file_.flush();
     found = found_;
     return std::move(file_);
   }
 
  private:
   void put(const Normal& n) {
-    waiting_.push_back(n);
+    file_.append(std::as_bytes(std::span(n)));
     if (n != Normal{}) ++found_;
-    if (waiting_.size() < kPiece) return;
-    file_.write(std::as_bytes(std::span(waiting_)));
-    waiting_.clear();
   }
 
   Rows rows_;
-  ScratchFile file_;
-  std::vector<Normal> waiting_;
+  SpillFile file_;
   std::uint64_t found_ = 0;
 };
 
@@ -138,7 +134,7 @@ GridNormals grid_normals(std::unique_ptr<PointSource> source, const std::vector<
   }
   job.skip_to(source->info().count);
   GridNormals out;
-  ScratchFile file = job.finish(out.found);
+  SpillFile file = job.finish(out.found);
   out.source = std::make_unique<WithGridNormals>(std::move(source), std::move(file));
   return out;
 }

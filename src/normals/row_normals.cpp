@@ -65,7 +65,7 @@ NormalCode code_of(const std::array<float, 3>& normal) {
 RowNormals::RowNormals(edit::RecordSorter& records, const PatchSigns& signs, std::uint64_t rows,
                        const std::string& directory, const RunContext& run)
     : file_(directory) {
-  BackgroundWriter writer(TempFile::kBufferBytes, 4);
+  BackgroundWriter writer(SpillFile::kBufferBytes, 4);
   std::vector<NormalCode> codes;
   std::uint64_t next = 0;
   const auto write = [&] {

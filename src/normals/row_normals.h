@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "base/temp_file.h"
+#include "base/spill_file.h"
 #include "edit/record_sorter.h"
 #include "lamina/points.h"
 #include "normals/patch_graph.h"
@@ -38,7 +38,7 @@ class RowNormals {
   void apply(SampleBatch& batch) const;
 
  private:
-  TempFile file_;
+  SpillFile file_;
 };
 
 /// The rows of a source with these normals.

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "base/spill_file.h"
 #include "boundary/rim_finder.h"
 #include "chunks/part_file.h"
 #include "reconstruct/mesh_output.h"
@@ -13,7 +14,7 @@
 namespace lamina::ranks {
 
 /// Takes the finished slabs of a sweep through `span`: records of the final PLY, triangles by numbers from the part's
-/// first vertex on (PartTriangle). Keeps two megabytes.
+/// first vertex on (PartTriangle). Keeps little of it in memory.
 class RankSlabs : public SlabSink {
  public:
   /// Throws Error(budget) when `directory` cannot be written.
@@ -26,7 +27,7 @@ class RankSlabs : public SlabSink {
   [[nodiscard]] const SlabMark& below() const { return below_; }  ///< PartInfo::below
   [[nodiscard]] const SlabMark& last() const { return last_; }    ///< PartInfo::last
   [[nodiscard]] const MeshSinkSettings& layout() const { return layout_; }
-  [[nodiscard]] std::uint64_t disk_bytes() const { return records_.bytes + faces_.bytes; }
+  [[nodiscard]] std::uint64_t disk_bytes() const { return records_.size() + faces_.size(); }
   /// After the sweep: hands over all of it, piece by piece, in order.
   void read_vertices(const std::function<void(std::span<const std::byte>)>& take);
   /// After the sweep, once: the part's rims, packed (rim_bytes.h).
@@ -34,19 +35,9 @@ class RankSlabs : public SlabSink {
   void read_triangles(const std::function<void(std::span<const PartTriangle>)>& take);
 
  private:
-  struct Spill {
-    Descriptor file;
-    std::vector<std::byte> waiting;
-    std::uint64_t bytes = 0;
-  };
-  void put(Spill& spill, std::span<const std::byte> bytes);
-  void flush(Spill& spill);
-  void read(Spill& spill, const std::function<void(std::span<const std::byte>)>& take, std::size_t piece);
-
   SlabSpan span_;
   MeshSinkSettings layout_;
-  std::string directory_;
-  Spill records_, faces_;
+  SpillFile records_, faces_;
   bool begun_ = false;
   VertexBatch stands_on_;  ///< vertices of the slab below the part
   holes::RimFinder finder_;

@@ -1,11 +1,8 @@
 #include "reconstruct/pruner.h"
 
-#include <fcntl.h>
-#include <fmt/format.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <utility>
 
@@ -186,16 +183,11 @@ void Pruner::hold(Slab&& slab) {
 }
 
 void Pruner::spill(Slab& slab) {
-  if (!file_) file_ = open_unlinked(tmp_dir_);
+  if (!file_) file_.emplace(tmp_dir_);
   for_arrays(slab.vertices, slab.triangles, [&](const void* data, std::size_t bytes) {
-    if (const int error = pwrite_all(file_.get(), data, bytes, file_end_); error != 0) {
-      throw Error(ExitCode::budget,
-                  fmt::format("the temporary file in '{}' cannot grow beyond {} bytes: {}; free space "
-                              "there or choose another with --tmp-dir",
-                              tmp_dir_, file_end_, system_message(error)));
-    }
-    file_end_ += bytes;
+    file_->append({static_cast<const std::byte*>(data), bytes});
   });
+  file_->flush();
   held_bytes_ -= slab.bytes;
   slab.spilled = true;
   // Only the sizes of the arrays are still wanted.
@@ -212,21 +204,12 @@ void Pruner::fetch(Slab& slab) {
   resize(slab.vertices, slab.part.size());
   if (slab.radii) slab.vertices.radius.resize(slab.part.size());
   slab.triangles.resize(slab.spilled_triangles);
-  const std::uint64_t begin = file_begin_;
+  std::uint64_t at = file_->begin();
   for_arrays(slab.vertices, slab.triangles, [&](void* data, std::size_t bytes) {
-    const ReadResult got = pread_all(file_.get(), data, bytes, file_begin_);
-    if (got.error != 0 || got.bytes != bytes) {
-      throw Error(ExitCode::budget,
-                  fmt::format("the temporary file in '{}' cannot be read back: {}; choose another with "
-                              "--tmp-dir",
-                              tmp_dir_, got.error != 0 ? system_message(got.error) : "it ends early"));
-    }
-    file_begin_ += bytes;
+    file_->read(at, {static_cast<std::byte*>(data), bytes});
+    at += bytes;
   });
-  // Where holes are unknown the space comes back with the file's end.
-  (void)::fallocate(file_.get(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, static_cast<off_t>(begin),
-                    static_cast<off_t>(file_begin_ - begin));
-  if (file_begin_ == file_end_ && ::ftruncate(file_.get(), 0) == 0) file_begin_ = file_end_ = 0;
+  file_->discard_before(at);
 }
 
 void Pruner::pass_on_decided() {

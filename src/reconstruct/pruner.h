@@ -3,10 +3,11 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "base/descriptor.h"
+#include "base/spill_file.h"
 #include "lamina/surface.h"
 #include "meshes/mesh_sink.h"
 #include "reconstruct/mesh_output.h"
@@ -40,7 +41,8 @@ class Pruner {
   void finish();
 
   [[nodiscard]] const PruneCounts& counts() const { return counts_; }
-  [[nodiscard]] std::uint64_t disk_bytes() const { return file_end_ - file_begin_; }  ///< waiting in the file, now
+  /// Waiting in the file, now.
+  [[nodiscard]] std::uint64_t disk_bytes() const { return file_ ? file_->size() - file_->begin() : 0; }
 
  private:
   enum class Fate : std::uint8_t { open, stays, goes };
@@ -94,9 +96,8 @@ class Pruner {
   std::vector<std::uint32_t> live_part_;
 
   std::deque<Slab> waiting_;
-  std::uint64_t held_bytes_ = 0;  ///< of the waiting slabs in memory
-  Descriptor file_;
-  std::uint64_t file_begin_ = 0, file_end_ = 0;
+  std::uint64_t held_bytes_ = 0;   ///< of the waiting slabs in memory
+  std::optional<SpillFile> file_;  ///< of the waiting slabs that are not in memory, in their order
 
   // Of the slab passed on last, and the one being passed on.
   std::uint64_t passed_first_ = 0;

@@ -7,7 +7,7 @@
 #include <map>
 #include <span>
 
-#include "base/scratch_file.h"
+#include "base/spill_file.h"
 #include "lamina/error.h"
 #include "samples/neighbour_grid.h"
 
@@ -87,7 +87,7 @@ Outliers drop_outliers(const SlabStore& store, const OutlierRule& rule, const st
   const std::int32_t cell = choose_cell(store, buckets, rule.neighbours);
   buckets.forget_before(store.buckets());
   const std::int64_t reach = std::int64_t{kFarthestCells} * cell;
-  ScratchFile distances(directory);
+  SpillFile distances(directory);
   Moments moments;
   for (std::size_t first = 0; first < store.buckets();) {
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
@@ -114,9 +114,10 @@ Outliers drop_outliers(const SlabStore& store, const OutlierRule& rule, const st
     }
     const std::vector<float> means = mean_distances(positions, wanted, rule.neighbours, cell);
     moments.add(means);
-    distances.write(std::as_bytes(std::span(means)));
+    distances.append(std::as_bytes(std::span(means)));
     first = end;
   }
+  distances.flush();
   Outliers out;
   if (!(moments.count > 0)) return out;
   out.limit = moments.limit(rule.sigma);

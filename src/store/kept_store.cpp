@@ -175,7 +175,7 @@ SlabStore SlabStore::open(const std::string& directory, const StoreLayout& layou
     damaged(path, "is damaged: its counts are wrong");
   std::unique_ptr<Impl> impl(
       new Impl{SampleColumns(layout), layout, {}, std::vector<BucketIndex>(buckets), 0, 0, directory});
-  for (std::size_t f = 0; f < files; ++f) impl->files.push_back(TempFile::open(directory, store_file_name(f)));
+  for (std::size_t f = 0; f < files; ++f) impl->files.push_back(SpillFile::open(directory, store_file_name(f)));
   for (std::size_t b = 0; b < buckets; ++b) {
     BucketIndex& bucket = impl->buckets[b];
     const auto blocks = in.take<std::uint64_t>();

@@ -55,7 +55,7 @@ std::uint64_t SlabStore::total() const {
 }
 std::uint64_t SlabStore::disk_bytes() const {
   std::uint64_t bytes = 0;
-  for (const TempFile& file : impl_->files) bytes += file.size();
+  for (const SpillFile& file : impl_->files) bytes += file.size();
   return bytes;
 }
 
@@ -68,7 +68,7 @@ void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
   const auto& checksums = impl_->buckets[bucket].checksums;
   const auto& keep = impl_->buckets[bucket].keep;
   const auto& columns = impl_->columns;
-  const TempFile& file = impl_->file_of(bucket);
+  const SpillFile& file = impl_->file_of(bucket);
   std::vector<std::size_t> first(blocks.size());
   std::uint64_t here = 0;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
@@ -117,7 +117,7 @@ void SlabStore::keep_only(std::vector<std::vector<bool>> keep) {
 }
 
 void SlabStore::will_read(std::size_t bucket) const {
-  const TempFile& file = impl_->file_of(bucket);
+  const SpillFile& file = impl_->file_of(bucket);
   std::uint64_t begin = 0;
   std::uint64_t end = 0;
   // Blocks next to each other are one request.

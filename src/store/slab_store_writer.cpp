@@ -68,8 +68,8 @@ struct SlabStoreWriter::Impl {
   [[nodiscard]] static std::size_t block_rows_for(std::size_t rows_in_flight) {
     return std::clamp<std::size_t>(rows_in_flight / kBlocksInFlight / kChunkRows * kChunkRows, 1024, kBlockRows);
   }
-  [[nodiscard]] static std::vector<TempFile> make_files(const StoreSettings& s) {
-    std::vector<TempFile> files;
+  [[nodiscard]] static std::vector<SpillFile> make_files(const StoreSettings& s) {
+    std::vector<SpillFile> files;
     const std::size_t n = std::clamp<std::size_t>(s.buckets / kBucketsPerFile, 1, kFiles);
     while (files.size() < n) {
       s.keep ? files.emplace_back(s.directory, store_file_name(files.size())) : files.emplace_back(s.directory);
@@ -88,7 +88,7 @@ struct SlabStoreWriter::Impl {
   std::vector<std::uint32_t> bucket_of;
   PackedNormals normals;  ///< of the samples being appended
   std::array<Piece, kBlocksInFlight> pieces;
-  BackgroundWriter disk{TempFile::kBufferBytes, kBuffersInFlight};
+  BackgroundWriter disk{SpillFile::kBufferBytes, kBuffersInFlight};
 };
 
 void SlabStoreWriter::Impl::pack(const LocalSamples& s) {
@@ -211,7 +211,7 @@ SlabStore SlabStoreWriter::finish() {
   std::vector<std::size_t> all(impl_->buffers.buckets());
   std::iota(all.begin(), all.end(), std::size_t{0});
   impl_->flush(all);
-  for (TempFile& file : impl_->store->files) file.flush(impl_->disk);
+  for (SpillFile& file : impl_->store->files) file.flush(impl_->disk);
   impl_->store->files.front().check(impl_->disk.drain());
   SlabStore store(std::move(impl_->store));
   impl_.reset();

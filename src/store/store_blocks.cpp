@@ -68,7 +68,7 @@ StoreGatherer::StoreGatherer(const StoreLayout& layout, const std::string& direc
           SampleColumns(layout), layout, {}, std::vector<BucketIndex>(all.size()), 0, 0, std::string()}),
       blocks_(all.size()),
       sources_(sources),
-      disk_(TempFile::kBufferBytes, kBuffersMoved) {
+      disk_(SpillFile::kBufferBytes, kBuffersMoved) {
   const std::size_t files =
       std::clamp<std::size_t>(all.size() / kBucketsPerPart, 1, std::min(kMostFiles, kFilesPerSource * sources));
   while (store_->files.size() < files) store_->files.emplace_back(directory);
@@ -88,7 +88,7 @@ void StoreGatherer::add(std::size_t bucket, std::size_t source, const CodedBlock
 }
 
 SlabStore StoreGatherer::finish() {
-  for (TempFile& file : store_->files) file.flush(disk_);
+  for (SpillFile& file : store_->files) file.flush(disk_);
   store_->files.front().check(disk_.drain());
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     for (const std::vector<BlockEntry>& of_source : blocks_[b])

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/temp_file.h"
+#include "base/spill_file.h"
 #include "store/block_codec.h"
 #include "store/columns.h"
 
@@ -31,13 +31,13 @@ std::string store_file_name(std::size_t file);
 struct SlabStore::Impl {
   SampleColumns columns;
   StoreLayout layout;
-  std::vector<TempFile> files;  ///< each holds a run of buckets, so that the disk they take can be given back
+  std::vector<SpillFile> files;  ///< each holds a run of buckets, so that the disk they take can be given back
   std::vector<BucketIndex> buckets;
   std::uint64_t total = 0;
   std::size_t released = 0;  ///< files before this one are gone
   std::string directory;     ///< where the store is kept; empty: it is not
 
-  [[nodiscard]] TempFile& file_of(std::size_t bucket) { return files[bucket * files.size() / buckets.size()]; }
+  [[nodiscard]] SpillFile& file_of(std::size_t bucket) { return files[bucket * files.size() / buckets.size()]; }
 };
 
 /// The insides of a store, for those that move its blocks.

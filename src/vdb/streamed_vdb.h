@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "base/spill_file.h"
 #include "base/staged_file.h"
-#include "base/temp_file.h"
 #include "vdb/grids.h"
 #include "vdb/tile_signs.h"
 
@@ -74,8 +74,8 @@ class StreamedVdb {
 
   std::string path_;
   StagedFile staged_;
-  TempFile spool_;
-  BackgroundWriter disk_{TempFile::kBufferBytes, kBuffersInFlight};  ///< ends before the file it writes to
+  SpillFile spool_;
+  BackgroundWriter disk_{SpillFile::kBufferBytes, kBuffersInFlight};  ///< ends before the file it writes to
   std::vector<Grid> grids_;
   std::uint64_t bytes_ = 0;
 };

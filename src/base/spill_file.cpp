@@ -1,4 +1,4 @@
-#include "base/temp_file.h"
+#include "base/spill_file.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -8,7 +8,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <memory>
 #include <utility>
+#include <vector>
 
 #include "lamina/error.h"
 
@@ -22,32 +24,32 @@ std::uint64_t file_bytes(int descriptor) {
 
 }  // namespace
 
-TempFile::TempFile(std::string directory)
+SpillFile::SpillFile(std::string directory)
     : directory_(directory.empty() ? "." : std::move(directory)), file_(open_unlinked(directory_)) {}
 
-TempFile::TempFile(std::string directory, std::string name, Descriptor file)
+SpillFile::SpillFile(std::string directory, std::string name, Descriptor file)
     : directory_(std::move(directory)), name_(std::move(name)), file_(std::move(file)) {}
 
-TempFile::TempFile(std::string directory, std::string name)
-    : TempFile(std::move(directory), std::move(name), Descriptor()) {
+SpillFile::SpillFile(std::string directory, std::string name)
+    : SpillFile(std::move(directory), std::move(name), Descriptor()) {
   const std::string path = directory_ + "/" + name_;
   file_ = Descriptor(::open(path.c_str(), O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
   if (!file_) throw Error(ExitCode::budget, fmt::format("{}: cannot be written: {}", path, system_message(errno)));
 }
 
-TempFile TempFile::open(std::string directory, std::string name) {
+SpillFile SpillFile::open(std::string directory, std::string name) {
   const std::string path = directory + "/" + name;
   Descriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
   if (!file) {
     throw Error(ExitCode::unreadable,
                 fmt::format("{}: cannot be read: {}; make the store again", path, system_message(errno)));
   }
-  TempFile out(std::move(directory), std::move(name), std::move(file));
+  SpillFile out(std::move(directory), std::move(name), std::move(file));
   out.written_ = file_bytes(out.file_.get());
   return out;
 }
 
-void TempFile::report_damage(std::uint64_t offset, const std::string& what) const {
+void SpillFile::report_damage(std::uint64_t offset, const std::string& what) const {
   if (kept()) {
     throw Error(ExitCode::unreadable, fmt::format("{}/{}: is damaged at byte {} ({}); make the store again", directory_,
                                                   name_, offset, what));
@@ -57,22 +59,33 @@ void TempFile::report_damage(std::uint64_t offset, const std::string& what) cons
                                             directory_, offset, what));
 }
 
-void TempFile::will_read(std::uint64_t offset, std::uint64_t bytes) const {
+void SpillFile::will_read(std::uint64_t offset, std::uint64_t bytes) const {
   if (bytes > 0)
     ::posix_fadvise(file_.get(), static_cast<off_t>(offset), static_cast<off_t>(bytes), POSIX_FADV_WILLNEED);
 }
 
-void TempFile::discard() {
+void SpillFile::discard_before(std::uint64_t offset) {
+  if (offset <= begin_) return;
+  // Where holes are unknown the space comes back with the file's end.
+  (void)::fallocate(file_.get(), FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, static_cast<off_t>(begin_),
+                    static_cast<off_t>(offset - begin_));
+  begin_ = offset;
+  if (begin_ == size() && held_bytes_ == 0 && ::ftruncate(file_.get(), 0) == 0) begin_ = written_ = 0;
+}
+
+void SpillFile::discard() {
   file_ = {};
-  written_ = 0;
+  begin_ = written_ = 0;
   held_.reset();
   held_bytes_ = 0;
 }
 
-std::uint64_t TempFile::append(std::span<const std::byte> bytes, BackgroundWriter& writer) {
+std::uint64_t SpillFile::append(std::span<const std::byte> bytes, BackgroundWriter* writer) {
   const std::uint64_t offset = size();
   while (!bytes.empty()) {
-    if (!held_) held_ = writer.buffer();
+    if (!held_) {
+      held_ = writer != nullptr ? writer->buffer() : std::make_unique_for_overwrite<std::byte[]>(kBufferBytes);
+    }
     const std::size_t part = std::min(bytes.size(), kBufferBytes - held_bytes_);
     std::memcpy(held_.get() + held_bytes_, bytes.data(), part);
     held_bytes_ += part;
@@ -82,14 +95,16 @@ std::uint64_t TempFile::append(std::span<const std::byte> bytes, BackgroundWrite
   return offset;
 }
 
-void TempFile::flush(BackgroundWriter& writer) {
+void SpillFile::flush(BackgroundWriter* writer) {
   if (held_bytes_ == 0) return;
   const std::uint64_t offset = written_;
-  written_ += held_bytes_;
-  check(writer.write(file_.get(), std::move(held_), std::exchange(held_bytes_, 0), offset));
+  const std::size_t bytes = std::exchange(held_bytes_, 0);
+  written_ += bytes;
+  check(writer != nullptr ? writer->write(file_.get(), std::move(held_), bytes, offset)
+                          : pwrite_all(file_.get(), held_.get(), bytes, offset));
 }
 
-void TempFile::check(int error) const {
+void SpillFile::check(int error) const {
   if (error == 0) return;
   if (kept()) {
     throw Error(ExitCode::budget, fmt::format("{}/{}: cannot grow beyond {} bytes: {}; free space there", directory_,
@@ -101,19 +116,25 @@ void TempFile::check(int error) const {
                           directory_, file_bytes(file_.get()), system_message(error)));
 }
 
-void TempFile::read(std::uint64_t offset, std::span<std::byte> bytes) const {
-  while (!bytes.empty()) {
-    const ssize_t got = ::pread(file_.get(), bytes.data(), bytes.size(), static_cast<off_t>(offset));
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) {
-      if (kept()) report_damage(offset, got < 0 ? system_message(errno) : "it ends there");
-      throw Error(
-          ExitCode::budget,
-          fmt::format("the temporary file in '{}' cannot be read back at byte {}: {}; choose another with --tmp-dir",
-                      directory_, offset, got < 0 ? system_message(errno) : "it ends there"));
-    }
-    offset += static_cast<std::uint64_t>(got);
-    bytes = bytes.subspan(static_cast<std::size_t>(got));
+void SpillFile::read(std::uint64_t offset, std::span<std::byte> bytes) const {
+  const ReadResult got = pread_all(file_.get(), bytes.data(), bytes.size(), offset);
+  if (got.bytes == bytes.size()) return;
+  offset += got.bytes;
+  const std::string why = got.error != 0 ? system_message(got.error) : "it ends there";
+  if (kept()) report_damage(offset, why);
+  throw Error(
+      ExitCode::budget,
+      fmt::format("the temporary file in '{}' cannot be read back at byte {}: {}; choose another with --tmp-dir",
+                  directory_, offset, why));
+}
+
+void SpillFile::read_through(std::size_t piece, const std::function<void(std::span<const std::byte>)>& take) const {
+  std::vector<std::byte> buffer(piece);
+  for (std::uint64_t at = begin_; at < written_;) {
+    const auto bytes = std::span(buffer).first(static_cast<std::size_t>(std::min<std::uint64_t>(piece, written_ - at)));
+    read(at, bytes);
+    take(bytes);
+    at += bytes.size();
   }
 }
 
