@@ -1,6 +1,11 @@
-# Sources of one folder compiled together: half the compiler's work for a build from scratch, as the checks' builds are.
-# By hand, one source after the other is quicker, and a forgotten #include shows (scripts/tidy sees each by itself, too).
-option(LAMINA_UNITY "Compile the sources of a folder together" $ENV{LAMINA_UNITY})
+# Sources of one folder compiled together: half the compiler's work for a build from scratch. A change of one source takes
+# more: who works on one room for a day sets LAMINA_UNITY=OFF. A forgotten #include shows then, and in scripts/tidy --alone.
+if(DEFINED ENV{LAMINA_UNITY})
+  set(LAMINA_UNITY_DEFAULT $ENV{LAMINA_UNITY})
+else()
+  set(LAMINA_UNITY_DEFAULT ON)
+endif()
+option(LAMINA_UNITY "Compile the sources of a folder together" ${LAMINA_UNITY_DEFAULT})
 
 function(lamina_unity target)
   if(NOT LAMINA_UNITY)

@@ -1,7 +1,7 @@
 // Files of any format, with gzip and the telling of formats before.
 #include "harness.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZED(file) {
   using namespace lamina;
   const InputFile file = fuzz::as_file(data, size);
   const std::string path = "/proc/self/fd/" + std::to_string(file.file.get());

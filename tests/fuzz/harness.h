@@ -5,15 +5,24 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstdio>
 #include <cstdlib>
 #include <memory>
+#include <stdexcept>
 #include <string>
 
 #include "base/descriptor.h"
+#include "fuzzed_readers.h"
 #include "lamina/error.h"
 #include "lamina/points.h"
 #include "points/input_file.h"
+
+// Begins the function that hands `size` bytes at `data` to a reader: libFuzzer's entry where each reader has a program
+// of its own, a function with the reader's name where one program replays the corpus of all (replay_test.cpp).
+#ifdef LAMINA_FUZZ_ENTRY
+#define FUZZED(reader) extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size)
+#else
+#define FUZZED(reader) int lamina::fuzz::fuzz_##reader(const std::uint8_t* data, std::size_t size)
+#endif
 
 namespace lamina::fuzz {
 
@@ -26,9 +35,9 @@ inline InputFile as_file(const std::uint8_t* data, std::size_t size) {
   return file;
 }
 
+/// Ends a fuzzer, which catches nothing, and fails a test.
 [[noreturn]] inline void broken(const char* what) {
-  std::fprintf(stderr, "%s\n", what);
-  std::abort();
+  throw std::logic_error(what);
 }
 
 /// All rows, in pieces of a size that divides nothing; arrays must be as long as they say.

@@ -3,7 +3,7 @@
 
 #include "harness.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZED(inputs) {
   using namespace lamina;
   const InputFile file = fuzz::as_file(data, size);
   const std::string path = "/proc/self/fd/" + std::to_string(file.file.get());

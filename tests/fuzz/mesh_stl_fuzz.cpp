@@ -1,6 +1,6 @@
 #include "mesh_harness.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZED(mesh_stl) {
   using namespace lamina::meshes;
   return lamina::fuzz::run_mesh(data, size, [](FileBuffer& file, const std::string& path) {
     return read_with_openmesh(file, path, TextFormat::stl);

@@ -2,7 +2,7 @@
 
 #include "harness.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZED(obj) {
   using namespace lamina;
   return fuzz::run([&] { fuzz::read_all(*open_obj(fuzz::as_file(data, size), "fuzz"), size); });
 }

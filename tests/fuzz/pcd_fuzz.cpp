@@ -2,7 +2,7 @@
 
 #include "harness.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZED(pcd) {
   using namespace lamina;
   return fuzz::run([&] { fuzz::read_all(*open_pcd(fuzz::as_file(data, size), "fuzz", fuzz::kScratch), size); });
 }

@@ -4,7 +4,7 @@
 #include "harness.h"
 #include "points/text_points.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZED(text) {
   using namespace lamina;
   std::string_view text(reinterpret_cast<const char*>(data), size);
   std::string columns;

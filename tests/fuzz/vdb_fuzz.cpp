@@ -9,7 +9,7 @@
 #include "harness.h"
 #include "lamina/volume_points.h"
 
-extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+FUZZED(vdb) {
   using namespace lamina;
   const InputFile file = fuzz::as_file(data, size);
   const std::string path = fmt::format("/proc/self/fd/{}", file.file.get());
