@@ -10,7 +10,7 @@ namespace {
 constexpr double kSlab = 500;
 /// Of a slab beside the chunk: it is read, refined and projected, but gives no mesh.
 constexpr double kBeside = 0.7;
-constexpr std::size_t kBelow = 5, kAbove = 5;  ///< slabs projected there
+constexpr std::size_t kBelow = reach_of(Stage::project).below, kAbove = reach_of(Stage::project).above;
 
 class Costs {
  public:
@@ -44,20 +44,27 @@ std::vector<std::size_t> ends_within(const Costs& costs, double most, std::size_
 
 }  // namespace
 
-std::vector<double> slab_samples(const SlabStore& store, const Lattice& lattice, const SlabSpan& all) {
-  std::vector<double> samples(static_cast<std::size_t>(all.end - all.begin), 0.0);
-  const double height = lattice.slab_height();
+std::vector<double> slab_samples(const ReconstructionPlan& plan, const SlabStore& store) {
+  std::vector<double> samples(static_cast<std::size_t>(plan.slabs.size()), 0.0);
+  const double height = plan.lattice.slab_height();
   for (std::size_t b = 0; b < store.buckets(); ++b) {
     if (store.count(b) == 0) continue;
     const double low = store.z_lower(b), high = static_cast<double>(store.z_upper(b)) + 1;
     const double per_step = static_cast<double>(store.count(b)) / (high - low);
-    const std::int32_t last = lattice.slab_of(store.z_upper(b));
-    for (std::int32_t s = lattice.slab_of(store.z_lower(b)); s <= last; ++s) {
+    const std::int32_t last = plan.lattice.slab_of(store.z_upper(b));
+    for (std::int32_t s = plan.lattice.slab_of(store.z_lower(b)); s <= last; ++s) {
       const double share = std::min(high, (s + 1.0) * height) - std::max(low, s * height);
-      samples[static_cast<std::size_t>(s - all.begin)] += per_step * share;
+      samples[static_cast<std::size_t>(s - plan.slabs.begin)] += per_step * share;
     }
   }
   return samples;
+}
+
+std::uint64_t samples_in(const ReconstructionPlan& plan, const SlabStore& store, const SlabSpan& span) {
+  const std::vector<double> samples = slab_samples(plan, store);
+  double sum = 0;
+  for (std::int32_t s = span.begin; s < span.end; ++s) sum += samples[static_cast<std::size_t>(s - plan.slabs.begin)];
+  return static_cast<std::uint64_t>(std::llround(sum));
 }
 
 double chunk_cost(const std::vector<double>& cost, std::size_t begin, std::size_t end) {
@@ -86,10 +93,10 @@ std::vector<SlabSpan> cut(const std::vector<double>& cost, std::int32_t first, i
   return spans;
 }
 
-std::vector<SlabSpan> cut(const SlabStore& store, const Lattice& lattice, const SlabSpan& all, int count) {
-  std::vector<double> cost = slab_samples(store, lattice, all);
+std::vector<SlabSpan> cut(const ReconstructionPlan& plan, const SlabStore& store, int count) {
+  std::vector<double> cost = slab_samples(plan, store);
   for (double& c : cost) c += kSlab;
-  return cut(cost, all.begin, count);
+  return cut(cost, plan.slabs.begin, count);
 }
 
 }  // namespace lamina

@@ -4,18 +4,21 @@
 #include <vector>
 
 #include "reconstruct/plan.h"
-#include "reconstruct/slab_span.h"
+#include "reconstruct/stages.h"
 #include "store/slab_store.h"
 
 namespace lamina {
 
-/// Samples in each slab of `all`: a bucket's are taken to lie evenly between its lowest and its highest one.
-std::vector<double> slab_samples(const SlabStore& store, const Lattice& lattice, const SlabSpan& all);
+/// Samples in each slab of the plan: a bucket's are taken to lie evenly between its lowest and its highest one.
+std::vector<double> slab_samples(const ReconstructionPlan& plan, const SlabStore& store);
 
-/// `count` spans that follow each other from all.begin to all.end, the last ones empty where there are fewer slabs than
-/// that. The largest cost of a chunk, the slabs it works on beside its own included, is as small as it can be. A
-/// function of store, lattice and count alone.
-std::vector<SlabSpan> cut(const SlabStore& store, const Lattice& lattice, const SlabSpan& all, int count);
+/// Samples in the slabs of a span, as slab_samples() has them.
+std::uint64_t samples_in(const ReconstructionPlan& plan, const SlabStore& store, const SlabSpan& span);
+
+/// `count` spans that follow each other through the slabs of the plan, the last ones empty where there are fewer slabs
+/// than that. The largest cost of a chunk, the slabs it works on beside its own included, is as small as it can be. A
+/// function of plan, store and count alone.
+std::vector<SlabSpan> cut(const ReconstructionPlan& plan, const SlabStore& store, int count);
 
 /// What a chunk of slabs [begin, end) costs, from what each slab does: those beside it are read and projected, too.
 double chunk_cost(const std::vector<double>& cost, std::size_t begin, std::size_t end);

@@ -4,7 +4,7 @@
 
 #include "lamina/error.h"
 #include "lamina/run.h"
-#include "reconstruct/choose_normals.h"
+#include "reconstruct/stored_cloud.h"
 #include "samples/clean_ingested.h"
 
 namespace lamina {
@@ -34,10 +34,10 @@ std::string mesh_settings(const SurfaceSettings& settings) {
       vertex_curvature, close_holes, watertight ? (*watertight ? "yes" : "no") : "auto");
 }
 
-std::uint64_t job_hash(const SurfaceSettings& settings, const std::string& input_id, const Resolved& resolved) {
+std::uint64_t job_hash(const SurfaceSettings& settings, const std::string& input_id, const ReconstructionPlan& plan) {
   const std::string text =
       fmt::format("{}\n{}\n{}\nlattice {} {} radii {} {}\n", version(), input_id, mesh_settings(settings),
-                  resolved.lattice.cell, resolved.lattice.levels, resolved.radii.finest_cell, resolved.radii.levels);
+                  plan.lattice.cell, plan.lattice.levels, plan.radii.finest_cell, plan.radii.levels);
   std::uint64_t hash = 0xcbf29ce484222325U;
   for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3U;
   return hash;

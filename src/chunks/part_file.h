@@ -11,7 +11,7 @@
 #include "base/output_file.h"
 #include "boundary/rim.h"
 #include "meshes/mesh_sink.h"
-#include "reconstruct/slab_span.h"
+#include "reconstruct/stages.h"
 
 namespace lamina {
 

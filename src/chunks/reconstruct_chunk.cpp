@@ -1,13 +1,11 @@
 #include <fmt/format.h>
 
-#include <cmath>
-
 #include "chunks/cuts.h"
 #include "chunks/job.h"
 #include "chunks/part_slabs.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
-#include "reconstruct/choose_support.h"
+#include "reconstruct/job.h"
 #include "reconstruct/kept_input.h"
 
 namespace lamina {
@@ -15,35 +13,27 @@ namespace {
 
 constexpr int kMostChunks = 100000;
 
-ChunkStats run_chunk(const SurfaceSettings& settings, const Chunk& chunk, const RunContext& run) {
+ChunkStats run_chunk(const SurfaceSettings& settings, const Chunk& chunk, Job& job) {
   ChunkStats stats;
-  Stopwatch watch;
-  const Stopwatch::Moment began = Stopwatch::now();
-  SweepInput input = open_kept_input(settings.input, settings);
-  const Resolved resolved =
-      plan_surface(settings, input, run, watch, Stopwatch::now().wall - began.wall, stats.surface);
-  const SlabSpan all = all_slabs(resolved.lattice, input.ingested.extent);
-  const SlabSpan span =
-      cut(input.ingested.store, resolved.lattice, all, chunk.count)[static_cast<std::size_t>(chunk.number - 1)];
-  stats.first_slab = span.begin - all.begin;
-  stats.slabs = span.end - span.begin;
-  stats.all_slabs = all.end - all.begin;
-  const std::uint64_t job = job_hash(settings, kept_input_id(settings.input), resolved);
-  PartSlabs parts({{chunk.number, span, settings.output}}, chunk.count, job, hole_settings(settings, resolved.support),
-                  mesh_layout(settings, input, resolved));
+  StoredCloud cloud = open_kept_input(settings.input, settings);
+  const ReconstructionPlan plan = plan_surface(settings, cloud, job);
+  const SlabStore& store = cloud.ingested.store;
+  const SlabSpan span = cut(plan, store, chunk.count)[static_cast<std::size_t>(chunk.number - 1)];
+  stats.first_slab = span.begin - plan.slabs.begin;
+  stats.slabs = span.size();
+  stats.all_slabs = plan.slabs.size();
+  PartSlabs parts({{chunk.number, span, settings.output}}, chunk.count,
+                  job_hash(settings, kept_input_id(settings.input), plan), plan.holes, mesh_layout(plan));
   if (!span.empty()) {
-    const SlabSpan projected = stage_spans(span, all, settings.diffuse).projected;
-    stats.overlap_slabs = projected.end - projected.begin - stats.slabs;
-    const std::vector<double> samples = slab_samples(input.ingested.store, resolved.lattice, all);
-    double sum = 0;
-    for (std::int32_t s = span.begin; s < span.end; ++s) sum += samples[static_cast<std::size_t>(s - all.begin)];
-    stats.samples = static_cast<std::uint64_t>(std::llround(sum));
-    sweep(settings, input, resolved, span, parts, nullptr, run, watch, stats.surface);
+    stats.overlap_slabs = plan.stages_of(span).of(Stage::project).size() - stats.slabs;
+    stats.samples = samples_in(plan, store, span);
+    sweep(plan, cloud, span, {parts}, job);
   }
-  watch.time("commit", [&] { parts.finish(); });
-  stats.surface.vertices = parts.vertices();
-  stats.surface.triangles = parts.triangles();
-  finish_stats(watch, began, stats.surface);
+  job.watch.time("commit", [&] { parts.finish(); });
+  job.stats.vertices = parts.vertices();
+  job.stats.triangles = parts.triangles();
+  job.finish();
+  stats.surface = job.stats;
   return stats;
 }
 
@@ -56,13 +46,14 @@ ChunkStats reconstruct_chunk(const SurfaceSettings& settings, const Chunk& chunk
     throw Error(ExitCode::usage, fmt::format("--chunk {}/{}: must be i/n with 1 <= i <= n <= {}", chunk.number,
                                              chunk.count, kMostChunks));
   }
-  if (!settings.more_inputs.empty() || !is_kept_input(settings.input)) {
+  if (!names_kept_input(settings)) {
     throw Error(ExitCode::usage, fmt::format("{}: is no store; --chunk works on one that 'lamina sort IN... --store "
                                              "DIR' has made",
                                              settings.input));
   }
+  Job job(run);
   ChunkStats stats;
-  run_in_arena(run, [&] { stats = run_chunk(settings, chunk, run); });
+  run_in_arena(run, [&] { stats = run_chunk(settings, chunk, job); });
   return stats;
 }
 

@@ -13,7 +13,7 @@
 #include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "lamina/run.h"
-#include "reconstruct/choose_support.h"
+#include "reconstruct/job.h"
 #include "reconstruct/kept_input.h"
 
 namespace lamina {
@@ -33,8 +33,7 @@ std::string describe_file(const std::string& path) {
 /// What a checkpoint is for: with anything else than this it is of no use.
 std::string describe_run(const SurfaceSettings& settings) {
   std::string text = fmt::format("lamina {}\n{}", version(), mesh_settings(settings));
-  if (settings.more_inputs.empty() && is_kept_input(settings.input))
-    return text + describe_file(settings.input + "/store.json");
+  if (names_kept_input(settings)) return text + describe_file(settings.input + "/store.json");
   for (const PointInput& input : expand_inputs(input_names(settings))) {
     if (input.path == "-") {
       throw Error(ExitCode::usage,
@@ -50,24 +49,23 @@ std::string describe_run(const SurfaceSettings& settings) {
 }
 
 /// The input as it lies in the checkpoint; read into it where it does not.
-SweepInput open_input(const SurfaceSettings& settings, const CheckpointFolder& folder, const RunContext& run,
-                      Stopwatch& watch, SurfaceStats& stats, std::string& id) {
-  if (settings.more_inputs.empty() && is_kept_input(settings.input)) {
+StoredCloud open_input(const SurfaceSettings& settings, const CheckpointFolder& folder, Job& job, std::string& id) {
+  if (names_kept_input(settings)) {
     id = kept_input_id(settings.input);
     return open_kept_input(settings.input, settings);
   }
   if (!is_kept_input(folder.store())) {
     NewFolder made(folder.store());
     {
-      const SweepInput input = read_surface_input(settings, made.path(), /*keep=*/true, run, watch, stats);
-      watch.time("store", [&] { save_input(input, settings, made.path()); });
+      const StoredCloud cloud = read_cloud(settings, {made.path(), /*stays=*/true}, job);
+      job.watch.time("store", [&] { save_input(cloud, settings, made.path()); });
     }
     made.publish();
   }
   id = kept_input_id(folder.store());
-  SweepInput input = open_kept_input(folder.store(), settings);
-  input.info.path = settings.input;
-  return input;
+  StoredCloud cloud = open_kept_input(folder.store(), settings);
+  cloud.info.path = settings.input;
+  return cloud;
 }
 
 /// Whether a part is there and whole; a damaged one is made again.
@@ -85,10 +83,10 @@ bool is_done(const PartSlabs::Part& part, int count, std::uint64_t job, const Ru
 
 class ResumableRun {
  public:
-  ResumableRun(const SurfaceSettings& settings, const Checkpoint& checkpoint, const RunContext& run)
-      : settings_(settings), run_(run), folder_(checkpoint.directory, describe_run(settings), checkpoint.resume) {}
+  ResumableRun(const SurfaceSettings& settings, const Checkpoint& checkpoint, Job& job)
+      : settings_(settings), job_(job), folder_(checkpoint.directory, describe_run(settings), checkpoint.resume) {}
 
-  SurfaceStats finish() {
+  void finish() {
     try {
       reconstruct();
       join();
@@ -98,42 +96,39 @@ class ResumableRun {
       if (useless || error.code() == ExitCode::empty) {
         folder_.remove();
       } else {
-        run_.info(fmt::format("{}: keeps what is done; the same command with --resume goes on", folder_.path()));
+        job_.run.info(fmt::format("{}: keeps what is done; the same command with --resume goes on", folder_.path()));
       }
       throw;
     }
     folder_.remove();
-    finish_stats(watch_, began_, stats_);
-    return stats_;
+    job_.finish();
   }
 
  private:
   void reconstruct() {
     std::string id;
-    SweepInput input = open_input(settings_, folder_, run_, watch_, stats_, id);
-    const Resolved resolved = plan_surface(settings_, input, run_, watch_, Stopwatch::now().wall - began_.wall, stats_);
-    const SlabSpan all = all_slabs(resolved.lattice, input.ingested.extent);
-    const std::uint64_t total = input.ingested.store.total();
-    const auto count = static_cast<int>(std::clamp(total / kSamplesPerPart, kFewestParts, kMostParts));
-    const std::uint64_t job = job_hash(settings_, id, resolved);
-    const std::vector<SlabSpan> spans = cut(input.ingested.store, resolved.lattice, all, count);
+    StoredCloud cloud = open_input(settings_, folder_, job_, id);
+    const ReconstructionPlan plan = plan_surface(settings_, cloud, job_);
+    const SlabStore& store = cloud.ingested.store;
+    const auto count = static_cast<int>(std::clamp(store.total() / kSamplesPerPart, kFewestParts, kMostParts));
+    const std::uint64_t hash = job_hash(settings_, id, plan);
+    const std::vector<SlabSpan> spans = cut(plan, store, count);
     std::vector<PartSlabs::Part> left;
     int done = 0;
     for (int number = 1; number <= count; ++number) {
       const PartSlabs::Part part{number, spans[static_cast<std::size_t>(number - 1)], folder_.part(number)};
       parts_.push_back(part.path);
-      if (left.empty() && is_done(part, count, job, run_)) {
+      if (left.empty() && is_done(part, count, hash, job_.run)) {
         ++done;
       } else {
         left.push_back(part);
       }
     }
-    if (folder_.resumed()) run_.info(fmt::format("{}: {} of {} parts are done", folder_.path(), done, count));
+    if (folder_.resumed()) job_.run.info(fmt::format("{}: {} of {} parts are done", folder_.path(), done, count));
     if (left.empty()) return;
-    const SlabSpan span{left.front().span.begin, all.end};
-    PartSlabs slabs(std::move(left), count, job, hole_settings(settings_, resolved.support),
-                    mesh_layout(settings_, input, resolved));
-    if (!span.empty()) sweep(settings_, input, resolved, span, slabs, nullptr, run_, watch_, stats_);
+    const SlabSpan span{left.front().span.begin, plan.slabs.end};
+    PartSlabs slabs(std::move(left), count, hash, plan.holes, mesh_layout(plan));
+    if (!span.empty()) sweep(plan, cloud, span, {slabs}, job_);
     slabs.finish();
   }
 
@@ -145,11 +140,11 @@ class ResumableRun {
 
   void join() {
     try {
-      watch_.time("commit", [&] {
-        const MergedParts merged = merge_parts(parts_, settings_.output, run_);
-        stats_.vertices = merged.vertices;
-        stats_.triangles = merged.triangles;
-        stats_.holes = merged.holes;
+      job_.watch.time("commit", [&] {
+        const MergedParts merged = merge_parts(parts_, settings_.output, job_.run);
+        job_.stats.vertices = merged.vertices;
+        job_.stats.triangles = merged.triangles;
+        job_.stats.holes = merged.holes;
       });
     } catch (const Error& error) {
       if (error.code() != ExitCode::unreadable) throw;
@@ -158,10 +153,7 @@ class ResumableRun {
   }
 
   const SurfaceSettings& settings_;
-  const RunContext& run_;
-  Stopwatch watch_;
-  Stopwatch::Moment began_ = Stopwatch::now();
-  SurfaceStats stats_;
+  Job& job_;
   CheckpointFolder folder_;
   std::vector<std::string> parts_;
 };
@@ -174,9 +166,9 @@ SurfaceStats reconstruct_resumable(const SurfaceSettings& settings, const Checkp
   require_mesh_alone(settings, "--checkpoint");
   require_two_files(settings);
   { const OutputFile trial(settings.output, run.tmp_dir); }
-  SurfaceStats stats;
-  run_in_arena(run, [&] { stats = ResumableRun(settings, checkpoint, run).finish(); });
-  return stats;
+  Job job(run);
+  run_in_arena(run, [&] { ResumableRun(settings, checkpoint, job).finish(); });
+  return job.stats;
 }
 
 }  // namespace lamina

@@ -2,6 +2,7 @@
 
 #include "chunks/new_folder.h"
 #include "lamina/chunk.h"
+#include "reconstruct/job.h"
 #include "reconstruct/kept_input.h"
 
 namespace lamina {
@@ -14,18 +15,16 @@ SurfaceStats write_store(const SurfaceSettings& settings, const std::string& sto
   own.dry_run = false;
   RunContext here = run;
   if (here.tmp_dir.empty()) here.tmp_dir = (std::filesystem::absolute(store) / "..").lexically_normal().string();
-  SurfaceStats stats;
-  Stopwatch watch;
-  const Stopwatch::Moment began = Stopwatch::now();
+  Job job(here);
   NewFolder folder(store);
   run_in_arena(run, [&] {
-    const SweepInput input = read_surface_input(own, folder.path(), /*keep=*/true, here, watch, stats);
-    plan_surface(own, input, here, watch, Stopwatch::now().wall - began.wall, stats);
-    watch.time("store", [&] { save_input(input, own, folder.path()); });
+    const StoredCloud cloud = read_cloud(own, {folder.path(), /*stays=*/true}, job);
+    plan_surface(own, cloud, job);
+    job.watch.time("store", [&] { save_input(cloud, own, folder.path()); });
   });
   folder.publish();
-  finish_stats(watch, began, stats);
-  return stats;
+  job.finish();
+  return job.stats;
 }
 
 }  // namespace lamina

@@ -100,7 +100,7 @@ RefitNormals::RefitNormals(const RefitSettings& settings, const Lattice& lattice
 RefitNormals::~RefitNormals() = default;
 
 double RefitNormals::reach() const {
-  return std::ceil(static_cast<double>(settings_.support) * static_cast<double>(settings_.max_radius)) + 1;
+  return std::ceil(static_cast<double>(static_cast<float>(settings_.support)) * static_cast<double>(settings_.max_radius)) + 1;
 }
 
 void RefitNormals::add(std::size_t bucket, const LocalSamples& samples, const std::vector<float>& radii) {
@@ -119,7 +119,7 @@ void RefitNormals::add(std::size_t bucket, const LocalSamples& samples, const st
   const auto unit = static_cast<float>(lattice_.cell);
   for (std::size_t i = 0; i < n; ++i) {
     const float q = radii[i] > 0 ? unit / radii[i] : 0.0F;
-    added->bucket.support[i] = settings_.support * std::min(radii[i], settings_.max_radius);
+    added->bucket.support[i] = static_cast<float>(settings_.support) * std::min(radii[i], settings_.max_radius);
     added->bucket.weight[i] = q * q * (samples.quality.empty() ? 1.0F : samples.quality[i]);
   }
   const auto [low, high] = std::minmax_element(s.z.begin(), s.z.end());

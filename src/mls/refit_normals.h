@@ -12,7 +12,7 @@
 namespace lamina {
 
 struct RefitSettings {
-  float support = 4;     ///< radii within which a sample acts, > 0
+  double support = 0;    ///< radii within which a sample acts; 0: normals stay
   float max_radius = 0;  ///< a longer radius acts as this, steps, > 0: how far is known before streaming
   int level = 0;         ///< whose cells are about a radius long: only time depends on it
 };

@@ -21,6 +21,7 @@ class RankSlabs : public SlabSink {
   RankSlabs(const SlabSpan& span, MeshSinkSettings layout, const std::string& directory);
   void write(const FinalSlab& slab, const VertexBatch& vertices) override;
 
+  [[nodiscard]] const SlabSpan& span() const { return span_; }
   [[nodiscard]] std::uint64_t vertices() const { return vertices_; }
   [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
   [[nodiscard]] bool any() const { return begun_; }               ///< a slab of its own had surface

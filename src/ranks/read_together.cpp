@@ -12,7 +12,7 @@
 #include "points/sniff.h"
 #include "ranks/deal_rows.h"
 #include "ranks/packed_input.h"
-#include "reconstruct/choose_normals.h"
+#include "reconstruct/stored_cloud.h"
 #include "store/store_blocks.h"
 
 namespace lamina::ranks {
@@ -45,9 +45,8 @@ RowSpan share_of(std::uint64_t rows, int rank, int size) {
 
 class Reading {
  public:
-  Reading(Ranks& ranks, const SurfaceSettings& settings, const std::string& directory, const RunContext& run,
-          Stopwatch& watch)
-      : ranks_(ranks), settings_(settings), directory_(directory), run_(run), watch_(watch) {}
+  Reading(Ranks& ranks, const SurfaceSettings& settings, const std::string& directory, Job& job)
+      : ranks_(ranks), settings_(settings), directory_(directory), job_(job) {}
 
   SharedInput read() {
     open();
@@ -56,15 +55,14 @@ class Reading {
     bool complete = false;
     if (tell(survey)) complete = fill(*survey);
     if (complete) {
-      ranks_.together([&] { judge(census_, source_->info(), settings_.bad_samples, run_); });
+      ranks_.together([&] { judge(census_, source_->info(), settings_.bad_samples, job_.run); });
     } else {
       ingested_.reset();
-      look([&] { survey = survey_input(*source_, settings_.bad_samples, run_); });
+      look([&] { survey = survey_input(*source_, settings_.bad_samples, job_.run); });
       tell(survey);
       fill(*survey);
     }
-    SharedInput out{{source_->info(), frame_, std::move(*ingested_)}, rows_.end - rows_.first, normals_};
-    return out;
+    return {{source_->info(), frame_, std::move(*ingested_)}, rows_.end - rows_.first};
   }
 
  private:
@@ -72,13 +70,12 @@ class Reading {
     Packer words;
     ranks_.together([&] {
       if (!ranks_.first()) return;
-      source_ = open_inputs(settings_, directory_, run_);
+      source_ = open_inputs(settings_, directory_, job_.run);
       // Normals that are found lie in a store of rank 0's; it deals them out.
-      watch_.time("normals",
-                  [&] { source_ = choose_normals(std::move(source_), settings_, normals_, directory_, run_); });
+      job_.watch.time("normals", [&] { source_ = choose_normals(std::move(source_), settings_, directory_, job_); });
       require_samples(source_->info());
       put(words, source_->info());
-      words.put(!normals_ && can_be_shared(settings_, source_->info()));
+      words.put(!job_.stats.normals && can_be_shared(settings_, source_->info()));
     });
     Bytes bytes = words.take();
     ranks_.broadcast(bytes);
@@ -88,7 +85,7 @@ class Reading {
     ranks_.together([&] {
       if (ranks_.first()) return;
       if (shared) {
-        source_ = open_inputs(settings_, directory_, run_);
+        source_ = open_inputs(settings_, directory_, job_.run);
       } else {
         source_ = std::make_unique<DealtRows>(ranks_, info);
       }
@@ -104,7 +101,7 @@ class Reading {
   template <class Work>
   void look(const Work& work) {
     ranks_.together([&] {
-      if (ranks_.first()) watch_.time("survey", work);
+      if (ranks_.first()) job_.watch.time("survey", work);
     });
   }
 
@@ -132,9 +129,9 @@ class Reading {
   bool fill(const Survey& survey) {
     ranks_.together([&] {
       const auto work = [&] {
-        ingested_.emplace(ingest(*source_, survey, frame_, settings_.radius_scale, directory_, run_, {}, rows_));
+        ingested_.emplace(ingest(*source_, survey, frame_, settings_.radius_scale, directory_, job_.run, {}, rows_));
       };
-      watch_.time("store", [&] {
+      job_.watch.time("store", [&] {
         if (shared_) {
           work();
         } else if (ranks_.first()) {
@@ -196,10 +193,8 @@ class Reading {
   Ranks& ranks_;
   const SurfaceSettings& settings_;
   const std::string& directory_;
-  const RunContext& run_;
-  Stopwatch& watch_;
+  Job& job_;
   std::unique_ptr<PointSource> source_;
-  std::optional<NormalsReport> normals_;
   bool shared_ = true;
   RowSpan rows_{0, 0};
   Frame frame_;
@@ -209,9 +204,8 @@ class Reading {
 
 }  // namespace
 
-SharedInput read_together(Ranks& ranks, const SurfaceSettings& settings, const std::string& directory,
-                          const RunContext& run, Stopwatch& watch) {
-  return Reading(ranks, settings, directory, run, watch).read();
+SharedInput read_together(Ranks& ranks, const SurfaceSettings& settings, const std::string& directory, Job& job) {
+  return Reading(ranks, settings, directory, job).read();
 }
 
 }  // namespace lamina::ranks

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cmath>
 #include <optional>
 
 #include "base/output_file.h"
@@ -16,22 +15,18 @@
 #include "ranks/read_together.h"
 #include "ranks/sum_stats.h"
 #include "ranks/write_together.h"
-#include "reconstruct/choose_support.h"
+#include "reconstruct/job.h"
 #include "reconstruct/kept_input.h"
 #include "reconstruct/pipeline.h"
 
 namespace lamina::ranks {
 namespace {
 
-bool is_store(const SurfaceSettings& settings) {
-  return settings.more_inputs.empty() && is_kept_input(settings.input);
-}
-
 /// What the whole job needs, known before anything is read. On rank 0 also that the output can be written.
 void check_job(const SurfaceSettings& settings, const RunContext& run, bool first) {
   check_settings(settings);
   require_mesh_alone(settings, "mpirun");
-  if (!is_store(settings) && (settings.clean.looks_around() || !settings.clean.pick.takes_all())) {
+  if (!names_kept_input(settings) && (settings.clean.looks_around() || !settings.clean.pick.takes_all())) {
     throw Error(
         ExitCode::usage,
         "ranks that share out an input's rows cannot clean them: clean the points before, with 'lamina clean', "
@@ -46,6 +41,13 @@ void check_job(const SurfaceSettings& settings, const RunContext& run, bool firs
     throw Error(ExitCode::usage,
                 fmt::format("{}: is no regular file; several ranks write one file together", settings.output));
   }
+}
+
+/// The buckets that a sweep through the span reads.
+BucketSpan buckets_for(const ReconstructionPlan& plan, const SlabStore& store, const SlabSpan& span) {
+  const ZRead z = z_read(plan, span);
+  const double filter = plan.refit.support > 0 ? RefitNormals(plan.refit, plan.lattice, select_kernel()).reach() : 0;
+  return buckets_read(store, plan.radii, plan.given_radii, z.from, z.to, filter);
 }
 
 /// A run that ends when another rank's has, and speaks on rank 0 alone; warnings of the others are kept for it.
@@ -95,87 +97,73 @@ class RankRun {
   std::vector<std::string> warnings_;
 };
 
-class Job {
+class RanksJob {
  public:
-  Job(Ranks& ranks, const SurfaceSettings& settings, const RunContext& run)
-      : ranks_(ranks), settings_(settings), rank_run_(ranks, run), run_(rank_run_.context()) {}
+  RanksJob(Ranks& ranks, const SurfaceSettings& settings, const RunContext& run)
+      : ranks_(ranks), settings_(settings), rank_run_(ranks, run), job_(rank_run_.context()) {}
 
   RanksStats finish() {
-    ranks_.together([&] { check_job(settings_, run_, ranks_.first()); });
-    directory_ = temporary_directory(settings_, run_);
-    SweepInput input = read();
-    Resolved resolved;
-    ranks_.together(
-        [&] { resolved = plan_surface(settings_, input, run_, watch_, Stopwatch::now().wall - began_.wall, stats_); });
-    const SlabSpan span = share_out(input, resolved);
+    ranks_.together([&] { check_job(settings_, job_.run, ranks_.first()); });
+    directory_ = temporary_directory(settings_, job_.run);
+    StoredCloud cloud = read();
+    std::optional<ReconstructionPlan> made;
+    ranks_.together([&] { made.emplace(plan_surface(settings_, cloud, job_)); });
+    const ReconstructionPlan& plan = *made;
+    const SlabSpan span = share_out(cloud, plan);
     std::optional<RankSlabs> part;
     rank_run_.keep_warnings();
     const double before = Stopwatch::now().wall;
     ranks_.together([&] {
-      part.emplace(span, mesh_layout(settings_, input, resolved), directory_);
-      if (!span.empty()) sweep(settings_, input, resolved, span, *part, nullptr, run_, watch_, stats_);
+      part.emplace(span, mesh_layout(plan), directory_);
+      if (!span.empty()) sweep(plan, cloud, span, {*part}, job_);
     });
     own_.sweeping = Stopwatch::now().wall - before;
-    watch_.time("commit", [&] {
-      const Place place = write_together(ranks_, span, *part, settings_.output, settings_.input, resolved.plan.samples,
-                                         hole_settings(settings_, resolved.support), stats_.holes, run_);
-      stats_.vertices = place.vertices;
-      stats_.triangles = place.triangles;
+    job_.watch.time("commit", [&] {
+      const Place place = write_together(ranks_, plan, *part, settings_.output, job_);
+      job_.stats.vertices = place.vertices;
+      job_.stats.triangles = place.triangles;
     });
-    stats_.disk_bytes = std::max(stats_.disk_bytes, disk_ + part->disk_bytes());
+    job_.stats.disk_bytes = std::max(job_.stats.disk_bytes, disk_ + part->disk_bytes());
     own_.vertices = part->vertices();
     own_.triangles = part->triangles();
     rank_run_.pass_warnings_on();
-    finish_stats(watch_, began_, stats_);
+    job_.finish();
     return gather_stats();
   }
 
  private:
-  SweepInput read() {
-    if (is_store(settings_)) {
-      std::optional<SweepInput> input;
-      ranks_.together([&] { input.emplace(open_kept_input(settings_.input, settings_)); });
-      return std::move(*input);
+  StoredCloud read() {
+    if (names_kept_input(settings_)) {
+      std::optional<StoredCloud> cloud;
+      ranks_.together([&] { cloud.emplace(open_kept_input(settings_.input, settings_)); });
+      return std::move(*cloud);
     }
-    SharedInput shared = read_together(ranks_, settings_, directory_, run_, watch_);
+    SharedInput shared = read_together(ranks_, settings_, directory_, job_);
     own_.rows_read = shared.rows;
-    stats_.normals = shared.normals;
-    watch_.time("plan", [&] {
-      shared.input.radii = survey_together(ranks_, shared.input.ingested.store, kSurveySamples, settings_.density);
+    job_.watch.time("plan", [&] {
+      shared.cloud.radii = survey_together(ranks_, shared.cloud.ingested.store, kSurveySamples, settings_.density);
     });
-    return std::move(shared.input);
+    return std::move(shared.cloud);
   }
 
-  /// The rank's slabs; leaves in `input` what they take.
-  SlabSpan share_out(SweepInput& input, const Resolved& resolved) {
-    SlabStore& store = input.ingested.store;
-    const SlabSpan all = all_slabs(resolved.lattice, input.ingested.extent);
-    const std::vector<SlabSpan> spans = cut(store, resolved.lattice, all, ranks_.size());
+  /// The rank's slabs; leaves in `cloud` what they take.
+  SlabSpan share_out(StoredCloud& cloud, const ReconstructionPlan& plan) {
+    SlabStore& store = cloud.ingested.store;
+    const std::vector<SlabSpan> spans = cut(plan, store, ranks_.size());
     std::vector<BucketSpan> wanted;
-    for (const SlabSpan& span : spans) {
-      const ZRead z = z_read(settings_, resolved, span, all);
-      wanted.push_back(span.empty() ? BucketSpan{}
-                                    : buckets_read(store, resolved.radii, input.info.has_radius, z.from, z.to,
-                                                   filter_reach(resolved)));
-    }
+    for (const SlabSpan& span : spans) wanted.push_back(span.empty() ? BucketSpan{} : buckets_for(plan, store, span));
     const auto rank = static_cast<std::size_t>(ranks_.rank());
     const SlabSpan own = spans[rank];
-    own_.first_slab = own.begin - all.begin;
-    own_.slabs = own.end - own.begin;
-    if (!own.empty()) {
-      const SlabSpan projected = stage_spans(own, all, settings_.diffuse).projected;
-      own_.overlap_slabs = projected.end - projected.begin - own_.slabs;
-    }
-    const std::vector<double> samples = slab_samples(store, resolved.lattice, all);
-    double sum = 0;
-    for (std::int32_t s = own.begin; s < own.end; ++s) sum += samples[static_cast<std::size_t>(s - all.begin)];
-    own_.samples = static_cast<std::uint64_t>(std::llround(sum));
+    own_.first_slab = own.begin - plan.slabs.begin;
+    own_.slabs = own.size();
+    if (!own.empty()) own_.overlap_slabs = plan.stages_of(own).of(Stage::project).size() - own_.slabs;
+    own_.samples = samples_in(plan, store, own);
     for (std::size_t b = wanted[rank].begin; b < wanted[rank].end; ++b) own_.samples_held += store.count(b);
-    if (!is_store(settings_)) {
-      watch_.time("share", [&] {
-        SlabStore gathered = gather_buckets(ranks_, store, wanted, directory_, run_);
+    if (!names_kept_input(settings_)) {
+      job_.watch.time("share", [&] {
+        SlabStore gathered = gather_buckets(ranks_, store, wanted, directory_, job_.run);
         disk_ = gathered.disk_bytes();
-        stats_.disk_bytes = store.disk_bytes() + disk_;
+        job_.stats.disk_bytes = store.disk_bytes() + disk_;
         store = std::move(gathered);
       });
     }
@@ -183,9 +171,9 @@ class Job {
   }
 
   RanksStats gather_stats() {
-    own_.seconds = stats_.wall;
-    own_.cpu = stats_.cpu;
-    own_.peak_memory = stats_.peak_memory;
+    own_.seconds = job_.stats.wall;
+    own_.cpu = job_.stats.cpu;
+    own_.peak_memory = job_.stats.peak_memory;
     own_.waited = ranks_.traffic().waited;
     own_.sent = ranks_.traffic().sent;
     own_.received = ranks_.traffic().received;
@@ -193,19 +181,16 @@ class Job {
     words.put(own_);
     RanksStats all;
     for (const Bytes& bytes : ranks_.gather(words.take())) all.ranks.push_back(Unpacker(bytes).get<RankStats>());
-    sum_stats(ranks_, stats_);
-    all.surface = stats_;
+    sum_stats(ranks_, job_.stats);
+    all.surface = job_.stats;
     return all;
   }
 
   Ranks& ranks_;
   const SurfaceSettings& settings_;
   RankRun rank_run_;
-  const RunContext& run_;
-  Stopwatch watch_;
-  Stopwatch::Moment began_ = Stopwatch::now();
+  Job job_;
   std::string directory_;
-  SurfaceStats stats_;
   RankStats own_;
   std::uint64_t disk_ = 0;  ///< of the gathered store
 };
@@ -218,7 +203,7 @@ namespace lamina {
 RanksStats reconstruct_ranks(const SurfaceSettings& settings, const RunContext& run) {
   ranks::Ranks ranks;
   RanksStats stats;
-  run_in_arena(run, [&] { stats = ranks::Job(ranks, settings, run).finish(); });
+  run_in_arena(run, [&] { stats = ranks::RanksJob(ranks, settings, run).finish(); });
   return stats;
 }
 

@@ -14,7 +14,7 @@
 #include "lamina/error.h"
 #include "meshes/mesh_header.h"
 #include "meshes/records.h"
-#include "reconstruct/sweep.h"
+#include "reconstruct/job.h"
 
 namespace lamina::ranks {
 namespace {
@@ -128,19 +128,18 @@ Place find_place(std::span<const Border> parts, std::size_t rank, const std::str
   return place;
 }
 
-Place write_together(Ranks& ranks, const SlabSpan& span, RankSlabs& part, const std::string& output,
-                     const std::string& input, std::uint64_t samples, const HoleSettings& holes, HoleStats& closed,
-                     const RunContext& run) {
+Place write_together(Ranks& ranks, const ReconstructionPlan& plan, RankSlabs& part, const std::string& output,
+                     Job& job) {
   const std::vector<Border> borders =
-      gather_borders(ranks, {span, part.any(), part.below(), part.last(), part.vertices(), part.triangles()});
+      gather_borders(ranks, {part.span(), part.any(), part.below(), part.last(), part.vertices(), part.triangles()});
   Place place;
   std::optional<OutputFile> file;
   std::string staged;
   ranks.together([&] {
     place = find_place(borders, static_cast<std::size_t>(ranks.rank()), output);
-    if (place.triangles == 0) no_surface(input, samples);
+    if (place.triangles == 0) no_surface(plan);
   });
-  const holes::Addition addition = close_together(ranks, part, borders, holes, place, closed);
+  const holes::Addition addition = close_together(ranks, part, borders, plan.holes, place, job.stats.holes);
   ranks.together([&] {
     if (!ranks.first()) return;
     file.emplace(output, std::string());
@@ -154,7 +153,7 @@ Place write_together(Ranks& ranks, const SlabSpan& span, RankSlabs& part, const 
   {
     SharedFile shared(ranks, staged, output);
     ranks.together([&] {
-      write_part(shared, part, place, ranks.first(), run);
+      write_part(shared, part, place, ranks.first(), job.run);
       if (ranks.first()) write_addition(shared, part, place, addition);
     });
     shared.close();

@@ -9,7 +9,8 @@
 #include "lamina/holes.h"
 #include "ranks/rank_slabs.h"
 #include "ranks/ranks.h"
-#include "reconstruct/slab_span.h"
+#include "reconstruct/job.h"
+#include "reconstruct/stages.h"
 
 namespace lamina::ranks {
 
@@ -31,10 +32,9 @@ struct Place {
 /// Error(budget) beyond the vertices that a PLY's indices can name; `name`: the mesh, for the message.
 Place find_place(std::span<const Border> parts, std::size_t rank, const std::string& name);
 
-/// Writes the file, holes closed; it appears under its name when all have written. The place is that of this rank, the
-/// holes are known to rank 0. Throws Error(empty) where no rank has a triangle: for `input` with `samples`.
-Place write_together(Ranks& ranks, const SlabSpan& span, RankSlabs& part, const std::string& output,
-                     const std::string& input, std::uint64_t samples, const HoleSettings& holes, HoleStats& closed,
-                     const RunContext& run);
+/// Writes the plan's mesh as `output`, holes closed; it appears under its name when all have written. The place is that
+/// of this rank, the holes are known to rank 0 (job.stats). Throws Error(empty) where no rank has a triangle.
+Place write_together(Ranks& ranks, const ReconstructionPlan& plan, RankSlabs& part, const std::string& output,
+                     Job& job);
 
 }  // namespace lamina::ranks

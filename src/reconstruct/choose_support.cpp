@@ -4,58 +4,60 @@
 
 #include <algorithm>
 
+#include "reconstruct/constants.h"
+
 namespace lamina {
 namespace {
 
-/// Samples this far (radii) from the surface that their neighbours suggest are noisy. Detail that the sampling hardly
-/// resolves looks the same up to 0.05; noise of half a spacing either way has 0.12.
-constexpr float kNoisy = 0.05F;
-constexpr float kVeryNoisy = 0.1F;
+/// Where corners themselves say how many projections they need.
+constexpr int kMostProjections = 16;
 
-/// Radii of an evenly sampled surface: the 99 % quantile is some 2.5 times the 1 % one (cells that the surface clips
-/// give long ones), six to eight where density varies 64 times. Where density varies, the support must bridge wider
-/// gaps.
-constexpr float kEven = 3;
+/// What noise asks for: a wider support, the wider the more of it, on the same cells, and normals that agree.
+void choose_for_noise(float noise, bool cell_given, StageSettings& out) {
+  const double share = std::min(1.0, static_cast<double>(noise - kNoisy) / static_cast<double>(kVeryNoisy - kNoisy));
+  out.feed.blend = kNoisyBlend + (kVeryNoisyBlend - kNoisyBlend) * share;
+  out.feed.cell = {kChosenCell, Length::Unit::sample_radius};
+  out.refit.support = kNoisyRefit;
+  out.projection.good_reach = kNoisyTrust;
+  if (!cell_given) out.projection.band = kNoisyBand;
+}
 
-/// No more than 1.3 M triangles of a million samples.
-constexpr double kCell = 0.892;
+/// What an even, clean sampling allows: the narrowest support, finer cells between sheets, and a closed mesh.
+void choose_for_even(bool cell_given, StageSettings& out) {
+  out.feed.blend = 1;
+  out.feed.cell = {kChosenCell, Length::Unit::sample_radius};
+  out.projection.good_reach = kEvenTrust;
+  out.projection.good_samples = kEvenTrustedSamples;
+  out.holes.watertight = true;
+  if (cell_given) return;
+  out.feed.thin_cells = true;
+  out.projection.band = kSheetBand;
+}
 
 }  // namespace
 
-SupportChoice choose_support(const SurfaceSettings& settings, const RadiusSurvey& survey) {
-  SupportChoice out;
-  if (settings.blend) {
-    out.blend = *settings.blend;
+StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& survey) {
+  StageSettings out;
+  out.feed.blend = kDefaultBlend;
+  out.holes.watertight = false;
+  if (s.blend) {
+    out.feed.blend = *s.blend;
   } else if (survey.noise > kNoisy) {
-    const double share =
-        std::min(1.0, static_cast<double>(survey.noise - kNoisy) / static_cast<double>(kVeryNoisy - kNoisy));
-    out.blend = 1.75 + 0.75 * share;
-    out.cell = {kCell, Length::Unit::sample_radius};
-    out.refit = 4;
-    if (!settings.cell) out.band = 1.25F;
-    out.good_reach = 0.2F;
+    choose_for_noise(survey.noise, s.cell.has_value(), out);
   } else if (survey.high < kEven * survey.low) {
-    out.blend = 1;
-    out.cell = {kCell, Length::Unit::sample_radius};
-    out.good_reach = 0.25F;
-    out.good_samples = 4;
-    out.watertight = true;
-    if (!settings.cell) {
-      // Around thin things cells are half as large: values must reach over as many more of them.
-      out.thin_cells = true;
-      out.band = 4;
-    }
+    choose_for_even(s.cell.has_value(), out);
   }
-  if (settings.cell) out.cell = *settings.cell;
-  if (settings.watertight) out.watertight = *settings.watertight;
-  if (settings.refit) out.refit = *settings.refit;
+  if (s.cell) out.feed.cell = *s.cell;
+  if (s.refit) out.refit.support = *s.refit;
+  // Free clustering joins sheets: a boundary loop may pass through a vertex several times.
+  out.holes.longest = s.cluster == ClusterMode::free ? 0 : s.close_holes;
+  out.holes.watertight = s.watertight.value_or(out.holes.watertight) && out.holes.longest > 0;
+  out.feed.radius_scale = static_cast<float>(s.radius_scale);
+  out.projection.fit = s.fit == FitMode::sphere ? Fit::sphere : Fit::plane;
+  out.projection.steps = s.steps == 0 ? kMostProjections : s.steps;
+  if (s.steps == 0) out.projection.tolerance = static_cast<float>(s.step_tolerance / out.feed.blend);
+  out.projection.centres = s.diffuse;
   return out;
-}
-
-HoleSettings hole_settings(const SurfaceSettings& settings, const SupportChoice& support) {
-  // Free clustering joins sheets: a rim may pass through a vertex several times.
-  const double longest = settings.cluster == ClusterMode::free ? 0 : settings.close_holes;
-  return {longest, support.watertight && longest > 0};
 }
 
 std::string describe_choice(const SurfaceSettings& settings, const SurfacePlan& plan) {

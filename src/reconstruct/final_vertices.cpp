@@ -30,10 +30,10 @@ Vec3 clustered(const SurfaceCorner& c, float chord) {
   return position(c) + to_vec(c.offset) + static_cast<double>(shift) * to_vec(c.normal);
 }
 
-}  // namespace
-
-void place_vertices(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, const Frame& frame, float chord,
-                    VertexBatch& out) {
+void place_points(const ClusteredSlab& from, const Frame& frame, float chord, VertexBatch& out) {
+  const FinalSlab& slab = from.slab;
+  const IsoSlab& here = from.here;
+  const IsoSlab* const next = from.next;
   const std::size_t n = slab.vertices.size();
   const std::size_t attributes = here.corner_attributes.size();
   for (auto* v : {&out.x, &out.y, &out.z}) resize_anew(*v, n);
@@ -80,35 +80,43 @@ void place_vertices(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* n
   });
 }
 
-void place_levels(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, double finest, VertexBatch& out) {
+void place_levels(const ClusteredSlab& from, double finest, VertexBatch& out) {
   std::vector<float>& levels = out.attributes.emplace_back();
-  levels.reserve(slab.vertices.size());
-  for (const FinalVertex& v : slab.vertices) {
-    const IsoSlab& s = v.corner.next() ? *next : here;
+  levels.reserve(from.slab.vertices.size());
+  for (const FinalVertex& v : from.slab.vertices) {
+    const IsoSlab& s = v.corner.next() ? *from.next : from.here;
     levels.push_back(static_cast<float>(std::lround(std::log2(s.corners[v.corner.index()].cell / finest))));
   }
 }
 
-void place_curvatures(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, double step, VertexBatch& out) {
+void place_curvatures(const ClusteredSlab& from, double step, VertexBatch& out) {
   std::vector<float>& curvatures = out.attributes.emplace_back();
-  curvatures.reserve(slab.vertices.size());
-  const auto of = [&](SlabIndex i) { return (i.next() ? *next : here).corners[i.index()].curvature; };
-  for (const FinalVertex& v : slab.vertices) {
+  curvatures.reserve(from.slab.vertices.size());
+  const auto of = [&](SlabIndex i) { return (i.next() ? *from.next : from.here).corners[i.index()].curvature; };
+  for (const FinalVertex& v : from.slab.vertices) {
     float curvature = of(v.corner);
     if (v.kind == FinalVertex::Kind::isovertex) curvature = (1 - v.t) * curvature + v.t * of(v.other);
     curvatures.push_back(static_cast<float>(static_cast<double>(curvature) / step));
   }
 }
 
-void place_radii(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, const RadiusRule& rule,
-                 VertexBatch& out) {
+void place_radii(const ClusteredSlab& from, const RadiusRule& rule, VertexBatch& out) {
   out.radius.clear();
-  out.radius.reserve(slab.vertices.size());
-  for (const FinalVertex& v : slab.vertices) {
-    const IsoSlab& s = v.corner.next() ? *next : here;
+  out.radius.reserve(from.slab.vertices.size());
+  for (const FinalVertex& v : from.slab.vertices) {
+    const IsoSlab& s = v.corner.next() ? *from.next : from.here;
     const double by_cell = rule.per_cell * static_cast<double>(s.corners[v.corner.index()].cell);
     out.radius.push_back(static_cast<float>(std::max(rule.least, by_cell)));
   }
+}
+
+}  // namespace
+
+void place_vertices(const ClusteredSlab& slab, const Frame& frame, const VertexSettings& settings, VertexBatch& out) {
+  place_points(slab, frame, settings.chord, out);
+  if (settings.levels) place_levels(slab, settings.finest_cell, out);
+  if (settings.curvature) place_curvatures(slab, frame.step, out);
+  place_radii(slab, settings.radii, out);
 }
 
 }  // namespace lamina

@@ -7,27 +7,31 @@
 
 namespace lamina {
 
-/// `here` is the finished slab, `next` the one above (null at the end). `chord`: SurfaceSettings::chord.
-/// A clustered vertex goes to its corner's projected point, moved outward by chord * curvature * cell^2 (at most a
-/// quarter of a cell), which makes up for triangles cutting inside a curved surface.
-void place_vertices(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, const Frame& frame, float chord,
-                    VertexBatch& out);
-
-/// Adds an attribute behind those of place_vertices(): the octree level of the finest cell around the vertex's corner,
-/// 0 the finest. `finest`: that level's cell, in steps.
-void place_levels(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, double finest, VertexBatch& out);
-
-/// Adds an attribute behind those that are there: mean curvature of the fit, 1 / input unit. `step`: Frame::step.
-void place_curvatures(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, double step, VertexBatch& out);
-
 /// The influence radius R that goes with a cell, input units.
 struct RadiusRule {
   double per_cell = 1;  ///< for each step of its side
   double least = 0;     ///< whatever the cell
 };
 
-/// The influence radius around each vertex, by the finest cell around its corner.
-void place_radii(const FinalSlab& slab, const IsoSlab& here, const IsoSlab* next, const RadiusRule& rule,
-                 VertexBatch& out);
+/// What vertices are given.
+struct VertexSettings {
+  float chord = 0.2F;      ///< SurfaceSettings::chord
+  bool levels = false;     ///< an attribute behind the samples' own: the octree level of the finest cell around, 0 the
+                           ///< finest
+  bool curvature = false;  ///< another: mean curvature of the fit, 1 / input unit
+  double finest_cell = 1;  ///< of the lattice, steps
+  RadiusRule radii;        ///< the influence radius around each vertex, by the finest cell around its corner
+};
+
+/// A finished slab with what it refers to.
+struct ClusteredSlab {
+  const FinalSlab& slab;
+  const IsoSlab& here;
+  const IsoSlab* next;  ///< the one above, null at the end
+};
+
+/// A clustered vertex goes to its corner's projected point, moved outward by chord * curvature * cell^2 (at most a
+/// quarter of a cell), which makes up for triangles cutting inside a curved surface.
+void place_vertices(const ClusteredSlab& slab, const Frame& frame, const VertexSettings& settings, VertexBatch& out);
 
 }  // namespace lamina

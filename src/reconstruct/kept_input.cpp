@@ -10,7 +10,7 @@
 #include "base/output_file.h"
 #include "base/ply_type.h"
 #include "lamina/error.h"
-#include "reconstruct/choose_normals.h"
+#include "reconstruct/stored_cloud.h"
 #include "samples/clean_ingested.h"
 
 namespace lamina {
@@ -142,7 +142,7 @@ bool is_kept_input(const std::string& directory) {
   return std::filesystem::is_regular_file(path_in(directory), ignored);
 }
 
-void save_input(const SweepInput& input, const SurfaceSettings& settings, const std::string& directory) {
+void save_input(const StoredCloud& input, const SurfaceSettings& settings, const std::string& directory) {
   const Extent& e = input.ingested.extent;
   const Json j{{"format", kFormat},
                {"version", kVersion},
@@ -160,7 +160,7 @@ void save_input(const SweepInput& input, const SurfaceSettings& settings, const 
   file.publish();
 }
 
-SweepInput open_kept_input(const std::string& directory, const SurfaceSettings& settings) {
+StoredCloud open_kept_input(const std::string& directory, const SurfaceSettings& settings) {
   const std::string path = path_in(directory);
   const std::string text = read_text(path);
   PointSourceInfo info;

@@ -2,19 +2,19 @@
 #pragma once
 #include <string>
 
-#include "reconstruct/sweep.h"
+#include "reconstruct/stored_cloud.h"
 
 namespace lamina {
 
 /// Whether a folder holds a kept input.
 bool is_kept_input(const std::string& directory);
 
-/// Completes the folder that read_surface_input() kept the store in. Throws Error(budget) when it cannot be written.
-void save_input(const SweepInput& input, const SurfaceSettings& settings, const std::string& directory);
+/// Completes the folder that read_cloud() kept the store in. Throws Error(budget) when it cannot be written.
+void save_input(const StoredCloud& input, const SurfaceSettings& settings, const std::string& directory);
 
 /// Opens it. Throws Error(unreadable) naming the file that is damaged or of another version, Error(usage) where the
 /// settings ask for another frame, other samples or other radii than the input was read with.
-SweepInput open_kept_input(const std::string& directory, const SurfaceSettings& settings);
+StoredCloud open_kept_input(const std::string& directory, const SurfaceSettings& settings);
 
 /// A name of the kept input's contents: other samples, another frame, another name.
 std::string kept_input_id(const std::string& directory);

@@ -8,15 +8,8 @@
 
 namespace lamina {
 
-MeshOutput::MeshOutput(const ClusterSettings& settings, float chord, double finest, const RadiusRule& radii,
-                       bool curvature, const Frame& frame, SlabSink& sink)
-    : chord_(chord),
-      finest_(finest),
-      radii_(radii),
-      curvature_(curvature),
-      frame_(frame),
-      sink_(sink),
-      clusterer_(settings) {}
+MeshOutput::MeshOutput(ClusterMode mode, const VertexSettings& vertices, const Frame& frame, SlabSink& sink)
+    : settings_(vertices), frame_(frame), sink_(sink), clusterer_(ClusterSettings{mode}) {}
 
 MeshOutput::~MeshOutput() {
   tasks_.cancel();
@@ -66,10 +59,7 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
   if (last) clusterer_.finish();
   while (clusterer_.pop(done_)) {
     const IsoSlab* next = clustered_.size() > 1 ? clustered_[1].get() : nullptr;
-    place_vertices(done_, *clustered_.front(), next, frame_, chord_, vertices_);
-    if (finest_ > 0) place_levels(done_, *clustered_.front(), next, finest_, vertices_);
-    if (curvature_) place_curvatures(done_, *clustered_.front(), next, frame_.step, vertices_);
-    place_radii(done_, *clustered_.front(), next, radii_, vertices_);
+    place_vertices({done_, *clustered_.front(), next}, frame_, settings_, vertices_);
     sink_.write(done_, vertices_);
     triangles_ += done_.triangles.size();
     if (clustered_.front().use_count() == 1) {

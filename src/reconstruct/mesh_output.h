@@ -46,12 +46,8 @@ class MeshFileSlabs : public SlabSink {
 /// start().
 class MeshOutput {
  public:
-  /// `chord`: SurfaceSettings::chord. `finest`: the finest level's cell where vertices are to have their level as the
-  /// last attribute, else 0. `radii`: of cells.
-  /// `curvature`: vertices have it as the last attribute.
   /// The sink is the caller's; nobody else may write to it.
-  MeshOutput(const ClusterSettings& settings, float chord, double finest, const RadiusRule& radii, bool curvature,
-             const Frame& frame, SlabSink& sink);
+  MeshOutput(ClusterMode mode, const VertexSettings& vertices, const Frame& frame, SlabSink& sink);
   /// Drops what is not written yet.
   ~MeshOutput();
   MeshOutput(const MeshOutput&) = delete;
@@ -75,10 +71,7 @@ class MeshOutput {
  private:
   void work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last);
 
-  float chord_;
-  double finest_;
-  RadiusRule radii_;
-  bool curvature_;
+  VertexSettings settings_;
   const Frame& frame_;
   SlabSink& sink_;
   Clusterer clusterer_;

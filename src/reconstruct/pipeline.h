@@ -1,4 +1,5 @@
-// The window's pipeline: stages that slide over the slabs, each a few slabs behind the one before (METHOD 3.4).
+// The window's pipeline: stages that slide over the slabs, each a few slabs behind the one before (Cuccuru et al.
+// 2009, section 3.4).
 #pragma once
 #include <cstdint>
 #include <deque>
@@ -9,29 +10,21 @@
 #include "levelset/surface_volume.h"
 #include "mls/project.h"
 #include "octree/window.h"
+#include "reconstruct/job.h"
 #include "reconstruct/mesh_output.h"
 #include "reconstruct/plan.h"
-#include "reconstruct/slab_span.h"
-#include "reconstruct/stopwatch.h"
+#include "reconstruct/stages.h"
 #include "samples/sample_feed.h"
 
 namespace lamina {
 
-/// The z of the samples that the pipeline reads for a span of slabs: [from, to); no `from`: from the bottom.
-struct ZRead {
-  std::optional<std::int64_t> from;
-  std::int64_t to = 0;
-};
-ZRead z_read(const SurfaceSettings& settings, const Resolved& resolved, const SlabSpan& span, const SlabSpan& all);
-
-/// Refine, project, finish, number, triangulate, cluster, write: run() takes the slabs through all of them.
+/// Refine, project, finish, number, triangulate, cluster, write: run() takes the slabs through all of them, each as far
+/// ahead as kStageReach says.
 class Pipeline {
  public:
   /// The sink gets the finished slabs of `span`, and a few below it whose vertices but for the last of these slabs are
-  /// not those of a sweep through all. With a volume the span is all_slabs().
-  Pipeline(const SurfaceSettings& settings, const Resolved& resolved, const Frame& frame, const Extent& extent,
-           SampleFeed& feed, std::size_t attributes, SlabSink& sink, const SlabSpan& span,
-           SurfaceVolume* volume = nullptr);
+  /// not those of a sweep through all. With a volume the span is plan.slabs.
+  Pipeline(const ReconstructionPlan& plan, SampleFeed& feed, const SlabSpan& span, const SweepOutput& output);
   void run(const RunContext& run, Stopwatch& watch);
   void report(SurfaceStats& stats) const;
 
@@ -46,16 +39,15 @@ class Pipeline {
   void retire();
   void note_disk();
 
-  const SurfaceSettings& settings_;
-  const Resolved& resolved_;
+  const ReconstructionPlan& plan_;
   SampleFeed& feed_;
   SurfaceVolume* volume_;  ///< null: none is asked for
   Kernel kernel_;
   Window window_;
   Projector projector_;
   MeshOutput output_;
-  SlabSpan all_;       ///< slabs that can hold surface
-  StageSpans stages_;  ///< slabs each stage has to do
+  StageSpans stages_;    ///< slabs each stage has to do
+  double sample_reach_;  ///< sample_reach() of the plan
 
   // Next slab of each stage.
   std::int32_t refined_, placed_, projected_, finished_, numbered_, triangulated_;

@@ -1,47 +1,100 @@
-// Turns settings and a look at the cloud into the lattice and what the run will take.
+// The plan of a reconstruction: everything that the sweep, its parts, the volume and the statistics need to know of the
+// settings and the cloud, derived once and never changed.
 #pragma once
-#include "lamina/frame.h"
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "boundary/hole_closer.h"
 #include "lamina/surface.h"
+#include "lattice/extent.h"
 #include "lattice/lattice.h"
+#include "meshes/mesh_sink.h"
+#include "mls/project.h"
 #include "mls/refit_normals.h"
-#include "reconstruct/choose_support.h"
-#include "samples/radii.h"
+#include "reconstruct/final_vertices.h"
+#include "reconstruct/pruner.h"
+#include "reconstruct/stages.h"
+#include "reconstruct/stored_cloud.h"
 #include "samples/sample_feed.h"
-#include "store/ingest.h"
-#include "store/slab_store.h"
 
 namespace lamina {
 
-struct Resolved {
-  Lattice lattice;
-  FeedSettings feed;
-  RadiiSettings radii;
-  SurfacePlan plan;
-  SupportChoice support;
-  RefitSettings refit;  ///< support 0: normals stay
-  int main_level = 0;   ///< of most cells
+/// What a run is expected to take.
+struct ExpectedCost {
+  std::uint64_t memory = 0;    ///< bytes, at the peak
+  std::uint64_t disk = 0;      ///< bytes of temporary files, at the most
+  double cpu_seconds = 0;      ///< of the whole run, on the machine that the model was made on
+  double reading_seconds = 0;  ///< of these for reading the input
 };
 
-/// NormalFilter::reach() of what `refit` asks for.
-double filter_reach(const Resolved& resolved);
+/// Lengths are in fixed-point steps of the frame where nothing else is said.
+struct ReconstructionPlan {
+  // The cloud.
+  std::string input;  ///< what messages call it
+  std::uint64_t samples = 0;
+  std::uint64_t buckets = 0;
+  Frame frame;  ///< of what comes out: less the shift where one is asked for
+  Extent extent;
+  AttributeLayout attributes;
+  bool given_radii = false;
+  RadiusSurvey radius;  ///< scaled and bounded as the samples' own are
+
+  // The octree.
+  Lattice lattice;
+  int main_level = 0;  ///< of most cells
+  SlabSpan slabs;      ///< all that can hold surface
+  int window = 1;      ///< slabs that each stage advances at once
+
+  // The stages.
+  RadiiSettings radii;
+  FeedSettings feed;
+  RefitSettings refit;
+  ProjectSettings projection;
+  float boundary = 0;  ///< SurfaceSettings::boundary
+  ClusterMode cluster = ClusterMode::preserving;
+  VertexSettings vertices;
+  HoleSettings holes;
+  PruneRule pruning;
+  VolumeExport volume;
+  std::vector<std::string> comments;  ///< of the mesh file
+  AttributeLayout mesh_attributes;
+  bool double_positions = false;
+
+  ExpectedCost expected;
+
+  /// The slabs each stage works on for the finished slabs of a span.
+  [[nodiscard]] StageSpans stages_of(const SlabSpan& span) const { return {span, slabs, projection.centres}; }
+};
 
 /// Throws Error(usage) for settings out of range. Called before the input is opened.
 void check_settings(const SurfaceSettings& settings);
 
-/// Throws Error(usage) when the cell asked for cannot be represented for this cloud.
-Resolved resolve_plan(const SurfaceSettings& settings, const Frame& frame, const SlabStore& store, const Extent& bounds,
-                      bool given_radii, std::size_t attributes);
+/// A function of settings, cloud and survey alone, so that all parts of a job plan the same. Throws Error(usage) when
+/// the cell asked for cannot be represented for this cloud, or vertices would have two attributes of one name;
+/// Error(empty) where no sampling density can be estimated.
+ReconstructionPlan make_plan(const SurfaceSettings& settings, const StoredCloud& cloud, const RadiusSurvey& survey);
 
-/// The same after a survey_radii() of the store with kSurveySamples and settings.density.
-Resolved resolve_plan(const SurfaceSettings& settings, const Frame& frame, const SlabStore& store, const Extent& bounds,
-                      const RadiusSurvey& radii, bool given_radii, std::size_t attributes);
+/// The mesh file's layout, without its name.
+MeshSinkSettings mesh_layout(const ReconstructionPlan& plan);
 
-/// Processor seconds of a whole run on the machine the model was made on; of which reading the input takes
-/// kReferenceRead a sample.
-double expected_cpu_seconds(const SurfaceSettings& settings, const Resolved& resolved, std::size_t attributes);
-inline constexpr double kReferenceRead = 80e-9;
+/// Bytes of the store that the sweep reads for a span of slabs: samples with z in [from, to); no `from`: from the
+/// bottom.
+struct ZRead {
+  std::optional<std::int64_t> from;
+  std::int64_t to = 0;
+};
+ZRead z_read(const ReconstructionPlan& plan, const SlabSpan& span);
 
-/// The plan in lines for a reader.
+/// How far beyond a slab samples may lie that act on its corners.
+double sample_reach(const ReconstructionPlan& plan);
+
+/// What the plan comes to in the input's units; time and threads are not known yet.
+SurfacePlan summary_of(const ReconstructionPlan& plan);
+
+/// The summary in lines for a reader.
 std::string describe(const SurfacePlan& plan);
 
 }  // namespace lamina

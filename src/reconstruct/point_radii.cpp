@@ -171,15 +171,18 @@ PointRadiiReport write_radii(PointSource& source, PointsWriter& writer, const Po
   NumberedRows positions(source);
   const Survey survey = survey_input(positions, settings.bad_samples, silent);
   const Frame frame = choose_frame(survey, FrameMode::pca);
-  const Ingested in = ingest(positions, survey, frame, 1, directory, run);
-  SurfaceSettings plan;
-  plan.input = source.info().path;
-  plan.density = settings.density;
-  const Resolved resolved = resolve_plan(plan, frame, in.store, in.extent, false, NumberedRows::kDigits);
+  StoredCloud cloud{positions.info(), frame, ingest(positions, survey, frame, 1, directory, run)};
+  cloud.info.has_radius = false;
+  const SlabStore& store = cloud.ingested.store;
+  SurfaceSettings as_reconstructed;
+  as_reconstructed.input = source.info().path;
+  as_reconstructed.density = settings.density;
+  const RadiusSurvey surveyed = survey_radii(store, kSurveySamples, settings.density);
+  const ReconstructionPlan plan = make_plan(as_reconstructed, cloud, surveyed);
 
-  const std::uint64_t whole = in.store.total() * kRecord;
+  const std::uint64_t whole = store.total() * kRecord;
   edit::RecordSorter by_row(sizeof(float), static_cast<std::size_t>(std::min<std::uint64_t>(memory, whole)), directory);
-  estimate(in.store, resolved.radii, by_row, run);
+  estimate(store, plan.radii, by_row, run);
 
   PointRadiiReport report;
   RadiusWriter out(source, writer, settings, frame.step * settings.particlescale, report, run);

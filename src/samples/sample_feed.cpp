@@ -41,10 +41,15 @@ std::size_t first_bucket(const SlabStore& store, std::int64_t z, std::int64_t co
   return first_reaching((cell_of(store.z_lower(first), counting) - 1) * counting);
 }
 
+/// H as the samples' arithmetic has it.
+float blend_of(const FeedSettings& settings) {
+  return static_cast<float>(settings.blend);
+}
+
 /// A radius that asks for cells larger than the coarsest level has gives no more than that level can use.
 float radius_limit(const FeedSettings& settings, const Lattice& lattice) {
-  const double coarsest = 2.0 * lattice.cell_size(lattice.levels - 1) / settings.cell_ratio;
-  return static_cast<float>(settings.cell_follows_support ? coarsest / settings.blend : coarsest);
+  const double coarsest = 2.0 * lattice.cell_size(lattice.levels - 1) / settings.cell_ratio();
+  return static_cast<float>(settings.cell_follows_support() ? coarsest / blend_of(settings) : coarsest);
 }
 
 /// Coarsest level whose cell is at most `size`.
@@ -57,7 +62,7 @@ std::uint8_t level_for(double size, const Lattice& lattice) {
 }  // namespace
 
 float support_limit(const FeedSettings& settings, const Lattice& lattice) {
-  return radius_limit(settings, lattice) * settings.blend;
+  return radius_limit(settings, lattice) * blend_of(settings);
 }
 
 SampleFeed::SampleFeed(SlabStore& store, const Lattice& lattice, const FeedSettings& settings,
@@ -184,7 +189,7 @@ void SampleFeed::learn(std::vector<float> radii) {
       ++counts_.clamped;
       r = radius_limit_;
     }
-    known.max_support = std::max(known.max_support, r * settings_.blend);
+    known.max_support = std::max(known.max_support, r * blend_of(settings_));
   }
   if (filter_ != nullptr && !radii.empty()) filter_->add(measured_, cache_.get(measured_)->samples, radii);
   known.radius = std::move(radii);
@@ -199,8 +204,9 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
   resize_anew(out.level, n);
   out.max_support = known.max_support;
   const auto finest = static_cast<float>(lattice_.cell);
-  const double ratio = settings_.cell_ratio * (settings_.cell_follows_support ? settings_.blend : 1.0F);
-  const bool has_quality = !out.samples.quality.empty();
+  const float blend = blend_of(settings_);
+  const double ratio = settings_.cell_ratio() * (settings_.cell_follows_support() ? blend : 1.0F);
+  const bool has_quality = !out.samples.quality.empty(), fixed = settings_.fixed_cell();
   if (!known.normals.x.empty()) {
     out.samples.nx = known.normals.x;
     out.samples.ny = known.normals.y;
@@ -209,14 +215,14 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 8192), [&](const auto& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       const float r = known.radius[i];
-      out.support[i] = r * settings_.blend;
+      out.support[i] = r * blend;
       // q_i is proportional to the sampling density 1 / r^2 (METHOD 3.1), scaled by the finest cell to stay near one.
       const float q = r > 0 ? finest / r : 0.0F;
       out.weight[i] = q * q * (has_quality ? out.samples.quality[i] : 1.0F);
-      out.level[i] = settings_.fixed_cell ? std::uint8_t{0} : level_for(static_cast<double>(r) * ratio, lattice_);
+      out.level[i] = fixed ? std::uint8_t{0} : level_for(static_cast<double>(r) * ratio, lattice_);
     }
   });
-  if (settings_.thin_cells && !settings_.fixed_cell) refine_thin(lattice_, out.samples, known.radius, out.level);
+  if (settings_.thin_cells && !fixed) refine_thin(lattice_, out.samples, known.radius, out.level);
 }
 
 std::shared_ptr<const ActiveBucket> SampleFeed::fetch(std::size_t bucket) {

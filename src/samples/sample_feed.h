@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "lamina/length.h"
 #include "lattice/lattice.h"
 #include "samples/bucket_cache.h"
 #include "samples/normal_filter.h"
@@ -19,16 +20,21 @@ namespace lamina {
 using Batch = std::vector<std::shared_ptr<const ActiveBucket>>;
 
 struct FeedSettings {
-  float radius_scale = 1;               ///< multiplies estimated radii; given ones are scaled when read in
-  float blend = 1;                      ///< H
-  double cell_ratio = 0.9;              ///< a cell is split while larger than this times its smallest radius
-  bool cell_follows_support = true;     ///< the smallest R_i = H r_i counts, else the smallest r_i
-  bool thin_cells = false;              ///< a level less where normals cancel (feed/thin_cells.h)
-  bool fixed_cell = false;              ///< every sample asks for the finest level
+  float radius_scale = 1;  ///< multiplies estimated radii; given ones are scaled when read in
+  double blend = 1;        ///< H: a sample's support radius R_i is H r_i
+  /// Largest leaf cell that a sample allows: a length, the same for all, or a multiple of its r_i or R_i.
+  Length cell{0.9, Length::Unit::influence_radius};
+  bool thin_cells = false;              ///< a level less where normals cancel (samples/thin_cells.h)
   float max_radius = 0;                 ///< samples with a larger r_i are left out, steps; 0: none
   std::size_t cache_bytes = 64u << 20;  ///< memory for samples kept between uses
   /// Samples looked at together: large enough to keep every thread busy, small enough to stay in memory whatever H is.
   std::uint64_t batch_samples = 1u << 18;
+
+  /// Every sample asks for the finest level.
+  [[nodiscard]] bool fixed_cell() const { return cell.unit == Length::Unit::world; }
+  /// The largest leaf cell in units of R_i (or, in units of r_i, where cells do not follow the support).
+  [[nodiscard]] double cell_ratio() const { return fixed_cell() ? 1.0 : cell.value; }
+  [[nodiscard]] bool cell_follows_support() const { return cell.unit != Length::Unit::sample_radius; }
 };
 
 /// Largest influence a sample can have, steps.

@@ -71,10 +71,10 @@ std::vector<LocalSamples> pieces(const SlabStore& store) {
 }
 
 void write_store(benchmark::State& state, const Scene& scene) {
-  const std::vector<LocalSamples> parts = pieces(scene.ingested->store);
+  const std::vector<LocalSamples> parts = pieces(scene.cloud->ingested.store);
   StoreSettings settings;
   settings.directory = scene.folder;
-  const Extent& extent = scene.ingested->extent;
+  const Extent& extent = scene.cloud->ingested.extent;
   constexpr std::size_t kBuckets = 64;
   settings.z_min = extent.z_min;
   settings.bucket_height =
@@ -84,7 +84,7 @@ void write_store(benchmark::State& state, const Scene& scene) {
   measure(
       state, scene.samples(), [] { return 0; },
       [&](int) {
-        SlabStoreWriter writer(scene.ingested->store.layout(), settings);
+        SlabStoreWriter writer(scene.cloud->ingested.store.layout(), settings);
         for (const LocalSamples& p : parts) writer.append(p);
         bytes = writer.finish().disk_bytes();
       });
@@ -93,12 +93,12 @@ void write_store(benchmark::State& state, const Scene& scene) {
 
 /// Radii of every sample; the store is read in between, as in the job, but not timed.
 void density_radii(benchmark::State& state, const Scene& scene) {
-  const SlabStore& store = scene.ingested->store;
+  const SlabStore& store = scene.cloud->ingested.store;
   std::vector<LocalSamples> buckets(store.buckets());
   for (std::size_t b = 0; b < buckets.size(); ++b) store.read(b, buckets[b]);
   std::vector<float> radii;
   measure(
-      state, scene.samples(), [&] { return std::make_unique<RadiusEstimator>(scene.resolved.radii); },
+      state, scene.samples(), [&] { return std::make_unique<RadiusEstimator>(scene.plan.radii); },
       [&](const std::unique_ptr<RadiusEstimator>& estimator) {
         for (const LocalSamples& b : buckets) {
           estimator->push(b);
@@ -118,17 +118,18 @@ void add_input_benches(const Scene& scene, const std::string& suffix) {
     measure(s, scene.samples(), nothing, [&](int) { survey_input(*scene.source, BadSamples::drop, {}); });
   });
   add("ingest" + suffix, [&scene, nothing](benchmark::State& s) {
+    const Survey survey = survey_input(*scene.source, BadSamples::drop, {});
     measure(s, scene.samples(), nothing,
-            [&](int) { ingest(*scene.source, scene.survey, scene.frame, 1, scene.folder, {}); });
+            [&](int) { ingest(*scene.source, survey, scene.plan.frame, 1, scene.folder, {}); });
   });
   add("store_write" + suffix, [&scene](benchmark::State& s) { write_store(s, scene); });
   add("store_read" + suffix, [&scene, nothing](benchmark::State& s) {
-    measure(s, scene.samples(), nothing, [&](int) { read_store(scene.ingested->store); });
+    measure(s, scene.samples(), nothing, [&](int) { read_store(scene.cloud->ingested.store); });
   });
   if (scene.attributes() > 0) return;
   add("survey_radii", [&scene, nothing](benchmark::State& s) {
     measure(s, scene.samples(), nothing,
-            [&](int) { benchmark::DoNotOptimize(survey_radii(scene.ingested->store, scene.samples())); });
+            [&](int) { benchmark::DoNotOptimize(survey_radii(scene.cloud->ingested.store, scene.samples())); });
   });
   add("radii", [&scene](benchmark::State& s) { density_radii(s, scene); });
 }

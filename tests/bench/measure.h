@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "reconstruct/stopwatch.h"
+#include "reconstruct/job.h"
 
 namespace lamina::bench {
 

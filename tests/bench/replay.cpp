@@ -10,7 +10,7 @@
 #include "mls/finish.h"
 #include "octree/refine.h"
 #include "reconstruct/final_vertices.h"
-#include "reconstruct/slab_span.h"
+#include "reconstruct/stages.h"
 
 namespace lamina::bench {
 namespace {
@@ -26,12 +26,11 @@ Replay::Replay(const Scene& scene, const ProjectSettings& settings, const Kernel
     : scene_(scene),
       settings_(settings),
       kernel_(kernel),
-      feed_(scene.ingested->store, scene.resolved.lattice, all_cached(scene.resolved.feed), scene.resolved.radii,
-            false),
-      window_(scene.resolved.lattice, static_cast<int>(scene.attributes()), scene.ingested->extent),
+      feed_(scene.cloud->ingested.store, scene.plan.lattice, all_cached(scene.plan.feed), scene.plan.radii, false),
+      window_(scene.plan.lattice, static_cast<int>(scene.attributes()), scene.plan.extent),
       projector_(settings, kernel),
-      first_(all_slabs(scene.resolved.lattice, scene.ingested->extent).begin),
-      last_(all_slabs(scene.resolved.lattice, scene.ingested->extent).end - 1) {}
+      first_(scene.plan.slabs.begin),
+      last_(scene.plan.slabs.end - 1) {}
 
 void Replay::mark(const ActiveBucket& bucket) {
   constexpr std::size_t kPiece = 4096;
@@ -82,7 +81,7 @@ std::uint64_t Replay::write() const {
   VertexBatch vertices;
   for (std::size_t k = 0; k < final_.size(); ++k) {
     const IsoSlab* next = k + 1 < iso_.size() ? iso_[k + 1].get() : nullptr;
-    place_vertices(final_[k], *iso_[k], next, scene_.frame, static_cast<float>(scene_.settings.chord), vertices);
+    place_vertices({final_[k], *iso_[k], next}, scene_.plan.frame, scene_.plan.vertices, vertices);
     sink.append_vertices(vertices);
     sink.append_triangles(final_[k].triangles);
   }

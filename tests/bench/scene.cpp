@@ -61,11 +61,11 @@ Scene make_scene(const std::string& shape, std::uint64_t count, bool colours, co
   s.folder = folder;
   s.source = scattered(shape, count, colours);
   s.settings.input = shape;
-  s.survey = survey_input(*s.source, s.settings.bad_samples, {});
-  s.frame = choose_frame(s.survey, s.settings.frame.value_or(FrameMode::pca));
-  s.ingested = std::make_unique<Ingested>(ingest(*s.source, s.survey, s.frame, 1, folder, {}));
-  s.resolved = resolve_plan(s.settings, s.frame, s.ingested->store, s.ingested->extent, false,
-                            s.source->info().attributes.size());
+  const Survey survey = survey_input(*s.source, s.settings.bad_samples, {});
+  const Frame frame = choose_frame(survey, s.settings.frame.value_or(FrameMode::pca));
+  s.cloud = std::make_unique<StoredCloud>(
+      StoredCloud{s.source->info(), frame, ingest(*s.source, survey, frame, 1, folder, {})});
+  s.plan = make_plan(s.settings, *s.cloud, survey_radii(s.cloud->ingested.store, kSurveySamples, s.settings.density));
   return s;
 }
 

@@ -16,10 +16,8 @@ std::unique_ptr<PointSource> scattered(const std::string& shape, std::uint64_t c
 struct Scene {
   std::unique_ptr<PointSource> source;
   SurfaceSettings settings;
-  Survey survey;
-  Frame frame;
-  std::unique_ptr<Ingested> ingested;
-  Resolved resolved;
+  std::unique_ptr<StoredCloud> cloud;
+  ReconstructionPlan plan;
   std::string folder;  ///< for temporary files
   [[nodiscard]] std::uint64_t samples() const { return source->info().count; }
   [[nodiscard]] std::size_t attributes() const { return source->info().attributes.size(); }

@@ -5,7 +5,7 @@
 
 #include "chunks/chunked.h"
 #include "lamina/scatter.h"
-#include "reconstruct/slab_span.h"
+#include "reconstruct/stages.h"
 
 namespace lamina {
 namespace {

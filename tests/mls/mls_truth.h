@@ -270,9 +270,10 @@ inline std::vector<TruthSample> truth_samples(const LocalSamples& s, const Latti
     const double r = s.radius[i];
     if (settings.max_radius <= 0 || r <= settings.max_radius) t.support = r * settings.blend;
     t.weight = (s.quality.empty() ? 1.0 : s.quality[i]) / (r * r) * 1e4;
-    const double wanted = settings.cell_ratio * (settings.cell_follows_support ? r * settings.blend : r);
+    const double wanted = settings.cell_ratio() * (settings.cell_follows_support() ? r * settings.blend : r);
     t.cell = lattice.cell_size(0);
-    for (int level = 1; !settings.fixed_cell && level < lattice.levels && lattice.cell_size(level) <= wanted; ++level) {
+    for (int level = 1; !settings.fixed_cell() && level < lattice.levels && lattice.cell_size(level) <= wanted;
+         ++level) {
       t.cell = lattice.cell_size(level);
     }
     for (const auto& a : s.attributes) t.attributes.push_back(a[i]);

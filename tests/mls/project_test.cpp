@@ -200,13 +200,13 @@ std::vector<Scene> scenes() {
     Scene& s = add("supports much larger than cells");
     s.cloud = {Shape::sphere, 110, {0, 0, 0}, 350, 90, 130};
     s.feed.blend = 4;
-    s.feed.cell_follows_support = false;
+    s.feed.cell.unit = Length::Unit::sample_radius;
     s.lattice = {50, 2};
   }
   {
     Scene& s = add("fixed cell");
     s.cloud = {Shape::sphere, 250, {33, 44, 55}, 350, 100, 160};
-    s.feed.fixed_cell = true;
+    s.feed.cell = {1, Length::Unit::world};
     s.lattice = {90, 3};
   }
   return out;

@@ -16,58 +16,58 @@ SurfaceSettings by_noise() {
 }
 
 TEST(ChooseSupport, NothingIsChosenUnlessAskedFor) {
-  const SupportChoice choice = choose_support({}, survey(0.2F, 2));
-  EXPECT_EQ(choice.blend, 1.2);
-  EXPECT_EQ(choice.refit, 0);
-  EXPECT_EQ(choice.cell, (Length{0.9, Length::Unit::influence_radius}));
+  const StageSettings choice = choose_support({}, survey(0.2F, 2));
+  EXPECT_EQ(choice.feed.blend, 1.2);
+  EXPECT_EQ(choice.refit.support, 0);
+  EXPECT_EQ(choice.feed.cell, (Length{0.9, Length::Unit::influence_radius}));
 }
 
 TEST(ChooseSupport, EvenCleanCloudsGetTheNarrowestSupport) {
-  const SupportChoice even = choose_support(by_noise(), survey(0.01F, 2.5F));
-  const SupportChoice varying = choose_support(by_noise(), survey(0.01F, 8));
-  EXPECT_EQ(even.blend, 1);
-  EXPECT_EQ(even.cell.unit, Length::Unit::sample_radius);
-  EXPECT_EQ(varying.blend, 1.2);
-  EXPECT_EQ(even.refit + varying.refit, 0);
-  EXPECT_TRUE(even.thin_cells && even.watertight);
-  EXPECT_FALSE(varying.thin_cells || varying.watertight);
+  const StageSettings even = choose_support(by_noise(), survey(0.01F, 2.5F));
+  const StageSettings varying = choose_support(by_noise(), survey(0.01F, 8));
+  EXPECT_EQ(even.feed.blend, 1);
+  EXPECT_EQ(even.feed.cell.unit, Length::Unit::sample_radius);
+  EXPECT_EQ(varying.feed.blend, 1.2);
+  EXPECT_EQ(even.refit.support + varying.refit.support, 0);
+  EXPECT_TRUE(even.feed.thin_cells && even.holes.watertight);
+  EXPECT_FALSE(varying.feed.thin_cells || varying.holes.watertight);
 }
 
 TEST(ChooseSupport, ClosedMeshesAreMadeWhereAskedFor) {
   SurfaceSettings settings;
-  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2)).watertight);
+  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2)).holes.watertight);
   settings.watertight = true;
-  EXPECT_TRUE(choose_support(settings, survey(0.2F, 8)).watertight);
+  EXPECT_TRUE(choose_support(settings, survey(0.2F, 8)).holes.watertight);
   settings.blend.reset();
   settings.watertight = false;
-  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2)).watertight);
+  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2)).holes.watertight);
 }
 
 TEST(ChooseSupport, NoiseWidensTheSupportAndRefitsNormals) {
   double before = 1.2;
   for (const float noise : {0.06F, 0.08F, 0.1F}) {
-    const SupportChoice choice = choose_support(by_noise(), survey(noise, 2));
-    EXPECT_GT(choice.blend, before);
-    EXPECT_GT(choice.refit, 0);
-    EXPECT_EQ(choice.cell.unit, Length::Unit::sample_radius);
-    before = choice.blend;
+    const StageSettings choice = choose_support(by_noise(), survey(noise, 2));
+    EXPECT_GT(choice.feed.blend, before);
+    EXPECT_GT(choice.refit.support, 0);
+    EXPECT_EQ(choice.feed.cell.unit, Length::Unit::sample_radius);
+    before = choice.feed.blend;
   }
-  EXPECT_EQ(choose_support(by_noise(), survey(1, 2)).blend, before);
+  EXPECT_EQ(choose_support(by_noise(), survey(1, 2)).feed.blend, before);
 }
 
 TEST(ChooseSupport, GivenNumbersStand) {
   SurfaceSettings settings;
   settings.blend = 1.7;
-  EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).blend, 1.7);
-  EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).refit, 0);
-  EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).cell, (Length{0.9, Length::Unit::influence_radius}));
+  EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).feed.blend, 1.7);
+  EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).refit.support, 0);
+  EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).feed.cell, (Length{0.9, Length::Unit::influence_radius}));
   settings.blend.reset();
   settings.refit = 0.0;
   settings.cell = Length{0.5, Length::Unit::world};
-  EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).refit, 0);
-  EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).cell, *settings.cell);
-  EXPECT_GT(choose_support(settings, survey(0.2F, 2)).blend, 2);
-  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2)).thin_cells);
+  EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).refit.support, 0);
+  EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).feed.cell, *settings.cell);
+  EXPECT_GT(choose_support(settings, survey(0.2F, 2)).feed.blend, 2);
+  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2)).feed.thin_cells);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 
 #include "lamina/error.h"
 #include "reconstruct/clouds.h"
+#include "reconstruct/cost.h"
 
 namespace lamina {
 namespace {
@@ -142,13 +143,14 @@ TEST(SurfacePlan, TimeGrowsWithSamplesStepsAndCells) {
     SurfaceSettings s;
     s.blend = 1.2;
     change(s);
-    Resolved r;
-    r.support.blend = *s.blend;
-    r.feed.cell_ratio = 0.9;
-    r.plan.samples = samples;
-    r.plan.radius_median = 1;
-    r.plan.finest_cell = 0.63 * *s.blend;
-    return expected_cpu_seconds(s, r, 0);
+    ReconstructionPlan plan;
+    plan.feed.blend = *s.blend;
+    plan.projection.steps = s.steps;
+    plan.volume = s.volume;
+    plan.samples = samples;
+    plan.radius.median = 1000;
+    plan.lattice.cell = static_cast<std::int32_t>(0.63 * *s.blend * 1000);
+    return expected_cpu_seconds(plan);
   };
   const auto as_it_is = [](auto&) {};
   const double once = seconds(1'000'000, as_it_is);

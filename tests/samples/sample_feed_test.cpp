@@ -55,9 +55,11 @@ Case random_case(std::uint64_t seed) {
          {},
          static_cast<std::int32_t>(between(20, 1500))};
   c.settings.blend = static_cast<float>(between(0.5, 4));
-  c.settings.cell_ratio = between(0.5, 1.2);
-  c.settings.cell_follows_support = random() % 2 == 0;
-  c.settings.fixed_cell = random() % 4 == 0;
+  c.settings.cell.value = between(0.5, 1.2);
+  const bool follows = random() % 2 == 0;
+  c.settings.cell.unit = random() % 4 == 0 ? Length::Unit::world
+                         : follows         ? Length::Unit::influence_radius
+                                           : Length::Unit::sample_radius;
   if (random() % 2 == 0) c.settings.max_radius = static_cast<float>(between(50, 1000));
   c.settings.batch_samples = 1 + random() % 60;
   c.settings.cache_bytes = random() % 2 == 0 ? 1 + random() % 3000 : 64u << 20;
@@ -72,8 +74,8 @@ struct Expected {
 };
 Expected expect_sample(const Case& c, double r) {
   Expected e{r, 0, 0};
-  const double widest = 2.0 * c.lattice.cell_size(c.lattice.levels - 1) / c.settings.cell_ratio /
-                        (c.settings.cell_follows_support ? c.settings.blend : 1.0);
+  const double widest = 2.0 * c.lattice.cell_size(c.lattice.levels - 1) / c.settings.cell_ratio() /
+                        (c.settings.cell_follows_support() ? c.settings.blend : 1.0);
   if (c.settings.max_radius > 0 && r > c.settings.max_radius) {
     e.radius = 0;
     e.left_out = true;
@@ -82,9 +84,9 @@ Expected expect_sample(const Case& c, double r) {
     e.clamped = true;
   }
   e.support = e.radius * c.settings.blend;
-  const double cell = c.settings.cell_ratio * (c.settings.cell_follows_support ? e.support : e.radius);
+  const double cell = c.settings.cell_ratio() * (c.settings.cell_follows_support() ? e.support : e.radius);
   // The coarsest cells that are small enough; where none are, the finest.
-  for (int l = 1; l < c.lattice.levels && !c.settings.fixed_cell && c.lattice.cell_size(l) <= cell; ++l) e.level = l;
+  for (int l = 1; l < c.lattice.levels && !c.settings.fixed_cell() && c.lattice.cell_size(l) <= cell; ++l) e.level = l;
   return e;
 }
 
@@ -102,7 +104,7 @@ void expect_bucket(const Case& c, const LocalSamples& stored, const std::vector<
     const double q =
         e.radius > 0 ? std::pow(c.lattice.cell / e.radius, 2) * (stored.quality.empty() ? 1 : stored.quality[i]) : 0;
     RC_ASSERT(std::abs(b.weight[i] - q) <= 1e-6 * q);
-    const double wanted = c.settings.cell_ratio * (c.settings.cell_follows_support ? e.support : e.radius);
+    const double wanted = c.settings.cell_ratio() * (c.settings.cell_follows_support() ? e.support : e.radius);
     const double cell = c.lattice.cell_size(b.level[i]);
     // Rounding may decide only where a level fits exactly, as for clamped radii.
     RC_ASSERT(b.level[i] == e.level || std::abs(wanted - cell) < 1e-5 * cell ||

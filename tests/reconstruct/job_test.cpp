@@ -1,4 +1,4 @@
-#include "reconstruct/stopwatch.h"
+#include "reconstruct/job.h"
 
 #include <gtest/gtest.h>
 

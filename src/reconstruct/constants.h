@@ -1,0 +1,46 @@
+// Tuned constants of the automatic choice. docs/method.md has them in a table with the models they were confirmed on.
+#pragma once
+
+namespace lamina {
+
+/// H where nobody says another and nothing asks for one.
+inline constexpr double kDefaultBlend = 1.2;
+
+/// Samples this far (radii) from the surface that their neighbours suggest are noisy. Detail that the sampling hardly
+/// resolves looks the same up to 0.05; noise of half a spacing either way has 0.12.
+inline constexpr float kNoisy = 0.05F;
+inline constexpr float kVeryNoisy = 0.1F;
+
+/// H for noisy and for very noisy samples; between them it grows with the noise.
+inline constexpr double kNoisyBlend = 1.75;
+inline constexpr double kVeryNoisyBlend = 2.5;
+
+/// Support (radii) within which noisy normals are fitted again.
+inline constexpr double kNoisyRefit = 4;
+
+/// Radii of an evenly sampled surface: the 99 % quantile is some 2.5 times the 1 % one (cells that the surface clips
+/// give long ones), six to eight where density varies 64 times. Where density varies, the support must bridge wider
+/// gaps.
+inline constexpr float kEven = 3;
+
+/// Largest leaf cell (sample radii) where it is chosen: no more than 1.3 M triangles of a million samples.
+inline constexpr double kChosenCell = 0.892;
+
+/// How far (cells) from its nearest sample a corner keeps a value: less on noise, whose outermost samples would make
+/// sheets of their own; more where cells between two sheets are half as large, so that values reach as far as before.
+inline constexpr float kNoisyBand = 1.25F;
+inline constexpr float kSheetBand = 4;
+
+/// How far (support radii) a corner's projection may lie from its samples' mean, and how many must act, to be trusted.
+inline constexpr float kNoisyTrust = 0.2F;
+inline constexpr float kEvenTrust = 0.25F;
+inline constexpr int kEvenTrustedSamples = 4;
+
+/// The size of most cells in units of the largest the median radius allows: with 0.64 the radii of an evenly sampled
+/// surface (which scatter by 0.75 to 1.25 around their median) all ask for the same level.
+inline constexpr double kMainCell = 0.7;
+
+/// Half the side of a counting cell of 16 samples in radii: two radii wide, with room for scatter.
+inline constexpr double kCountingHalfWidth = 1.15;
+
+}  // namespace lamina

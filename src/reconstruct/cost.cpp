@@ -1,0 +1,175 @@
+#include "reconstruct/cost.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "reconstruct/constants.h"
+
+namespace lamina {
+namespace {
+
+/// Of reading the input, a sample.
+constexpr double kReferenceRead = 80e-9;
+
+/// Side of most cells in radii, where cells follow them.
+double main_cell(const FeedSettings& feed) {
+  return kMainCell * feed.cell_ratio() * (feed.cell_follows_support() ? feed.blend : 1.0);
+}
+
+/// Cells of surface that a sample stands for: a quarter of its radius squared of area.
+double cells_per_sample(const FeedSettings& feed) {
+  if (feed.fixed_cell()) return 1.0;
+  return 0.25 / (main_cell(feed) * main_cell(feed));
+}
+
+/// Faces wait on disk for the vertices. A sample stands for a quarter of its radius squared of surface; a main cell's
+/// worth of surface gives some 3.3 triangles (the cells it cuts, two each), clustering leaves 55 % of them.
+std::uint64_t expected_face_bytes(const ReconstructionPlan& plan) {
+  constexpr double kFaceBytes = 13;
+  const double finest = plan.lattice.cell;
+  const double cell = plan.feed.fixed_cell() ? finest : std::max(finest, main_cell(plan.feed) * plan.radius.median);
+  const double cells =
+      static_cast<double>(plan.samples) * 0.25 * plan.radius.median * plan.radius.median / (cell * cell);
+  return static_cast<std::uint64_t>(kFaceBytes * cells * (plan.cluster == ClusterMode::none ? 3.3 : 1.8));
+}
+
+/// Behind the sweep the store gives its disk back, a file at a time, while the faces grow.
+std::uint64_t expected_disk(const SlabStore& store, std::uint64_t faces) {
+  const std::uint64_t all = store.disk_bytes();
+  return std::min(all + faces, std::max(all, faces) + all / store.files());
+}
+
+/// Samples in the densest layer of a height, from the store's own counts: each bucket's lie evenly between its ends.
+double densest_layer(const SlabStore& store, std::int32_t height) {
+  double most = 0;
+  std::size_t first = 0;
+  for (std::size_t last = 0; last < store.buckets(); ++last) {
+    if (store.count(last) == 0) continue;
+    // A densest layer ends with a bucket, or begins with one; this one ends with `last`.
+    const double end = static_cast<double>(store.z_upper(last)) + 1, begin = end - height;
+    while (first < last && (store.count(first) == 0 || static_cast<double>(store.z_upper(first)) < begin)) ++first;
+    double sum = 0;
+    for (std::size_t b = first; b <= last; ++b) {
+      if (store.count(b) == 0) continue;
+      const auto low = static_cast<double>(store.z_lower(b)), high = static_cast<double>(store.z_upper(b)) + 1;
+      sum += static_cast<double>(store.count(b)) * (high - std::max(low, begin)) / (high - low);
+    }
+    most = std::max(most, sum);
+  }
+  return most;
+}
+
+/// Slabs whose corners have values: those projected ahead of the ones triangulated.
+double slabs_with_values(const ReconstructionPlan& plan) {
+  return reach_of(Stage::project).ahead + static_cast<double>(plan.window);
+}
+
+/// Slabs whose surface waits for the clusters around it: those triangulated below, and the one numbered above.
+double slabs_with_surface(const ReconstructionPlan& plan) {
+  return reach_of(Stage::triangulate).below + reach_of(Stage::number).ahead + static_cast<double>(plan.window);
+}
+
+/// Of --vdb, from samples per slab and cells of surface per sample. Bricks of 8^3 voxels wait until the band around
+/// them is grown, three layers of them; a brick for some 25 cells of surface. Of those written a record remains, and
+/// another while the tiles' signs are found.
+double volume_memory(const ReconstructionPlan& plan, double per_slab) {
+  if (plan.volume.path.empty()) return 0;
+  constexpr double kCellsPerBrick = 25, kPlanes = 24, kBrick = 10.4e3, kRecords = 60, kBuffers = 4e6;
+  const double cells = cells_per_sample(plan.feed);
+  const double extra = plan.attributes.empty() ? 0 : 3 * 2048.0 * static_cast<double>(plan.volume.grids.size());
+  const double per_plane = per_slab * cells / plan.lattice.layers(plan.main_level);
+  const double all = static_cast<double>(plan.samples) * cells;
+  const double bricks = std::min(per_plane * kPlanes, all) / kCellsPerBrick;
+  return bricks * (kBrick + extra) + all / kCellsPerBrick * kRecords + kBuffers;
+}
+
+/// Of fitting normals again, measured with supports of 2 to 8 r: samples within reach of the slab's whose normals are
+/// found, in the order they came and in clumps; the normals until the sweep has passed; bins and rows of tiles.
+double refit_memory(const ReconstructionPlan& plan, double per_step) {
+  if (plan.refit.support <= 0) return 0;
+  constexpr double kHeld = 80, kNormal = 12, kBins = 12e6;
+  const double slab = plan.lattice.slab_height();
+  const double reach = RefitNormals(plan.refit, plan.lattice, select_kernel()).reach();
+  const auto within = [&](double height) { return std::min(per_step * height, static_cast<double>(plan.samples)); };
+  const double slabs_with_normals = reach_of(Stage::mark).ahead - 1 + static_cast<double>(plan.window);
+  return kBins + kHeld * within(2 * reach + slab) + kNormal * within(slabs_with_normals * slab);
+}
+
+double mesh_memory(const ReconstructionPlan& plan, const SlabStore& store, double per_slab) {
+  // Around each cell of surface lie some four and a half corners, and one and a half cells cross it.
+  const auto attributes = static_cast<double>(plan.attributes.size());
+  const double cells = cells_per_sample(plan.feed);
+  const double corner_bytes = 4.5 * cells * (4.0 * (static_cast<double>(kFirstAttribute) + attributes) + 12);
+  const double surface_bytes = 1.5 * cells * (56 + 4.0 * attributes + 2 * 12 + 1.5 * 16);
+  const double window = per_slab * (slabs_with_values(plan) * corner_bytes + slabs_with_surface(plan) * surface_bytes);
+  const double cached = std::min(static_cast<double>(plan.feed.cache_bytes),
+                                 static_cast<double>(store.total()) * (37 + 4.0 * attributes));
+  constexpr double kProgram = 60e6;
+  // What the window's count leaves out - counting cells, clustering, bins, and the allocator's gaps - grows with it,
+  // and faster.
+  constexpr double kPart = 0.158, kGrowth = 1.58;
+  const double rest = 1e6 * kPart * std::pow(1e-6 * window, kGrowth);
+  return kProgram + cached + rest + refit_memory(plan, per_slab / plan.lattice.slab_height());
+}
+
+}  // namespace
+
+std::uint64_t expected_mesh_memory(const ReconstructionPlan& plan, const SlabStore& store) {
+  return static_cast<std::uint64_t>(mesh_memory(plan, store, densest_layer(store, plan.lattice.slab_height())));
+}
+
+std::uint64_t table_bytes(const ReconstructionPlan& plan, const SlabStore& store) {
+  double tallest = 0;
+  for (std::size_t b = 0; b < store.buckets(); ++b) {
+    if (store.count(b) > 0) tallest = std::max(tallest, static_cast<double>(store.z_upper(b)) - store.z_lower(b));
+  }
+  constexpr double kLargestTable = 1 << 22;
+  double entries = 0;  // of a slab
+  for (int level = 0; level < plan.lattice.levels; ++level) {
+    const double block = 8.0 * plan.lattice.cell_size(level);
+    const double table = (static_cast<double>(plan.extent.x_max) - plan.extent.x_min + 3 * block) / block *
+                         (static_cast<double>(plan.extent.y_max) - plan.extent.y_min + 3 * block) / block;
+    if (table <= kLargestTable) entries += table * plan.lattice.layers(level) / 8;
+  }
+  return static_cast<std::uint64_t>(tallest / plan.lattice.slab_height() * entries * sizeof(void*));
+}
+
+ExpectedCost expected_cost(const ReconstructionPlan& plan, const Ingested& cloud) {
+  const SlabStore& store = cloud.store;
+  const double per_slab = densest_layer(store, plan.lattice.slab_height());
+  ExpectedCost out;
+  out.memory = static_cast<std::uint64_t>(mesh_memory(plan, store, per_slab) + volume_memory(plan, per_slab)) +
+               table_bytes(plan, store);
+  out.disk = expected_disk(store, expected_face_bytes(plan));
+  out.cpu_seconds = expected_cpu_seconds(plan);
+  out.reading_seconds = kReferenceRead * static_cast<double>(plan.samples);
+  return out;
+}
+
+double expected_cpu_seconds(const ReconstructionPlan& plan) {
+  // Seconds a sample: read and stored, counted, marked, gathered for its tiles; its share of the sums, by projection
+  // steps; and per cell of surface, which a sample gives some: refined, numbered, triangulated, clustered, written.
+  constexpr double kSample = 230e-9;
+  constexpr double kPerAttribute = 45e-9;
+  constexpr double kSums = 300e-9;
+  constexpr double kCell = 1190e-9;
+  constexpr double kRefit = 550e-9, kRefitSums = 30e-9;  // --refit: each sample, and by the square of the support
+  constexpr double kVoxels = 150e-9;                     // --vdb: for each voxel of the band's half width and two more
+  constexpr double kStep = 0.75;                         // a further projection step against the first
+  constexpr double kSupport = 1 / 0.63;                  // influence radius of a main cell, cells
+  const double finest = plan.lattice.cell;
+  const double cell = plan.feed.fixed_cell() ? finest : std::max(finest, main_cell(plan.feed) * plan.radius.median);
+  const double wider = std::max(1.0, plan.feed.blend * plan.radius.median / cell / kSupport);
+  const double cells = 0.25 * plan.radius.median * plan.radius.median / (cell * cell);
+  constexpr double kUsualSteps = 1.2;  // more than the first, where corners say how many
+  const bool by_corner = plan.projection.tolerance > 0;
+  const double further = by_corner ? kUsualSteps : plan.projection.steps - 1;
+  const double sums = kSums * wider * wider * (1 + kStep * further) * (plan.projection.centres ? 2 : 1);
+  const double volume = plan.volume.path.empty() ? 0 : kVoxels * (2 + plan.volume.band);
+  const double support = plan.refit.support;
+  const double refit = support > 0 ? kRefit + kRefitSums * support * support : 0;
+  const double attributes = kPerAttribute * static_cast<double>(plan.attributes.size());
+  return static_cast<double>(plan.samples) * (kSample + attributes + refit + sums + (kCell + volume) * cells);
+}
+
+}  // namespace lamina

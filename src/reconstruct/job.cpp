@@ -1,0 +1,207 @@
+#include "reconstruct/job.h"
+
+#include <fmt/format.h>
+#include <sys/resource.h>
+#include <tbb/global_control.h>
+#include <tbb/task_arena.h>
+
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <optional>
+#include <utility>
+
+#include "lamina/error.h"
+#include "mls/refit_normals.h"
+#include "reconstruct/choose_support.h"
+#include "reconstruct/cost.h"
+#include "reconstruct/pipeline.h"
+
+namespace lamina {
+namespace {
+
+/// Of the program alone: getrusage() counts what its parent held when it was started, too.
+std::uint64_t peak_memory() {
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;) {
+    std::uint64_t kilobytes = 0;
+    if (word == "VmHWM:" && status >> kilobytes) return kilobytes * 1024;
+  }
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<std::uint64_t>(usage.ru_maxrss) * 1024;
+}
+
+/// Normals that were not oriented alike tear the surface apart without any other sign.
+void warn_of_contradictions(const SurfaceStats& stats, const std::string& input, const RunContext& run) {
+  constexpr double kMuch = 0.05;  // scans of thin things have a percent
+  const double share =
+      stats.corners_seen == 0 ? 0.0 : static_cast<double>(stats.corners_torn) / static_cast<double>(stats.corners_seen);
+  if (share < kMuch && stats.torn_share < 4 * kMuch) return;
+  run.warn(
+      fmt::format("{}: normals contradict each other around {:.0f} % of the surface, {:.0f} % in slab {}: orient "
+                  "them alike before (lamina normal --reorient), or expect holes and double sheets",
+                  input, 100 * share, 100 * stats.torn_share, stats.torn_slab));
+}
+
+/// A few far samples can stretch the lattice until no cell is small enough for the others.
+bool is_out_of_reach(const SurfacePlan& plan) {
+  // The lattice addresses a million cells either way from its middle: farther samples set the size of the finest.
+  constexpr double kManyCells = 1 << 19;
+  const double largest = *std::max_element(plan.extent.begin(), plan.extent.end());
+  const bool unresolved =
+      largest > kManyCells * plan.finest_cell && plan.finest_cell > 2 * plan.blend * plan.radius_high;
+  // A surface has many samples in a slab; a sweep through nothing but gaps takes minutes and finds none.
+  constexpr std::uint64_t kSlabsPerSample = 8;
+  constexpr std::uint64_t kSlabsAnyway = 1000;
+  const auto slabs = static_cast<std::uint64_t>(plan.slabs);
+  return unresolved || (slabs > kSlabsAnyway && slabs / kSlabsPerSample > plan.samples);
+}
+
+/// Options that lower the memory a run takes, mildest first, in words and as settings: what the user gets who adds
+/// them. A larger support has larger cells unless these follow r.
+std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceSettings& settings,
+                                                                  const SurfacePlan& plan) {
+  std::vector<std::pair<std::string, SurfaceSettings>> runs;
+  SurfaceSettings s = settings;
+  std::string base;
+  if (s.window > 1) {
+    s.window = 1;
+    base = "--window 1";
+    runs.emplace_back(base, s);
+    base += " ";
+  }
+  // A lower slab; what is sparser than the coarsest level serves comes out thinner.
+  constexpr int kFewestLevels = 3;
+  for (int levels = plan.levels - 1; levels >= kFewestLevels; --levels) {
+    SurfaceSettings fewer = s;
+    fewer.levels = levels;
+    runs.emplace_back(fmt::format("{}--levels {}", base, levels), fewer);
+  }
+  for (const double factor : {1.25, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0}) {
+    SurfaceSettings coarser = s;
+    if (plan.cell.unit == Length::Unit::influence_radius) {
+      coarser.blend = plan.blend * factor;
+      if (*coarser.blend <= 64) runs.emplace_back(fmt::format("{}--blend {:g}", base, *coarser.blend), coarser);
+    } else {
+      coarser.cell = Length{plan.cell.value * factor, plan.cell.unit};
+      runs.emplace_back(fmt::format("{}--cell {}", base, to_string(*coarser.cell)), coarser);
+    }
+  }
+  return runs;
+}
+
+[[noreturn]] void refuse_memory(const SurfaceSettings& settings, const StoredCloud& cloud, const RadiusSurvey& survey,
+                                const SurfacePlan& plan, std::uint64_t allowed) {
+  const auto mb = [](std::uint64_t bytes) { return static_cast<double>(bytes) / 1e6; };
+  std::string remedy;
+  for (const auto& [words, changed] : smaller_runs(settings, plan)) {
+    const std::uint64_t bytes = make_plan(changed, cloud, survey).expected.memory;
+    if (bytes > allowed) continue;
+    remedy = fmt::format("; {} would fit ({:.0f} MB)", words, mb(bytes));
+    break;
+  }
+  if (remedy.empty()) remedy = "; give it more, or cut the cloud";
+  throw Error(ExitCode::budget, fmt::format("{}: needs about {:.0f} MB of memory, --max-memory allows {:.0f} MB{}",
+                                            input_name(settings), mb(plan.memory_bytes), mb(allowed), remedy));
+}
+
+/// How long the whole run will take, judging by how fast this machine has read the input.
+double expected_seconds(const ReconstructionPlan& plan, const PointSourceInfo& source, int threads, const Job& job) {
+  double slowness = 1;
+  constexpr std::uint64_t kEnough = 1'000'000;  // fewer are read too fast to tell
+  for (const StageTime& s : job.watch.stages()) {
+    // Formats that cost more to read say little of the rest.
+    if (s.stage == "store" && source.random_access && plan.samples >= kEnough) {
+      // Half of reading is the system's copying, which other programs disturb more than computing.
+      slowness = std::clamp(std::sqrt(s.cpu / plan.expected.reading_seconds), 0.7, 1.5);
+    }
+  }
+  constexpr double kEfficiency = 0.92;  // of each thread beyond the first
+  const double left = plan.expected.cpu_seconds - plan.expected.reading_seconds;
+  return job.elapsed() + slowness * left / (1 + kEfficiency * (threads - 1));
+}
+
+void note_input(const StoredCloud& cloud, SurfaceStats& stats) {
+  const Census& census = cloud.ingested.census;
+  stats.samples_read = cloud.info.count;
+  stats.replaced_attributes = census.unusable_attributes;
+  for (int k = 1; k < kDefects; ++k) {
+    if (census.rejected[k] > 0)
+      stats.rejected.push_back({describe(static_cast<Defect>(k)), census.rejected[k], census.first_row[k]});
+  }
+}
+
+}  // namespace
+
+void Job::finish() {
+  stats.stages = watch.stages();
+  const Stopwatch::Moment ended = Stopwatch::now();
+  stats.wall = ended.wall - began.wall;
+  stats.cpu = ended.cpu - began.cpu;
+  stats.peak_memory = peak_memory();
+}
+
+void run_in_arena(const RunContext& run, const std::function<void()>& work) {
+  const int threads = run.threads > 0 ? run.threads : tbb::this_task_arena::max_concurrency();
+  const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
+  tbb::task_arena arena(threads);
+  arena.execute(work);
+}
+
+ReconstructionPlan plan_surface(const SurfaceSettings& settings, const StoredCloud& cloud, Job& job) {
+  RadiusSurvey survey;
+  std::optional<ReconstructionPlan> made;
+  job.watch.time("plan", [&] {
+    survey = cloud.radii ? *cloud.radii : survey_radii(cloud.ingested.store, kSurveySamples, settings.density);
+    made.emplace(make_plan(settings, cloud, survey));
+  });
+  const ReconstructionPlan& plan = *made;
+  SurfacePlan& told = job.stats.plan;
+  told = summary_of(plan);
+  told.threads = tbb::this_task_arena::max_concurrency();
+  told.seconds = expected_seconds(plan, cloud.info, told.threads, job);
+  note_input(cloud, job.stats);
+  job.run.info(describe(told));
+  if (const std::string choice = describe_choice(settings, told); !choice.empty()) job.run.info(choice);
+  constexpr std::uint64_t kLargestTables = std::uint64_t{1} << 30;  // a scan of 380 million samples needs a few MB
+  if (is_out_of_reach(told) || table_bytes(plan, cloud.ingested.store) > kLargestTables) {
+    throw Error(ExitCode::empty,
+                fmt::format("{}: some of the {} samples lie so far away from the others ({:.3g}, r {:.3g}) that the "
+                            "lattice cannot hold both; remove them",
+                            plan.input, told.samples, *std::max_element(told.extent.begin(), told.extent.end()),
+                            told.radius_median));
+  }
+  if (job.run.max_memory > 0 && told.memory_bytes > job.run.max_memory)
+    refuse_memory(settings, cloud, survey, told, job.run.max_memory);
+  job.stats.disk_bytes = cloud.ingested.store.disk_bytes();
+  return std::move(*made);
+}
+
+void sweep(const ReconstructionPlan& plan, StoredCloud& cloud, const SlabSpan& span, const SweepOutput& output,
+           Job& job) {
+  SampleFeed feed(cloud.ingested.store, plan.lattice, plan.feed, plan.radii, plan.given_radii);
+  std::optional<RefitNormals> refit;
+  if (plan.refit.support > 0) {
+    refit.emplace(plan.refit, plan.lattice, select_kernel());
+    feed.filter_normals(*refit);
+  }
+  Pipeline pipeline(plan, feed, span, output);
+  pipeline.run(job.run, job.watch);
+  pipeline.report(job.stats);
+  warn_of_contradictions(job.stats, plan.input, job.run);
+  if (feed.counts().undersampled > 0) {
+    job.stats.rejected.push_back({"radius above --max-radius", feed.counts().undersampled, std::nullopt});
+    job.run.info(fmt::format("{} of {} samples discarded as undersampled: radius above --max-radius",
+                             feed.counts().undersampled, cloud.info.count));
+  }
+}
+
+void no_surface(const ReconstructionPlan& plan) {
+  throw Error(ExitCode::empty,
+              fmt::format("{}: no surface came out of {} samples; they lie too far apart for their radii, or on no "
+                          "surface at all (try --blend or --particlescale above 1)",
+                          plan.input, plan.samples));
+}
+
+}  // namespace lamina

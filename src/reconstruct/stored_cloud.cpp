@@ -1,0 +1,237 @@
+#include "reconstruct/stored_cloud.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <utility>
+
+#include "base/descriptor.h"
+#include "lamina/error.h"
+#include "reconstruct/job.h"
+#include "reconstruct/kept_input.h"
+#include "samples/clean_ingested.h"
+#include "store/survey.h"
+
+namespace lamina {
+namespace {
+
+constexpr std::size_t kRowsAtOnce = std::size_t{1} << 15;
+
+/// Normals that say nothing: what a plan comes to does not depend on them.
+class PlannedNormals final : public PointSource {
+ public:
+  explicit PlannedNormals(std::unique_ptr<PointSource> source) : source_(std::move(source)) {
+    info_ = source_->info();
+    info_.has_normals = true;
+  }
+  void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
+    source_->read(first, count, out);
+    out.nx.assign(out.size(), 0);
+    out.ny.assign(out.size(), 0);
+    out.nz.assign(out.size(), 1);
+  }
+
+ private:
+  std::unique_ptr<PointSource> source_;
+};
+
+struct Usable {
+  bool any = false, all = true;
+};
+
+/// Looks until it knows: rows of every kind, or all of them.
+Usable look_for_normals(PointSource& source, const RunContext& run) {
+  Usable usable;
+  SampleBatch batch;
+  for (std::uint64_t first = 0; first < source.info().count; first += kRowsAtOnce) {
+    if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+    source.read(first, kRowsAtOnce, batch);
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      const bool missing = defect_of(batch, i) == Defect::normal;
+      usable.any = usable.any || !missing;
+      usable.all = usable.all && !missing;
+    }
+    if (usable.any && !usable.all) break;
+  }
+  return usable;
+}
+
+/// Fills the store. A large input is read once, in a frame chosen by a part of its rows; twice where samples lie
+/// outside what these promised.
+StoredCloud ingest_all(PointSource& source, const SurfaceSettings& settings, const StorePlace& place, Job& job) {
+  require_samples(source.info());
+  const RowPick& pick = settings.clean.pick;
+  std::optional<Survey> survey;
+  const auto fill = [&] {
+    const Frame frame = choose_frame(*survey, chosen_frame(settings));
+    std::optional<Ingested> ingested;
+    job.watch.time("store", [&] {
+      ingested.emplace(ingest(source, *survey, frame, settings.radius_scale, place, job.run, pick));
+    });
+    return StoredCloud{source.info(), frame, std::move(*ingested)};
+  };
+  job.watch.time("survey", [&] { survey = survey_part(source, pick); });
+  if (survey) {
+    StoredCloud cloud = fill();
+    if (cloud.ingested.complete) {
+      judge(cloud.ingested.census, source.info(), settings.bad_samples, job.run);
+      return cloud;
+    }
+  }
+  job.watch.time("survey", [&] { survey = survey_input(source, settings.bad_samples, job.run, pick); });
+  return fill();
+}
+
+/// What is to be left out before anything is measured.
+void clean_cloud(StoredCloud& cloud, const SurfaceSettings& settings, const std::string& tmp, Job& job) {
+  Ingested& in = cloud.ingested;
+  CleanCounts& counts = job.stats.cleaned;
+  counts.clipped = in.census.clipped;
+  counts.skipped = in.census.skipped;
+  if (settings.clean.looks_around()) {
+    job.watch.time("clean", [&] {
+      clean_ingested(in, settings.clean, cloud.frame.step, input_name(settings), tmp, counts, job.run);
+    });
+  }
+  if (const std::string said = describe(counts); !said.empty())
+    job.run.info(fmt::format("{} of {} samples left: {}", in.store.total(), cloud.info.count, said));
+}
+
+}  // namespace
+
+std::string temporary_directory(const SurfaceSettings& settings, const RunContext& run) {
+  if (!run.tmp_dir.empty()) return run.tmp_dir;
+  std::error_code ignored;
+  const auto kind = std::filesystem::status(settings.output, ignored).type();
+  const bool beside = kind == std::filesystem::file_type::regular || kind == std::filesystem::file_type::not_found;
+  if (settings.output.empty() || settings.output == "-" || !beside) return system_tmp_dir();
+  const std::string parent = std::filesystem::path(settings.output).parent_path().string();
+  return parent.empty() ? "." : parent;
+}
+
+std::vector<std::string> input_names(const SurfaceSettings& settings) {
+  std::vector<std::string> names{settings.input};
+  names.insert(names.end(), settings.more_inputs.begin(), settings.more_inputs.end());
+  return names;
+}
+
+std::string input_name(const SurfaceSettings& settings) {
+  return settings.input == "-" ? "standard input" : settings.input;
+}
+
+bool names_kept_input(const SurfaceSettings& settings) {
+  return settings.more_inputs.empty() && is_kept_input(settings.input);
+}
+
+void require_two_files(const SurfaceSettings& settings) {
+  std::error_code ignored;
+  const bool kept = names_kept_input(settings);
+  const std::vector<PointInput> inputs = kept ? std::vector<PointInput>{} : expand_inputs(input_names(settings));
+  const auto is_input = [&](const std::string& name) {
+    return std::filesystem::is_regular_file(name, ignored) &&
+           std::any_of(inputs.begin(), inputs.end(),
+                       [&](const PointInput& input) { return std::filesystem::equivalent(input.path, name, ignored); });
+  };
+  for (const std::string& grids : {settings.volume.path, settings.volume.points}) {
+    if (grids.empty()) continue;
+    if (grids == settings.output || is_input(grids))
+      throw Error(ExitCode::usage, fmt::format("{}: is named twice; give the grids a file of their own", grids));
+  }
+  if (settings.output == "-" || settings.output.empty()) return;
+  if (is_input(settings.output)) {
+    throw Error(ExitCode::usage,
+                fmt::format("{}: is input and output; give the mesh another name with --output", settings.output));
+  }
+}
+
+FrameMode chosen_frame(const SurfaceSettings& settings) {
+  return settings.frame.value_or(settings.volume.wanted() ? FrameMode::axis : FrameMode::pca);
+}
+
+std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const std::string& tmp_dir,
+                                         const RunContext& run) {
+  std::unique_ptr<PointSource> source = open_points(input_names(settings), {tmp_dir, settings.columns});
+  const PointSourceInfo& info = source->info();
+  for (const std::string& remark : info.remarks) run.info(remark);
+  if (info.geographic) {
+    throw Error(ExitCode::unreadable,
+                fmt::format("{}: x and y are degrees of longitude and latitude, in which no distance can be measured; "
+                            "project them to metres first, for example to the UTM zone: pdal translate IN.las OUT.las "
+                            "reprojection --filters.reprojection.out_srs=EPSG:326ZONE",
+                            info.path));
+  }
+  return source;
+}
+
+std::unique_ptr<PointSource> choose_normals(std::unique_ptr<PointSource> source, const SurfaceSettings& settings,
+                                            const std::string& tmp_dir, Job& job) {
+  if (settings.normals == NormalsChoice::file || source->info().count == 0) return source;
+  NormalsSettings search = settings.normal_search;
+  search.bad_samples = settings.bad_samples;
+  search.mode = NormalsMode::estimate;
+  if (settings.normals == NormalsChoice::automatic && source->info().has_normals) {
+    const Usable usable = look_for_normals(*source, job.run);
+    if (usable.all) return source;
+    if (usable.any) search.mode = NormalsMode::complete;
+  }
+  if (settings.dry_run) return std::make_unique<PlannedNormals>(std::move(source));
+  RunContext here = job.run;
+  here.tmp_dir = tmp_dir;
+  here.threads = 0;  // this runs on the caller's already
+  const std::string path = source->info().path == "-" ? "standard input" : source->info().path;
+  NormalsReport& report = job.stats.normals.emplace();
+  std::unique_ptr<PointSource> found = with_normals(std::move(source), search, report, here);
+  job.run.info(describe(report));
+  warn_of_conflicts(report, path, job.run);
+  return found;
+}
+
+std::string normals_words(const SurfaceSettings& settings) {
+  if (settings.normals == NormalsChoice::file) return "file";
+  // Every setting by name: one that is added must be dealt with here, or this does not compile.
+  const auto& [mode, k, radius, viewpoints, scanners, pose_origins, flip, bad_samples] = settings.normal_search;
+  (void)mode, (void)bad_samples;
+  std::string words = settings.normals == NormalsChoice::automatic ? "auto" : "estimate";
+  words += fmt::format(" k {} radius {} scanners {} poses {} flip {}", k, radius, scanners, pose_origins, flip);
+  for (const Viewpoint& v : viewpoints)
+    words += fmt::format(" {} {} {} {}", v.direction ? "towards" : "from", v.at[0], v.at[1], v.at[2]);
+  return words;
+}
+
+StoredCloud read_cloud(const SurfaceSettings& settings, const StorePlace& place, Job& job) {
+  if (names_kept_input(settings) && !place.keep) return open_kept_input(settings.input, settings);
+  const std::string scratch = place.keep ? temporary_directory(settings, job.run) : place.directory;
+  std::unique_ptr<PointSource> source = open_inputs(settings, scratch, job.run);
+  if (settings.normals != NormalsChoice::file) {
+    job.watch.time("normals", [&] { source = choose_normals(std::move(source), settings, scratch, job); });
+  }
+  StoredCloud cloud = ingest_all(*source, settings, place, job);
+  clean_cloud(cloud, settings, scratch, job);
+  return cloud;
+}
+
+void shift_to_origin(StoredCloud& cloud) {
+  Census& census = cloud.ingested.census;
+  const Eigen::Vector3d extent = census.high - census.low;
+  const double power = std::floor(std::log10(extent.maxCoeff()));
+  // Whole powers of ten are exact doubles, their inverses are not: fractions are made by dividing.
+  const double whole = std::pow(10.0, std::abs(power));
+  std::array<double, 3>& shift = cloud.shift.emplace();
+  for (int k = 0; k < 3; ++k) {
+    const double middle = census.low[k] + 0.5 * extent[k];
+    const double rounded = power < 0 ? std::round(middle * whole) / whole : std::round(middle / whole) * whole;
+    shift[static_cast<std::size_t>(k)] = std::isfinite(rounded) ? rounded + 0.0 : 0.0;
+  }
+  const Eigen::Vector3d by(shift[0], shift[1], shift[2]);
+  cloud.frame.origin -= by;
+  census.low -= by;
+  census.high -= by;
+}
+
+std::string shift_text(const std::array<double, 3>& shift) {
+  return fmt::format("{} {} {}", shift[0], shift[1], shift[2]);
+}
+
+}  // namespace lamina

@@ -1,0 +1,73 @@
+// The input of a reconstruction: points opened, their normals found, cleaned and put into a store.
+#pragma once
+#include <array>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "lamina/frame.h"
+#include "lamina/points.h"
+#include "lamina/run.h"
+#include "lamina/surface.h"
+#include "samples/radii.h"
+#include "store/ingest.h"
+
+namespace lamina {
+
+struct Job;
+
+/// A cloud in its store, with what is known of where it came from.
+struct StoredCloud {
+  PointSourceInfo info;
+  Frame frame;
+  Ingested ingested;
+  std::optional<RadiusSurvey> radii{};           ///< where they have been surveyed already
+  std::optional<std::array<double, 3>> shift{};  ///< what comes out is less this: SurfaceSettings::local
+};
+
+/// Files and folders that the settings name, as one list.
+std::vector<std::string> input_names(const SurfaceSettings& settings);
+
+/// What messages call the input.
+std::string input_name(const SurfaceSettings& settings);
+
+/// Whether the settings name one input, and that is a kept one (kept_input.h).
+bool names_kept_input(const SurfaceSettings& settings);
+
+/// Folder for temporary files: next to the output unless told otherwise; the system's for standard output, pipes and
+/// devices.
+std::string temporary_directory(const SurfaceSettings& settings, const RunContext& run);
+
+/// A mesh in the place of its points would cost the user the scan. Throws Error(usage) where an output is one of the
+/// inputs, or two outputs are one file.
+void require_two_files(const SurfaceSettings& settings);
+
+/// The frame asked for: the settings' own, else what suits what is wanted.
+FrameMode chosen_frame(const SurfaceSettings& settings);
+
+/// Opens everything named, as one stream; says what the readers found worth saying. Throws Error(unreadable) for
+/// coordinates in degrees.
+std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const std::string& tmp_dir,
+                                         const RunContext& run);
+
+/// The source itself where its normals do, else with the ones found as settings.normals asks (job.stats.normals). In a
+/// dry run, which asks for nothing but the plan, they are made up. Says what was found and warns of what is wrong.
+std::unique_ptr<PointSource> choose_normals(std::unique_ptr<PointSource> source, const SurfaceSettings& settings,
+                                            const std::string& tmp_dir, Job& job);
+
+/// What the settings ask of normals in words: others where other normals come out.
+std::string normals_words(const SurfaceSettings& settings);
+
+/// The settings' input: a kept one is opened, others are read into a store at `place`. Normals are found and samples
+/// left out on the way where the settings ask for it.
+StoredCloud read_cloud(const SurfaceSettings& settings, const StorePlace& place, Job& job);
+
+/// Everything that comes out, from here on, is less the middle of the cloud, rounded to a power of ten near its size:
+/// few digits for people to copy.
+void shift_to_origin(StoredCloud& cloud);
+
+/// "4468300 847200 0", every digit of the numbers.
+std::string shift_text(const std::array<double, 3>& shift);
+
+}  // namespace lamina
