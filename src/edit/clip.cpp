@@ -9,7 +9,6 @@
 #include <unordered_map>
 
 #include "base/with_threads.h"
-#include "edit/compact.h"
 #include "lamina/edit_points.h"
 #include "lamina/error.h"
 #include "meshes/vec3.h"
@@ -130,12 +129,41 @@ void cut_along(Pieces& pieces, const HalfSpace& face, Keep keep) {
   pieces.inside = std::move(inside);
 }
 
+/// The vertices v with keep[v] != 0 in order, and the triangles all of whose corners stay.
+TriangleMesh only_vertices(const TriangleMesh& mesh, const std::vector<std::uint8_t>& keep) {
+  TriangleMesh out;
+  out.layout = mesh.layout;
+  out.attributes.resize(mesh.attributes.size());
+  std::vector<std::uint32_t> number(mesh.positions.size());
+  for (std::size_t v = 0; v < keep.size(); ++v) {
+    if (keep[v] == 0) continue;
+    number[v] = static_cast<std::uint32_t>(out.positions.size());
+    out.positions.push_back(mesh.positions[v]);
+    if (!mesh.normals.empty()) out.normals.push_back(mesh.normals[v]);
+    for (std::size_t a = 0; a < mesh.attributes.size(); ++a) out.attributes[a].push_back(mesh.attributes[a][v]);
+  }
+  for (const auto& t : mesh.triangles) {
+    if (std::all_of(t.begin(), t.end(), [&](auto v) { return keep[v] != 0; }))
+      out.triangles.push_back({number[t[0]], number[t[1]], number[t[2]]});
+  }
+  return out;
+}
+
+/// Without the vertices that are in no triangle.
+TriangleMesh without_unused_vertices(TriangleMesh mesh) {
+  std::vector<std::uint8_t> used(mesh.positions.size());
+  for (const auto& t : mesh.triangles)
+    for (const auto v : t) used[v] = 1;
+  if (std::find(used.begin(), used.end(), 0) == used.end()) return mesh;
+  return only_vertices(mesh, used);
+}
+
 TriangleMesh clip_vertices(const TriangleMesh& mesh, const ClipRegion& region, Keep keep) {
   std::vector<std::uint8_t> kept(mesh.positions.size());
   for (std::size_t v = 0; v < kept.size(); ++v) {
     kept[v] = contains(region, mesh.positions[v]) == (keep == Keep::inside) ? 1 : 0;
   }
-  return edit::only_vertices(mesh, kept);
+  return only_vertices(mesh, kept);
 }
 
 }  // namespace
@@ -196,7 +224,7 @@ TriangleMesh clip_mesh(const TriangleMesh& mesh, const ClipRegion& region, Keep 
     }
     pieces.mesh.triangles.resize(kept);
   }
-  return edit::without_unused_vertices(std::move(pieces.mesh));
+  return without_unused_vertices(std::move(pieces.mesh));
 }
 
 }  // namespace lamina

@@ -1,4 +1,5 @@
-// Nearest and near points: a balanced kd-tree over a set of positions.
+// Nearest and near points: a balanced kd-tree over a set of positions in double (normals/sample_tree.h is the one for k
+// nearest samples of a window).
 #pragma once
 #include <array>
 #include <cstdint>

@@ -4,15 +4,19 @@
 #include <fmt/ranges.h>
 
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "base/descriptor.h"
 #include "base/memory_limit.h"
 #include "edit/batch_pipe.h"
-#include "edit/extent.h"
 #include "edit/record_sorter.h"
 #include "lamina/error.h"
 #include "points/row_codec.h"
@@ -37,6 +41,51 @@ std::uint64_t spread(std::uint64_t v) {
   return (v | v << 2) & 0x1249249249249249ULL;
 }
 
+/// Where a cloud lies: of the rows with finite positions; without any, count is 0 and the box is empty.
+struct Extent {
+  std::uint64_t count = 0;
+  Eigen::Vector3d low, high;
+  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+};
+
+/// Sums are made of batches in order, about the first point: the same bits for any number of threads, and no
+/// cancellation far from the origin.
+Extent find_extent(PointSource& source, const RunContext& run) {
+  Extent e;
+  e.low.setConstant(std::numeric_limits<double>::infinity());
+  e.high = -e.low;
+  Eigen::Vector3d pivot = Eigen::Vector3d::Zero(), sum = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
+  edit::for_each_batch(
+      source, "survey", run, [](SampleBatch&) {},
+      [&](const SampleBatch& b) {
+        for (std::size_t i = 0; i < b.size(); ++i) {
+          const Eigen::Vector3d p(b.x[i], b.y[i], b.z[i]);
+          if (!p.allFinite()) continue;
+          if (e.count++ == 0) pivot = p;
+          e.low = e.low.cwiseMin(p);
+          e.high = e.high.cwiseMax(p);
+          const Eigen::Vector3d d = p - pivot;
+          sum += d;
+          products += d * d.transpose();
+        }
+      });
+  if (e.count == 0) return e;
+  const auto n = static_cast<double>(e.count);
+  e.covariance = products / n - (sum / n) * (sum / n).transpose();
+  return e;
+}
+
+/// Unit vector of the greatest spread, its largest component positive.
+Eigen::Vector3d dominant_axis(const Extent& extent) {
+  if (!extent.covariance.allFinite()) return Eigen::Vector3d::UnitZ();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(extent.covariance);
+  Eigen::Vector3d axis = solver.eigenvectors().col(2);
+  int largest = 0;
+  axis.cwiseAbs().maxCoeff(&largest);
+  return axis[largest] < 0 ? Eigen::Vector3d(-axis) : axis;
+}
+
 /// Keys of a batch's rows.
 class Keys {
  public:
@@ -44,11 +93,11 @@ class Keys {
     if (settings.key == SortKey::attribute) {
       find_attribute(source.info());
     } else if (settings.key == SortKey::sweep || settings.key == SortKey::spatial) {
-      const edit::Extent extent = edit::find_extent(source, run);
+      const Extent extent = find_extent(source, run);
       low_ = extent.low;
       const double side = (extent.high - extent.low).maxCoeff();
       per_cell_ = side > 0 ? ((1 << 21) - 1) / side : 0;
-      if (settings.key == SortKey::sweep) direction_ = edit::dominant_axis(extent);
+      if (settings.key == SortKey::sweep) direction_ = dominant_axis(extent);
     }
   }
 

@@ -83,19 +83,14 @@ DistanceStats measure_side(const TriangleMesh& from, const TriangleMesh& to, con
 }
 
 double diagonal_of(const TriangleMesh& mesh) {
-  std::optional<std::array<Vec3, 2>> box;
-  const auto add = [&](const Vec3& p) {
-    if (!box) box = {p, p};
-    for (std::size_t k = 0; k < 3; ++k) {
-      (*box)[0][k] = std::min((*box)[0][k], p[k]);
-      (*box)[1][k] = std::max((*box)[1][k], p[k]);
-    }
-  };
-  for (const auto& t : mesh.triangles)
-    for (const auto v : t) add(mesh.positions[v]);
-  if (mesh.triangles.empty())
-    for (const auto& p : mesh.positions) add(p);
-  return box ? norm((*box)[1] - (*box)[0]) : 0;
+  if (mesh.positions.empty()) return 0;
+  measure::Bounds box{mesh.positions[0], mesh.positions[0]};
+  if (!mesh.triangles.empty()) {
+    box = measure::triangle_bounds(mesh);
+  } else {
+    for (const auto& p : mesh.positions) widen(box, p);
+  }
+  return norm(box.high - box.low);
 }
 
 }  // namespace

@@ -28,4 +28,15 @@ EdgeTable::EdgeTable(const TriangleMesh& mesh) : start_(mesh.positions.size() + 
   });
 }
 
+std::vector<Edge> boundary_edges(const TriangleMesh& mesh) {
+  std::vector<Edge> edges;
+  EdgeTable(mesh).for_each_edge([&](std::span<const Side> sides) {
+    if (sides.size() != 1) return;
+    const auto& t = mesh.triangles[sides[0].corner / 3];
+    const auto [low, high] = std::minmax(t[sides[0].corner % 3], t[sides[0].next_corner() % 3]);
+    edges.push_back({low, high});
+  });
+  return edges;
+}
+
 }  // namespace lamina::measure

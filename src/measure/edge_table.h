@@ -1,5 +1,6 @@
 // The edges of a triangle mesh with the triangle sides that run along each.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -7,6 +8,9 @@
 #include "lamina/mesh.h"
 
 namespace lamina::measure {
+
+/// Vertex numbers, ascending.
+using Edge = std::array<std::uint32_t, 2>;
 
 /// True when the triangle names a vertex twice.
 inline bool repeats_index(const std::array<std::uint32_t, 3>& t) {
@@ -41,5 +45,8 @@ class EdgeTable {
   std::vector<std::uint32_t> start_;  ///< first side of each lower vertex
   std::vector<Side> sides_;
 };
+
+/// The edges of only one triangle, in ascending order.
+std::vector<Edge> boundary_edges(const TriangleMesh& mesh);
 
 }  // namespace lamina::measure

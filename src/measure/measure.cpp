@@ -7,9 +7,9 @@
 #include <limits>
 #include <numbers>
 
+#include "base/union_find.h"
 #include "lamina/error.h"
 #include "measure/edge_table.h"
-#include "measure/union_find.h"
 #include "meshes/vec3.h"
 
 namespace lamina {

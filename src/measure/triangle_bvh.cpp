@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <limits>
-
-#include "measure/point_triangle.h"
+#include <utility>
 
 namespace lamina::measure {
 
@@ -27,7 +27,46 @@ float round_up(double v) {
   return std::nextafter(static_cast<float>(v), std::numeric_limits<float>::infinity());
 }
 
+/// Squared distance from p to the segment a-b (a == b allowed).
+double squared_distance_to_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
+  const Vec3 ab = b - a, ap = p - a;
+  const double length2 = dot(ab, ab);
+  const double t = length2 > 0 ? std::fmin(1.0, std::fmax(0.0, dot(ap, ab) / length2)) : 0.0;
+  const Vec3 d = ap - t * ab;
+  return dot(d, d);
+}
+
 }  // namespace
+
+double squared_distance_to_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 ab = b - a, ac = c - a, ap = p - a;
+  const Vec3 n = cross(ab, ac);
+  const double n2 = dot(n, n);
+  if (n2 > 1e-24 * dot(ab, ab) * dot(ac, ac)) {
+    // Barycentric coordinates of the projection; inside, the distance is the height over the plane.
+    const double wc = dot(cross(ab, ap), n), wb = dot(cross(ap, ac), n);
+    if (wb >= 0 && wc >= 0 && wb + wc <= n2) {
+      const double h = dot(ap, n);
+      return h * h / n2;
+    }
+  }
+  return std::fmin(squared_distance_to_segment(p, a, b),
+                   std::fmin(squared_distance_to_segment(p, b, c), squared_distance_to_segment(p, c, a)));
+}
+
+void widen(Bounds& bounds, const Vec3& p) {
+  for (std::size_t k = 0; k < 3; ++k) {
+    bounds.low[k] = std::min(bounds.low[k], p[k]);
+    bounds.high[k] = std::max(bounds.high[k], p[k]);
+  }
+}
+
+Bounds triangle_bounds(const TriangleMesh& mesh) {
+  Bounds bounds{mesh.positions[mesh.triangles[0][0]], mesh.positions[mesh.triangles[0][0]]};
+  for (const auto& t : mesh.triangles)
+    for (const auto v : t) widen(bounds, mesh.positions[v]);
+  return bounds;
+}
 
 /// Top-down, binned surface area heuristic (Wald 2007). The tree's shape depends on the mesh alone.
 struct TriangleBvh::Builder {
@@ -142,14 +181,8 @@ struct TriangleBvh::Builder {
 };
 
 TriangleBvh::TriangleBvh(const TriangleMesh& mesh) : mesh_(mesh), order_(mesh.triangles.size()) {
-  Vec3 low = mesh.positions[mesh.triangles[0][0]], high = low;
-  for (const auto& t : mesh.triangles)
-    for (const auto v : t)
-      for (std::size_t k = 0; k < 3; ++k) {
-        low[k] = std::min(low[k], mesh.positions[v][k]);
-        high[k] = std::max(high[k], mesh.positions[v][k]);
-      }
-  centre_ = 0.5 * (low + high);
+  const Bounds bounds = triangle_bounds(mesh);
+  centre_ = 0.5 * (bounds.low + bounds.high);
   for (std::size_t t = 0; t < order_.size(); ++t) order_[t] = static_cast<std::uint32_t>(t);
   nodes_.resize(2 * order_.size());
   Builder builder{mesh_, centre_, order_, nodes_, {}};

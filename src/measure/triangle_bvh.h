@@ -1,4 +1,4 @@
-// Bounding volume hierarchy over a mesh's triangles: nearest distance and first hit along a ray.
+// Bounding volume hierarchy over a mesh's triangles: exact distance to the nearest one, and the first hit along a ray.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -10,6 +10,18 @@
 #include "meshes/vec3.h"
 
 namespace lamina::measure {
+
+/// Squared distance from p to the triangle a b c. A triangle of no area (an angle below 1e-12, where its normal would
+/// be rounding noise) is the segments of its sides.
+double squared_distance_to_triangle(const meshes::Vec3& p, const meshes::Vec3& a, const meshes::Vec3& b,
+                                    const meshes::Vec3& c);
+
+struct Bounds {
+  meshes::Vec3 low{}, high{};
+};
+void widen(Bounds& bounds, const meshes::Vec3& p);
+/// Box of the vertices that triangles name. Wants at least one triangle.
+Bounds triangle_bounds(const TriangleMesh& mesh);
 
 struct RayHit {
   double distance = 0;  ///< along the unit direction

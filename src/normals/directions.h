@@ -1,16 +1,52 @@
-// Directions of normals without their sign, and the links along which signs will travel.
+// Directions of normals, still without a sign: the plane that fits a sample's neighbours best, by principal component
+// analysis in closed form; and the links between neighbours along which signs will travel.
 #pragma once
+#include <array>
 #include <cstdint>
 
 #include "normals/sample_tree.h"
-#include "normals/window_samples.h"
+#include "normals/sample_window.h"
 
 namespace lamina::normals {
+
+/// Sums of offsets from one sample, of any unit: where it is among its neighbours they cannot cancel.
+struct Moments {
+  double count = 0;
+  std::array<double, 3> sum{};
+  std::array<double, 6> products{};  ///< xx xy xz yy yz zz
+
+  void add(const std::array<float, 3>& d) {
+    const double x = d[0];
+    const double y = d[1];
+    const double z = d[2];
+    count += 1;
+    sum[0] += x;
+    sum[1] += y;
+    sum[2] += z;
+    products[0] += x * x;
+    products[1] += x * y;
+    products[2] += x * z;
+    products[3] += y * y;
+    products[4] += y * z;
+    products[5] += z * z;
+  }
+};
+
+struct Plane {
+  std::array<float, 3> normal{};           ///< unit length; zero where there is none: samples on a line or a point
+  double least = 0, middle = 0, most = 0;  ///< variance along the principal axes
+
+  [[nodiscard]] bool valid() const { return normal[0] != 0 || normal[1] != 0 || normal[2] != 0; }
+};
+
+/// Only sums, products, quotients and square roots: the same bits on every processor. The sign of the normal means
+/// nothing.
+Plane fit_plane(const Moments& moments);
 
 struct DirectionSettings {
   int k = 16;        ///< neighbours the plane is fitted to
   float radius = 0;  ///< steps; above 0: all neighbours within it, however many
-  float reach = 0;   ///< steps: farther samples are nobody's neighbours
+  float search_radius = 0;  ///< steps: samples farther apart are no neighbours
 };
 
 /// Finds the links of the samples links.core names, and the normals of those that have none. Where the nearest samples

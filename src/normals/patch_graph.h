@@ -1,5 +1,5 @@
-// Patches: pieces of the surface within which the signs of normals are settled, and what neighbouring ones say about
-// each other.
+// The graph of patches, pieces of the surface within which the signs of normals are settled: what neighbouring ones say
+// about each other, and the signs that follow.
 #pragma once
 #include <array>
 #include <cstdint>

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "base/floor_divide.h"
-#include "normals/signed_forest.h"
+#include "base/union_find.h"
 
 namespace lamina::normals {
 namespace {
@@ -273,14 +273,22 @@ class PatchGrower {
   const Links& links_;
   WindowSamples& samples_;
   PatchGraph& graph_;
-  std::vector<std::uint32_t> order_;    ///< numbers of core samples, by cell
-  std::vector<std::uint32_t> cell_of_;  ///< by place; kNoNode outside the slab
-  std::vector<std::uint32_t> slot_;     ///< by place: where in order_
-  std::optional<SignedForest> forest_;  ///< of slots
+  std::vector<std::uint32_t> order_;       ///< numbers of core samples, by cell
+  std::vector<std::uint32_t> cell_of_;     ///< by place; kNoNode outside the slab
+  std::vector<std::uint32_t> slot_;        ///< by place: where in order_
+  std::optional<SignedUnionFind> forest_;  ///< of slots
   std::vector<Cell> cells_;
 };
 
 }  // namespace
+
+float agreement(const std::array<float, 3>& offset, const std::array<float, 3>& a, const std::array<float, 3>& b,
+                float scale) {
+  constexpr float kNoise = 0.25F;  // offsets of half the neighbourhood's radius are mirrored by half
+  const float cosine = dot(a, b);
+  const float squared = dot(offset, offset) + kNoise * scale;
+  return squared > 0 ? cosine - 2 * dot(a, offset) * dot(b, offset) / squared : cosine;
+}
 
 void grow_patches(const SampleTree& tree, const PatchSettings& settings, const Viewpoints& viewpoints,
                   const Links& links, WindowSamples& samples, PatchGraph& graph) {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "lamina/error.h"
-#include "normals/window_samples.h"
+#include "normals/sample_window.h"
 #include "store/unit_normal.h"
 
 namespace lamina::normals {

@@ -46,7 +46,7 @@ SampleTree::SampleTree(std::span<const std::int32_t> x, std::span<const std::int
   for (std::size_t i = 0; i < n; ++i) items[i] = {{x[i], y[i], z[i]}, static_cast<std::uint32_t>(i)};
   while ((n >> depth_) > kLeaf) ++depth_;
   nodes_.resize((std::size_t{1} << depth_) - 1);
-  if (n > 0) build(items, 0, 0, n, 0);
+  if (n > 0) build(items, {0, 0, n, 0});
   order_.resize(n);
   for (auto& axis : at_) axis.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -55,11 +55,11 @@ SampleTree::SampleTree(std::span<const std::int32_t> x, std::span<const std::int
   }
 }
 
-void SampleTree::build(std::vector<Item>& items, std::size_t node, std::size_t begin, std::size_t end, int depth) {
-  if (depth == depth_) return;
-  std::array<std::int32_t, 3> low = items[begin].at;
+void SampleTree::build(std::vector<Item>& items, const Subtree& tree) {
+  if (tree.depth == depth_) return;
+  std::array<std::int32_t, 3> low = items[tree.begin].at;
   std::array<std::int32_t, 3> high = low;
-  for (std::size_t i = begin + 1; i < end; ++i) {
+  for (std::size_t i = tree.begin + 1; i < tree.end; ++i) {
     for (std::size_t a = 0; a < 3; ++a) {
       low[a] = std::min(low[a], items[i].at[a]);
       high[a] = std::max(high[a], items[i].at[a]);
@@ -69,19 +69,16 @@ void SampleTree::build(std::vector<Item>& items, std::size_t node, std::size_t b
   for (std::size_t a = 1; a < 3; ++a) {
     if (high[a] - low[a] > high[axis] - low[axis]) axis = a;
   }
-  const std::size_t middle = begin + (end - begin) / 2;
   const auto at = [&](std::size_t i) { return items.begin() + static_cast<std::ptrdiff_t>(i); };
-  std::nth_element(at(begin), at(middle), at(end), [axis](const Item& a, const Item& b) {
+  std::nth_element(at(tree.begin), at(tree.middle()), at(tree.end), [axis](const Item& a, const Item& b) {
     return a.at[axis] < b.at[axis] || (a.at[axis] == b.at[axis] && a.number < b.number);
   });
-  nodes_[node] = {items[middle].at[axis], static_cast<int>(axis)};
-  const auto lower = [&] { build(items, 2 * node + 1, begin, middle, depth + 1); };
-  const auto upper = [&] { build(items, 2 * node + 2, middle, end, depth + 1); };
-  if (end - begin > kParallel) {
-    tbb::parallel_invoke(lower, upper);
+  nodes_[tree.node] = {items[tree.middle()].at[axis], static_cast<int>(axis)};
+  if (tree.end - tree.begin > kParallel) {
+    tbb::parallel_invoke([&] { build(items, tree.lower()); }, [&] { build(items, tree.upper()); });
   } else {
-    lower();
-    upper();
+    build(items, tree.lower());
+    build(items, tree.upper());
   }
 }
 
@@ -92,15 +89,15 @@ std::size_t SampleTree::nearest(std::uint32_t place, std::size_t k, float bound,
   q.wanted = std::min(k, kMostNeighbours);
   q.bound = bound;
   q.found = found;
-  if (q.wanted > 0) search(q, 0, 0, order_.size(), 0, 0.0F);
+  if (q.wanted > 0) search(q, whole(), 0.0F);
   return q.count;
 }
 
-void SampleTree::search(Query& q, std::size_t node, std::size_t begin, std::size_t end, int depth,
-                        float squared) const {
-  if (depth == depth_) {
+void SampleTree::search(Query& q, const Subtree& tree, float squared) const {
+  if (tree.depth == depth_) {
     std::array<float, kWidest> d2;
-    const std::size_t n = end - begin;
+    const std::size_t begin = tree.begin;
+    const std::size_t n = tree.end - begin;
     const std::int32_t* x = at_[0].data() + begin;
     const std::int32_t* y = at_[1].data() + begin;
     const std::int32_t* z = at_[2].data() + begin;
@@ -115,20 +112,12 @@ void SampleTree::search(Query& q, std::size_t node, std::size_t begin, std::size
     }
     return;
   }
-  const Node& split = nodes_[node];
+  const Node& split = nodes_[tree.node];
   const auto axis = static_cast<std::size_t>(split.axis);
-  const std::size_t middle = begin + (end - begin) / 2;
   const auto side = static_cast<float>(q.at[axis] - split.split);
   // Where both halves touch the plane, what lies on it may be in either.
-  const bool lower_first = side < 0 || (side == 0 && q.place < middle);
-  const auto go = [&](bool lower, float distance) {
-    if (lower) {
-      search(q, 2 * node + 1, begin, middle, depth + 1, distance);
-    } else {
-      search(q, 2 * node + 2, middle, end, depth + 1, distance);
-    }
-  };
-  go(lower_first, squared);
+  const bool lower_first = side < 0 || (side == 0 && q.place < tree.middle());
+  search(q, lower_first ? tree.lower() : tree.upper(), squared);
   // The other half is as far as the plane along this axis, and as the node itself along the others.
   const float before = q.outside[axis];
   const float there = squared - before * before + side * side;
@@ -136,7 +125,7 @@ void SampleTree::search(Query& q, std::size_t node, std::size_t begin, std::size
   constexpr float kSlack = 1 - 1e-5F;
   if (there * kSlack <= q.bound) {
     q.outside[axis] = side;
-    go(!lower_first, there);
+    search(q, lower_first ? tree.upper() : tree.lower(), there);
     q.outside[axis] = before;
   }
 }

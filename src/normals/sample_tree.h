@@ -1,4 +1,6 @@
-// The nearest samples around a sample: a balanced kd-tree over the fixed-point positions of a window.
+// The nearest samples around a sample: a balanced kd-tree over the fixed-point positions of a window. Its own tree
+// beside edit/point_tree.h, which asks for the one nearest of any positions: here every sample asks for its k nearest,
+// so leaves hold a dozen samples side by side and distances are sums of floats.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -39,7 +41,7 @@ class SampleTree {
   /// places.
   template <class Visit>
   void within(std::uint32_t place, float squared, const Visit& visit) const {
-    if (!order_.empty()) within(place, squared, visit, 0, 0, order_.size(), 0);
+    if (!order_.empty()) within(place, squared, visit, whole());
   }
 
   /// From the sample at place `a` to that at place `b`, steps.
@@ -57,25 +59,33 @@ class SampleTree {
   };
   struct Query;
 
-  void build(std::vector<Item>& items, std::size_t node, std::size_t begin, std::size_t end, int depth);
-  void search(Query& q, std::size_t node, std::size_t begin, std::size_t end, int depth, float squared) const;
+  /// What lies below a node: places [begin, end).
+  struct Subtree {
+    std::size_t node = 0, begin = 0, end = 0;
+    int depth = 0;
+    [[nodiscard]] std::size_t middle() const { return begin + (end - begin) / 2; }
+    [[nodiscard]] Subtree lower() const { return {2 * node + 1, begin, middle(), depth + 1}; }
+    [[nodiscard]] Subtree upper() const { return {2 * node + 2, middle(), end, depth + 1}; }
+  };
+  [[nodiscard]] Subtree whole() const { return {0, 0, order_.size(), 0}; }
+
+  void build(std::vector<Item>& items, const Subtree& tree);
+  void search(Query& q, const Subtree& tree, float squared) const;
 
   template <class Visit>
-  void within(std::uint32_t place, float squared, const Visit& visit, std::size_t node, std::size_t begin,
-              std::size_t end, int depth) const {
-    if (depth == depth_) {
-      for (std::size_t i = begin; i < end; ++i) {
+  void within(std::uint32_t place, float squared, const Visit& visit, const Subtree& tree) const {
+    if (tree.depth == depth_) {
+      for (std::size_t i = tree.begin; i < tree.end; ++i) {
         const std::array<float, 3> d = offset(place, static_cast<std::uint32_t>(i));
         const float d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
         if (d2 <= squared && i != place) visit(Neighbour{d2, static_cast<std::uint32_t>(i)});
       }
       return;
     }
-    const Node& n = nodes_[node];
-    const std::size_t middle = begin + (end - begin) / 2;
+    const Node& n = nodes_[tree.node];
     const auto side = static_cast<float>(at_[static_cast<std::size_t>(n.axis)][place] - n.split);
-    if (side <= 0 || side * side <= squared) within(place, squared, visit, 2 * node + 1, begin, middle, depth + 1);
-    if (side >= 0 || side * side <= squared) within(place, squared, visit, 2 * node + 2, middle, end, depth + 1);
+    if (side <= 0 || side * side <= squared) within(place, squared, visit, tree.lower());
+    if (side >= 0 || side * side <= squared) within(place, squared, visit, tree.upper());
   }
 
   std::array<std::vector<std::int32_t>, 3> at_;  ///< by place

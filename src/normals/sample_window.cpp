@@ -1,5 +1,8 @@
 #include "normals/sample_window.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <limits>
 #include <utility>
@@ -9,20 +12,39 @@
 namespace lamina::normals {
 namespace {
 
+/// Calls each(column of from, column of to) for all columns.
+template <class Each>
+void for_columns(const WindowSamples& from, WindowSamples& to, const Each& each) {
+  each(from.x, to.x);
+  each(from.y, to.y);
+  each(from.z, to.z);
+  each(from.nx, to.nx);
+  each(from.ny, to.ny);
+  each(from.nz, to.nz);
+  each(from.row, to.row);
+  each(from.node, to.node);
+  each(from.given, to.given);
+}
+
 void append_all(const WindowSamples& from, WindowSamples& to) {
-  const auto add = [](const auto& source, auto& target) { target.insert(target.end(), source.begin(), source.end()); };
-  add(from.x, to.x);
-  add(from.y, to.y);
-  add(from.z, to.z);
-  add(from.nx, to.nx);
-  add(from.ny, to.ny);
-  add(from.nz, to.nz);
-  add(from.row, to.row);
-  add(from.node, to.node);
-  add(from.given, to.given);
+  for_columns(from, to,
+              [](const auto& source, auto& target) { target.insert(target.end(), source.begin(), source.end()); });
 }
 
 }  // namespace
+
+void WindowSamples::append(const WindowSamples& from, std::size_t i) {
+  for_columns(from, *this, [i](const auto& source, auto& target) { target.push_back(source[i]); });
+}
+
+void WindowSamples::gather(const WindowSamples& from, std::span<const std::uint32_t> order) {
+  for_columns(from, *this, [order](const auto& source, auto& target) {
+    target.resize(order.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), std::size_t{1} << 14), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) target[i] = source[order[i]];
+    });
+  });
+}
 
 Slab slab_from(const SlabStore& store, const WindowSettings& settings, std::size_t first) {
   Slab slab{first, first, std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::min(), 0};
@@ -42,8 +64,8 @@ WindowCounts largest_window(const SlabStore& store, const WindowSettings& settin
   for (Slab slab = slab_from(store, settings, 0); slab.low <= slab.high; slab = slab_from(store, settings, slab.end)) {
     std::uint64_t window = 0;
     for (std::size_t b = 0; b < store.buckets(); ++b) {
-      if (store.count(b) > 0 && store.z_upper(b) >= slab.low - settings.reach &&
-          store.z_lower(b) <= slab.high + settings.reach)
+      if (store.count(b) > 0 && store.z_upper(b) >= slab.low - settings.halo &&
+          store.z_lower(b) <= slab.high + settings.halo)
         window += store.count(b);
     }
     most.window = std::max(most.window, window);
@@ -76,11 +98,11 @@ void SampleWindow::load(std::size_t bucket) {
   s.nz = std::move(local.nz);
 }
 
-/// Drops samples below the slab's reach.
+/// Drops samples below the halo of the slab.
 void SampleWindow::keep_what_is_near() {
   WindowSamples kept;
   for (std::size_t i = 0; i < samples_.size(); ++i) {
-    if (samples_.z[i] >= slab_.low - settings_.reach && samples_.z[i] < slab_.low) kept.append(samples_, i);
+    if (samples_.z[i] >= slab_.low - settings_.halo && samples_.z[i] < slab_.low) kept.append(samples_, i);
   }
   before_ = std::move(kept);
 }
@@ -91,7 +113,7 @@ bool SampleWindow::advance() {
   keep_what_is_near();
   for (; loaded_ < store_.buckets(); ++loaded_) {
     const bool near =
-        loaded_ < slab_.end || store_.count(loaded_) == 0 || store_.z_lower(loaded_) <= slab_.high + settings_.reach;
+        loaded_ < slab_.end || store_.count(loaded_) == 0 || store_.z_lower(loaded_) <= slab_.high + settings_.halo;
     if (!near) break;
     load(loaded_);
   }
@@ -104,7 +126,7 @@ bool SampleWindow::advance() {
   const std::size_t end = all.size();
   for (const WindowSamples& bucket : ahead_) {
     for (std::size_t i = 0; i < bucket.size(); ++i) {
-      if (bucket.z[i] <= slab_.high + settings_.reach) all.append(bucket, i);
+      if (bucket.z[i] <= slab_.high + settings_.halo) all.append(bucket, i);
     }
   }
   done_ += end - begin;

@@ -1,19 +1,50 @@
-// A window that slides over the slab store: one slab at a time, with what lies within reach of it.
+// A window that slides over the slab store: the samples of one slab at a time and of what lies within its halo, with
+// what has been found out about them.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "normals/sample_tree.h"
-#include "normals/window_samples.h"
 #include "store/slab_store.h"
 
 namespace lamina::normals {
 
+/// Node of the patch graph that every normal with a fixed sign belongs to.
+inline constexpr std::uint32_t kFixed = 0;
+/// Of samples that have no normal, or none yet.
+inline constexpr std::uint32_t kNoNode = ~0U;
+
+/// Parallel arrays. A normal's sign is relative to its patch: times the patch's sign it is the sample's.
+struct WindowSamples {
+  std::vector<std::int32_t> x, y, z;  ///< steps of the frame
+  std::vector<float> nx, ny, nz;      ///< unit length, or zero
+  std::vector<std::uint64_t> row;     ///< of the input
+  std::vector<std::uint32_t> node;    ///< of the patch graph
+  std::vector<std::uint8_t> given;    ///< 1: the normal comes from the input
+
+  [[nodiscard]] std::size_t size() const { return x.size(); }
+  [[nodiscard]] bool has_normal(std::size_t i) const { return nx[i] != 0 || ny[i] != 0 || nz[i] != 0; }
+  void append(const WindowSamples& from, std::size_t i);
+  /// Sample i becomes from[order[i]].
+  void gather(const WindowSamples& from, std::span<const std::uint32_t> order);
+};
+
+/// The samples of the slab itself, and to which of their neighbours each is linked.
+struct Links {
+  static constexpr std::size_t kMost = 8;
+  std::vector<std::uint32_t> core;                           ///< their places in the window, ascending
+  std::vector<std::array<std::uint32_t, kMost>> neighbours;  ///< places; unused ones repeat the sample itself
+  std::vector<float> scale;  ///< squared distance of the farthest neighbour taken, steps^2
+};
+
 struct WindowSettings {
-  std::int32_t reach = 1;  ///< steps to either side of the slab that the window shows
-  std::uint64_t least_samples =
-      1;  ///< of a slab, unless the store ends: buckets are taken together until they are enough
+  std::int32_t halo = 1;  ///< steps to either side of the slab that the window shows
+  /// Of a slab, unless the store ends: buckets are taken together until they hold enough.
+  std::uint64_t least_samples = 1;
   std::int32_t least_height = 1;  ///< steps, likewise
 };
 
@@ -38,7 +69,7 @@ class SampleWindow {
   SampleWindow(const SlabStore& store, const WindowSettings& settings);
 
   /// Goes on to the next slab. What was found out about samples of the last ones is kept as far as the new slab's
-  /// reach. False behind the last one.
+  /// halo. False behind the last one.
   bool advance();
   [[nodiscard]] const SampleTree& tree() const { return *tree_; }
   /// In the order of the tree's places.

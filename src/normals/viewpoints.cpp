@@ -5,6 +5,26 @@
 
 namespace lamina::normals {
 
+std::vector<SeenFrom> scanners_of(const PointSourceInfo& info, const NormalsSettings& settings) {
+  std::vector<SeenFrom> seen;
+  const bool one_each = settings.viewpoints.size() > 1 && settings.viewpoints.size() == info.scans.size();
+  for (std::size_t i = 0; i < info.scans.size(); ++i) {
+    const ScanPart& scan = info.scans[i];
+    SeenFrom s;
+    s.first = scan.first;
+    if (one_each) {
+      s.known = true;
+      s.viewpoint = settings.viewpoints[i];
+    } else if (settings.viewpoints.empty() && settings.scanners) {
+      const bool known = scan.scanner == ScanPart::Scanner::position || scan.scanner == ScanPart::Scanner::direction;
+      s.known = known || (settings.pose_origins && scan.scanner == ScanPart::Scanner::pose_origin);
+      s.viewpoint = {scan.at, scan.scanner == ScanPart::Scanner::direction};
+    }
+    seen.push_back(s);
+  }
+  return seen;
+}
+
 Viewpoints::Local Viewpoints::local(const Viewpoint& viewpoint, const Frame& frame) {
   const Eigen::Vector3d at(viewpoint.at[0], viewpoint.at[1], viewpoint.at[2]);
   const Eigen::Vector3d there =

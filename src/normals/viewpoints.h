@@ -16,6 +16,9 @@ struct SeenFrom {
   Viewpoint viewpoint;
 };
 
+/// Where the parts of an input were seen from, as its file or the settings say; rows ascending.
+std::vector<SeenFrom> scanners_of(const PointSourceInfo& info, const NormalsSettings& settings);
+
 class Viewpoints {
  public:
   /// `everywhere`: of rows that `by_row` (ascending) knows nothing about; each sample takes the nearest.

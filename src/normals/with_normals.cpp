@@ -34,6 +34,10 @@ constexpr double kPatches = 150'000;  ///< of a large cloud; cells and slabs cut
 constexpr double kLeastPatch = 128;   ///< samples
 constexpr double kMostSteps = 1 << 29;
 
+double percent(std::uint64_t part, std::uint64_t whole) {
+  return whole == 0 ? 0.0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole);
+}
+
 /// Lengths of the job, steps.
 struct Scale {
   DirectionSettings directions;
@@ -65,36 +69,16 @@ Scale scale_of(const NormalsSettings& settings, const SlabStore& store, const Fr
   s.directions.radius = settings.radius > 0 ? static_cast<float>(steps(settings.radius / frame.step)) : 0.0F;
   // A density radius is about twice the spacing, and sixteen neighbours lie within 1.2 of it.
   const double usual = std::sqrt(std::max(settings.k, 16) / 16.0) * double{radii.high};
-  constexpr double kReach = 5;
-  s.directions.reach = static_cast<float>(steps(std::max(kReach * usual, double{s.directions.radius})));
-  s.window.reach = static_cast<std::int32_t>(s.directions.reach);
+  constexpr double kSearched = 5;
+  s.directions.search_radius = static_cast<float>(steps(std::max(kSearched * usual, double{s.directions.radius})));
+  s.window.halo = static_cast<std::int32_t>(s.directions.search_radius);
   const double in_patch = std::max(kLeastPatch, static_cast<double>(store.total()) / kPatches);
   const double cell = std::max(0.5 * double{radii.median} * std::sqrt(in_patch), double{kLeastPatchCell});
   s.patches.cell = static_cast<std::int32_t>(steps(cell));
   s.patches.given_stay = settings.mode == NormalsMode::complete || settings.mode == NormalsMode::check;
   s.window.least_samples = kLeastSlab;
-  s.window.least_height = std::min(2 * s.window.reach, s.patches.cell);
+  s.window.least_height = std::min(2 * s.window.halo, s.patches.cell);
   return s;
-}
-
-std::vector<SeenFrom> scanners_of(const PointSourceInfo& info, const NormalsSettings& settings) {
-  std::vector<SeenFrom> seen;
-  const bool one_each = settings.viewpoints.size() > 1 && settings.viewpoints.size() == info.scans.size();
-  for (std::size_t i = 0; i < info.scans.size(); ++i) {
-    const ScanPart& scan = info.scans[i];
-    SeenFrom s;
-    s.first = scan.first;
-    if (one_each) {
-      s.known = true;
-      s.viewpoint = settings.viewpoints[i];
-    } else if (settings.viewpoints.empty() && settings.scanners) {
-      const bool known = scan.scanner == ScanPart::Scanner::position || scan.scanner == ScanPart::Scanner::direction;
-      s.known = known || (settings.pose_origins && scan.scanner == ScanPart::Scanner::pose_origin);
-      s.viewpoint = {scan.at, scan.scanner == ScanPart::Scanner::direction};
-    }
-    seen.push_back(s);
-  }
-  return seen;
 }
 
 class Job {
@@ -291,6 +275,50 @@ std::unique_ptr<PointSource> with_normals(std::unique_ptr<PointSource> source, c
   report.estimated += by_grid;
   report.by_viewpoint += by_grid;
   return give_normals(std::move(source), std::move(found));
+}
+
+std::size_t NormalsReport::worst_slab() const {
+  // A few links say nothing.
+  constexpr std::uint64_t kEnough = 1000;
+  std::size_t worst = 0;
+  double share = -1;
+  for (std::size_t i = 0; i < slabs.size(); ++i) {
+    if (slabs[i].pairs < std::min(kEnough, conflicts.pairs) || slabs[i].share() <= share) continue;
+    share = slabs[i].share();
+    worst = i;
+  }
+  return worst;
+}
+
+std::string describe(const NormalsReport& r) {
+  std::string text = fmt::format("{} normals found", r.estimated);
+  if (r.flipped > 0) text += fmt::format(", {} turned", r.flipped);
+  if (r.without > 0) text += fmt::format(", {} samples without one", r.without);
+  if (r.by_viewpoint > 0) text += fmt::format("; {:.1f} % face a viewpoint", percent(r.by_viewpoint, r.samples));
+  if (r.by_given > 0) text += fmt::format("; {:.1f} % follow given ones", percent(r.by_given, r.samples));
+  if (r.by_outside > 0) {
+    text += fmt::format("; {:.1f} % face outside of what they enclose", percent(r.by_outside, r.samples));
+    if (r.unsure > 0) text += fmt::format(" ({:.1f} % enclose little)", percent(r.unsure, r.samples));
+  }
+  return text + fmt::format("; {:.2f} % of neighbours conflict", 100 * r.conflicts.share());
+}
+
+void warn_of_conflicts(const NormalsReport& r, const std::string& path, const RunContext& run) {
+  constexpr double kMuch = 0.02;  // scans of thin things have a percent
+  constexpr double kUnsure = 0.2;
+  const SignConflicts worst = r.slabs.empty() ? SignConflicts{} : r.slabs[r.worst_slab()];
+  if (r.conflicts.share() > kMuch || worst.share() > 4 * kMuch) {
+    run.warn(
+        fmt::format("{}: the normals of {:.1f} % of neighbouring samples point to opposite sides, {:.1f} % in slab "
+                    "{} of {}: expect holes and double sheets; a viewpoint, an up direction or a larger k may help",
+                    path, 100 * r.conflicts.share(), 100 * worst.share(), r.worst_slab() + 1, r.slabs.size()));
+  }
+  if (static_cast<double>(r.unsure) > kUnsure * static_cast<double>(r.samples)) {
+    run.warn(
+        fmt::format("{}: {:.0f} % of the samples lie on surfaces too flat or open to tell their outside: say where "
+                    "it is with --viewpoint or --up",
+                    path, percent(r.unsure, r.samples)));
+  }
 }
 
 }  // namespace lamina

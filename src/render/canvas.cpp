@@ -1,9 +1,15 @@
 #include "render/canvas.h"
 
+#include <fmt/format.h>
+#include <png.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "base/result_file.h"
+#include "lamina/error.h"
+#include "lamina/render.h"
 
 namespace lamina::render_detail {
 namespace {
@@ -43,6 +49,10 @@ float decode(std::uint8_t encoded) {
   return tables().decode[encoded];
 }
 
+float decode(float byte) {
+  return decode(static_cast<std::uint8_t>(byte > 0 ? std::min(byte, 255.0F) + 0.5F : 0.0F));
+}
+
 void Canvas::blend(int x, int y, float depth, const Rgb& light, float opacity) {
   const auto& before = colour_[index(x, y)];
   Rgb mixed;
@@ -77,3 +87,30 @@ Image Canvas::resolve(int supersample) const {
 }
 
 }  // namespace lamina::render_detail
+
+namespace lamina {
+
+std::array<std::uint8_t, 3> Image::at(int x, int y) const {
+  const auto i = 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
+  return {pixels[i], pixels[i + 1], pixels[i + 2]};
+}
+
+void write_png(const Image& image, const std::string& path) {
+  png_image header = {};
+  header.version = PNG_IMAGE_VERSION;
+  header.width = static_cast<png_uint_32>(image.width);
+  header.height = static_cast<png_uint_32>(image.height);
+  header.format = PNG_FORMAT_RGB;
+  // Encoded in memory: libpng's own file writer would leave half a file under the final name.
+  std::string bytes(PNG_IMAGE_PNG_SIZE_MAX(header), '\0');
+  png_alloc_size_t size = bytes.size();
+  if (png_image_write_to_memory(&header, bytes.data(), &size, 0, image.pixels.data(), 0, nullptr) == 0) {
+    throw Error(ExitCode::internal, fmt::format("{}: the picture cannot be encoded: {}", path, header.message));
+  }
+  bytes.resize(size);
+  ResultFile file(path);
+  file.write(bytes);
+  file.commit();
+}
+
+}  // namespace lamina

@@ -1,4 +1,4 @@
-// Samples of a picture: what is nearest at each, and averaging them into pixels.
+// Samples of a picture: what is nearest at each, and averaging them into pixels. canvas.cpp writes these, too, as PNG.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -16,6 +16,8 @@ using Rgb = std::array<float, 3>;  ///< linear light, 0 to 1
 /// sRGB encoding, by table.
 std::uint8_t encode(float linear);
 float decode(std::uint8_t encoded);
+/// The same of a number on the scale 0-255, rounded and clamped.
+float decode(float byte);
 
 /// Depth grows toward the viewer.
 class Canvas {

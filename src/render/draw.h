@@ -1,4 +1,5 @@
-// Drawing one mesh or one batch of points into one view of the canvas.
+// Drawing into one view of the canvas: meshes, edges and points rasterised (draw_primitives.cpp), level sets and fogs
+// by rays (draw_level_set.cpp, draw_fog.cpp).
 #pragma once
 #include <array>
 #include <functional>
@@ -9,7 +10,7 @@
 #include "lamina/render.h"
 #include "lamina/sample.h"
 #include "lamina/volume.h"
-#include "render/boundary.h"
+#include "measure/edge_table.h"
 #include "render/canvas.h"
 #include "render/view.h"
 
@@ -23,7 +24,7 @@ void draw_mesh(const TriangleMesh& mesh, const std::vector<std::array<float, 3>>
                const RenderSettings& settings, const View& view, Canvas& canvas);
 
 /// Lines over everything drawn before or after.
-void draw_edges(const TriangleMesh& mesh, const std::vector<Edge>& edges, const RenderSettings& settings,
+void draw_edges(const TriangleMesh& mesh, const std::vector<measure::Edge>& edges, const RenderSettings& settings,
                 const View& view, Canvas& canvas);
 
 /// `radius` in input units serves points that have none of their own.

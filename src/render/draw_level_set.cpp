@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "render/draw.h"
-#include "render/grid_colours.h"
 #include "render/ray_field.h"
 #include "render/shade.h"
 #include "vdb/grids.h"

@@ -1,8 +1,11 @@
-// The rays of a picture through a grid, in the grid's index space.
+// The rays of a picture through a grid, in the grid's index space, and the colours of the grid beside it in its file.
 #pragma once
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
+#include <optional>
+
+#include "render/shade.h"
 #include "render/view.h"
 #include "vdb/grids.h"
 
@@ -47,6 +50,19 @@ class RayField {
   const openvdb::math::Transform& transform_;
   const View& view_;
   double start_ = 0, length_ = 0;
+};
+
+/// Looks colours up on one thread: it remembers the nodes it was in.
+class GridColours {
+ public:
+  /// `grid`: `Cd`, 0 to 1; null where there is none.
+  explicit GridColours(openvdb::Vec3SGrid::ConstPtr grid);
+  /// Interpolated; nothing where there is no grid.
+  [[nodiscard]] std::optional<Rgb> at(const openvdb::Vec3d& world) const;
+
+ private:
+  openvdb::Vec3SGrid::ConstPtr grid_;
+  std::optional<openvdb::Vec3SGrid::ConstAccessor> values_;
 };
 
 }  // namespace lamina::render_detail

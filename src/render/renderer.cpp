@@ -7,6 +7,7 @@
 
 #include "lamina/error.h"
 #include "lamina/render.h"
+#include "measure/edge_table.h"
 #include "render/canvas.h"
 #include "render/draw.h"
 #include "render/view.h"
@@ -57,11 +58,6 @@ bool finite(const std::array<double, 3>& p) {
 }
 
 }  // namespace
-
-std::array<std::uint8_t, 3> Image::at(int x, int y) const {
-  const auto i = 3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(width) + static_cast<std::size_t>(x));
-  return {pixels[i], pixels[i + 1], pixels[i + 2]};
-}
 
 struct Renderer::Impl {
   Impl(const RenderSettings& s, const RunContext& c)
@@ -164,7 +160,7 @@ void Renderer::draw(const TriangleMesh& mesh) {
   const auto& normals = has_normals ? mesh.normals : computed;
   impl_->draw([&](const View& view) { draw_mesh(mesh, normals, impl_->settings, view, impl_->canvas); });
   if (!impl_->settings.mark_boundary) return;
-  const std::vector<Edge> edges = impl_->arena.execute([&] { return render_detail::boundary_edges(mesh); });
+  const std::vector<measure::Edge> edges = impl_->arena.execute([&] { return measure::boundary_edges(mesh); });
   impl_->boundary += edges.size();
   impl_->draw([&](const View& view) { draw_edges(mesh, edges, impl_->settings, view, impl_->canvas); });
 }

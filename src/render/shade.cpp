@@ -74,8 +74,7 @@ std::optional<ColourReader> ColourReader::find(const AttributeLayout& layout,
 Rgb ColourReader::operator()(std::size_t i) const {
   Rgb out;
   for (std::size_t c = 0; c < 3; ++c) {
-    const float byte = to_byte_[c] * (*channels_[c])[i];
-    out[c] = decode(static_cast<std::uint8_t>(byte > 0 ? std::min(byte, 255.0F) + 0.5F : 0.0F));
+    out[c] = decode(to_byte_[c] * (*channels_[c])[i]);
   }
   return out;
 }

@@ -4,7 +4,7 @@
 
 #include "lamina/scatter.h"
 #include "meshes/vec3.h"
-#include "scatter/waves.h"
+#include "scatter/shapes.h"
 
 namespace lamina {
 namespace {

@@ -1,13 +1,14 @@
-// Star-shaped surfaces, stretched along the axes.
+// Star-shaped surfaces, stretched along the axes: a sphere with bumps and a draped figure.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <memory>
 #include <numbers>
+#include <utility>
 
 #include "base/counter_rng.h"
 #include "meshes/vec3.h"
-#include "scatter/attempt_seed.h"
-#include "scatter/shape_colour.h"
-#include "scatter/shape_kinds.h"
+#include "scatter/shapes.h"
 
 namespace lamina::scatter_detail {
 

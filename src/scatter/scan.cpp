@@ -12,9 +12,9 @@
 #include "lamina/error.h"
 #include "measure/triangle_bvh.h"
 #include "meshes/vec3.h"
-#include "scatter/interpolate.h"
+#include "scatter/mesh_surface.h"
 #include "scatter/point_rows.h"
-#include "scatter/waves.h"
+#include "scatter/shapes.h"
 
 namespace lamina {
 namespace {
@@ -46,22 +46,16 @@ class Scanner {
  public:
   Scanner(const TriangleMesh& mesh, const ScanSettings& settings)
       : settings_(settings), tree_(mesh), attributes_(mesh), mesh_(mesh) {
-    Vec3 low = mesh.positions[mesh.triangles[0][0]], high = low;
-    for (const auto& t : mesh.triangles)
-      for (const auto v : t)
-        for (std::size_t k = 0; k < 3; ++k) {
-          low[k] = std::min(low[k], mesh.positions[v][k]);
-          high[k] = std::max(high[k], mesh.positions[v][k]);
-        }
-    centre_ = 0.5 * (low + high);
-    reach_ = 0.51 * norm(high - low);
+    const measure::Bounds bounds = measure::triangle_bounds(mesh);
+    centre_ = 0.5 * (bounds.low + bounds.high);
+    half_width_ = 0.51 * norm(bounds.high - bounds.low);
   }
   [[nodiscard]] bool has_colour() const { return attributes_.has_colour(); }
 
   /// The grid spacing at which all views together see about `count` samples.
   [[nodiscard]] double spacing_for(std::uint64_t count) const {
     constexpr int kTrialRows = 160;
-    const double trial = 2 * reach_ / kTrialRows;
+    const double trial = 2 * half_width_ / kTrialRows;
     std::uint64_t seen = 0, hits = 0;
     for (int view = 0; view < settings_.views; ++view)
       for (const auto& row : look(view, trial)) {
@@ -86,7 +80,7 @@ class Scanner {
 
   [[nodiscard]] std::vector<Row> look(int number, double spacing) const {
     const View view = view_number(number, settings_.views);
-    const auto half = static_cast<long>(std::ceil(reach_ / spacing));
+    const auto half = static_cast<long>(std::ceil(half_width_ / spacing));
     std::vector<Row> rows(static_cast<std::size_t>(2 * half + 1));
     tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t r) {
       const double y = spacing * static_cast<double>(static_cast<long>(r) - half);
@@ -100,7 +94,7 @@ class Scanner {
 
  private:
   void shoot(const View& view, double x, double y, double spacing, std::uint64_t ray, Row& row) const {
-    const Vec3 origin = centre_ + x * view.right + y * view.up + (2 * reach_) * view.towards;
+    const Vec3 origin = centre_ + x * view.right + y * view.up + (2 * half_width_) * view.towards;
     const auto hit = tree_.first_hit(origin, -1.0 * view.towards);
     if (!hit) return;
     ++row.hits;
@@ -123,7 +117,7 @@ class Scanner {
   scatter_detail::MeshAttributes attributes_;
   const TriangleMesh& mesh_;
   Vec3 centre_{};
-  double reach_ = 0;
+  double half_width_ = 0;  ///< of a view's image
 };
 
 void require_sane(const TriangleMesh& mesh, const ScanSettings& s) {

@@ -12,8 +12,8 @@
 #include "base/result_file.h"
 #include "base/with_threads.h"
 #include "lamina/error.h"
-#include "scatter/attempt_seed.h"
 #include "scatter/point_rows.h"
+#include "scatter/shapes.h"
 
 namespace lamina {
 namespace {

@@ -6,7 +6,6 @@
 #include <limits>
 
 #include "base/counter_rng.h"
-#include "measure/point_triangle.h"
 #include "meshes/mesh_files.h"
 
 namespace lamina::measure {

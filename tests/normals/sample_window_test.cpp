@@ -39,11 +39,11 @@ SlabStore numbered_store(const std::string& folder, std::size_t count, std::vect
 
 TEST(SampleWindow, ShowsEverySampleOnceAndWhatLiesInReach) {
   const test::TemporaryFolder folder;
-  for (const std::int32_t reach : {1, 40, 150, 5000}) {
+  for (const std::int32_t halo : {1, 40, 150, 5000}) {
     for (const std::uint64_t least : {1, 700, 100000}) {
       std::vector<std::int32_t> z;
       const SlabStore store = numbered_store(folder.path(), 5000, z);
-      const WindowSettings settings{reach, least, 150};
+      const WindowSettings settings{halo, least, 150};
       const WindowCounts most = largest_window(store, settings);
       SampleWindow window(store, settings);
       std::vector<int> seen(z.size());
@@ -63,10 +63,10 @@ TEST(SampleWindow, ShowsEverySampleOnceAndWhatLiesInReach) {
         EXPECT_EQ(window.done(), done);
         EXPECT_LE(s.size(), most.window);
         EXPECT_LE(window.core().size(), most.slab);
-        std::size_t in_reach = 0;
-        for (const std::int32_t v : z) in_reach += v >= low - reach && v <= high + reach ? 1 : 0;
-        ASSERT_EQ(s.size(), in_reach);
-        ASSERT_EQ(window.tree().size(), in_reach);
+        std::size_t in_halo = 0;
+        for (const std::int32_t v : z) in_halo += v >= low - halo && v <= high + halo ? 1 : 0;
+        ASSERT_EQ(s.size(), in_halo);
+        ASSERT_EQ(window.tree().size(), in_halo);
         for (std::size_t i = 0; i < s.size(); ++i) {
           ASSERT_EQ(s.z[i], z[s.row[i]]);
           ASSERT_EQ(s.given[i] != 0, s.row[i] % 3 == 0);

@@ -6,8 +6,7 @@
 
 #include "lamina/scatter.h"
 #include "meshes/vec3.h"
-#include "scatter/shape_kinds.h"
-#include "scatter/waves.h"
+#include "scatter/shapes.h"
 
 namespace lamina {
 namespace {

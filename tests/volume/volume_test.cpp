@@ -11,7 +11,7 @@
 #include <stdexcept>
 
 #include "lamina/error.h"
-#include "measure/point_triangle.h"
+#include "measure/triangle_bvh.h"
 #include "render/shapes.h"
 #include "support/program.h"
 #include "vdb/grids.h"

@@ -1,20 +1,29 @@
-// Sphere, torus and boxes: sampled exactly by area.
+#include "scatter/shapes.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <array>
 #include <cmath>
+#include <memory>
 #include <numbers>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "base/counter_rng.h"
+#include "lamina/error.h"
+#include "lamina/scatter.h"
 #include "meshes/vec3.h"
-#include "scatter/attempt_seed.h"
-#include "scatter/shape_colour.h"
-#include "scatter/shape_kinds.h"
 
-namespace lamina::scatter_detail {
-
-using namespace meshes;
-using std::numbers::pi;
-
+namespace lamina {
 namespace {
 
+using namespace meshes;
+using namespace scatter_detail;
+using std::numbers::pi;
+
+/// Sphere, torus and boxes are sampled exactly by area.
 class BasicShape : public Surface {
  public:
   explicit BasicShape(bool colours) : colours_(colours) {}
@@ -100,16 +109,42 @@ class BoxShape final : public BasicShape {
   Vec3 pairs_;  ///< area of the two sides across each axis
 };
 
+/// Corners at +-x, +-y, +-z; z = 0 is the upper side of a rectangle.
+std::unique_ptr<Surface> box(double x, double y, double z, bool colours) {
+  return std::make_unique<BoxShape>(Vec3{x, y, z}, colours);
+}
+
+using Maker = std::unique_ptr<Surface> (*)(bool colours);
+
+constexpr std::array<std::pair<const char*, Maker>, 7> kShapes{{
+    {"sphere", [](bool c) -> std::unique_ptr<Surface> { return std::make_unique<Sphere>(c); }},
+    {"torus", [](bool c) -> std::unique_ptr<Surface> { return std::make_unique<Torus>(1, 0.4, c); }},
+    {"plane", [](bool c) { return box(1, 1, 0, c); }},
+    {"cube", [](bool c) { return box(1, 1, 1, c); }},
+    {"thin-sheet", [](bool c) { return box(1, 1, 0.01, c); }},
+    {"bumpy-sphere",
+     [](bool c) {
+       return radial_surface(bumps(), {1, 1, 1}, c);
+     }},
+    {"statue",
+     [](bool c) {
+       return radial_surface(draped_figure(), {0.55, 0.45, 1.4}, c);
+     }},
+}};
+
 }  // namespace
 
-std::unique_ptr<Surface> sphere_surface(bool colours) {
-  return std::make_unique<Sphere>(colours);
-}
-std::unique_ptr<Surface> torus_surface(double tube_centre, double tube, bool colours) {
-  return std::make_unique<Torus>(tube_centre, tube, colours);
-}
-std::unique_ptr<Surface> box_surface(const Vec3& half, bool colours) {
-  return std::make_unique<BoxShape>(half, colours);
+std::vector<std::string> shape_names() {
+  std::vector<std::string> names;
+  names.reserve(kShapes.size());
+  for (const auto& [name, maker] : kShapes) names.emplace_back(name);
+  return names;
 }
 
-}  // namespace lamina::scatter_detail
+std::unique_ptr<Surface> shape_surface(const std::string& name, bool colours) {
+  for (const auto& [known, maker] : kShapes)
+    if (name == known) return maker(colours);
+  throw Error(ExitCode::usage, fmt::format("unknown shape \"{}\"; known are {}", name, fmt::join(shape_names(), ", ")));
+}
+
+}  // namespace lamina

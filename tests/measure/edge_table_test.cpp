@@ -1,10 +1,10 @@
-#include "render/boundary.h"
+#include "measure/edge_table.h"
 
 #include <gtest/gtest.h>
 
 #include "render/shapes.h"
 
-namespace lamina::render_detail {
+namespace lamina::measure {
 namespace {
 
 TEST(BoundaryEdges, AreThoseOfOneTriangle) {
@@ -22,5 +22,12 @@ TEST(BoundaryEdges, AnEdgeOfThreeTrianglesIsNone) {
   EXPECT_EQ(boundary_edges(mesh).size(), 6u);
 }
 
+TEST(BoundaryEdges, TrianglesThatRepeatAVertexHaveNone) {
+  TriangleMesh mesh;
+  mesh.positions.resize(3);
+  mesh.triangles = {{0, 1, 2}, {1, 1, 2}};
+  EXPECT_EQ(boundary_edges(mesh).size(), 3u);
+}
+
 }  // namespace
-}  // namespace lamina::render_detail
+}  // namespace lamina::measure

@@ -1,4 +1,4 @@
-// Normals and colours anywhere on a mesh.
+// Normals and colours anywhere on a mesh; mesh_surface.cpp makes it a Surface to scatter on, too.
 #pragma once
 #include <array>
 #include <optional>

@@ -1,11 +1,12 @@
+#include "normals/patch_graph.h"
+
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "normals/patch_graph.h"
-#include "normals/signed_forest.h"
-#include "normals/window_samples.h"
+#include "base/union_find.h"
+#include "normals/sample_window.h"
 
 namespace lamina::normals {
 namespace {
@@ -56,7 +57,7 @@ std::vector<Evidence> evidence_of(const PatchGraph& graph) {
 }
 
 /// Moves the evidence from the clusters there were to those there are.
-void regroup(std::vector<Evidence>& evidence, SignedForest& forest) {
+void regroup(std::vector<Evidence>& evidence, SignedUnionFind& forest) {
   for (Evidence& e : evidence) {
     const std::uint32_t a = forest.find(e.a);
     const std::uint32_t b = forest.find(e.b);
@@ -68,7 +69,7 @@ void regroup(std::vector<Evidence>& evidence, SignedForest& forest) {
 }
 
 /// Joins clusters until none has anything to say to another, where the sum is at least this share of the weight.
-void grow_forest(std::vector<Evidence>& evidence, float least_share, SignedForest& forest, std::size_t nodes) {
+void grow_forest(std::vector<Evidence>& evidence, float least_share, SignedUnionFind& forest, std::size_t nodes) {
   constexpr std::size_t kNothing = ~std::size_t{0};
   std::vector<std::size_t> best(nodes);
   for (bool joined = true; joined;) {
@@ -155,7 +156,7 @@ bool is_inside_out(const Body& body, const std::array<float, 3>& up) {
   return (ground ? upward : body.volume) < 0;
 }
 
-void read_forest(SignedForest& forest, std::vector<std::uint32_t>& root, PatchSigns& signs) {
+void read_forest(SignedUnionFind& forest, std::vector<std::uint32_t>& root, PatchSigns& signs) {
   for (std::uint32_t i = 0; i < root.size(); ++i) {
     root[i] = forest.find(i);
     signs.sign[i] = forest.sign(i);
@@ -168,7 +169,7 @@ PatchSigns find_signs(const PatchGraph& graph, const std::array<float, 3>& up) {
   constexpr float kClear = 0.2F;  // share of evidence between clusters that do not contradict each other
   const std::size_t n = graph.nodes.size();
   PatchSigns signs{std::vector<std::int8_t>(n, 1), std::vector<SignSource>(n, SignSource::fixed), 0};
-  SignedForest forest(n);
+  SignedUnionFind forest(n);
   std::vector<Evidence> evidence = evidence_of(graph);
   grow_forest(evidence, kClear, forest, n);
   std::vector<std::uint32_t> root(n);

@@ -1,4 +1,4 @@
-#include "normals/plane.h"
+#include "normals/directions.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -2,7 +2,7 @@
 #include <rapidcheck/gtest.h>
 
 #include "normals/patch_graph.h"
-#include "normals/signed_forest.h"
+#include "base/union_find.h"
 
 namespace lamina::normals {
 namespace {
@@ -104,7 +104,7 @@ RC_GTEST_PROP(PatchSigns, FindHiddenSigns, ()) {
   const auto hidden = *rc::gen::container<std::vector<int>>(n + 1, rc::gen::element(-1, 1));
   PatchGraph g;
   for (std::uint32_t i = 1; i <= n; ++i) g.nodes.push_back(node_at(1, 1));
-  SignedForest joined(n + 1);
+  SignedUnionFind joined(n + 1);
   for (const auto& [a, b] : *rc::gen::container<std::vector<std::pair<std::uint32_t, std::uint32_t>>>(
            rc::gen::pair(rc::gen::inRange<std::uint32_t>(1, n + 1), rc::gen::inRange<std::uint32_t>(1, n + 1)))) {
     if (a == b) continue;
@@ -121,10 +121,10 @@ RC_GTEST_PROP(PatchSigns, FindHiddenSigns, ()) {
   RC_ASSERT(s.components == components);
 }
 
-RC_GTEST_PROP(SignedForest, KeepsSignsRelativeToTheRoot, ()) {
+RC_GTEST_PROP(SignedUnionFind, KeepsSignsRelativeToTheRoot, ()) {
   constexpr std::uint32_t kMany = 40;
   const auto hidden = *rc::gen::container<std::vector<int>>(kMany, rc::gen::element(-1, 1));
-  SignedForest forest(kMany);
+  SignedUnionFind forest(kMany);
   for (int i = 0; i < 60; ++i) {
     const auto a = *rc::gen::inRange<std::uint32_t>(0, kMany);
     const auto b = *rc::gen::inRange<std::uint32_t>(0, kMany);

@@ -1,16 +1,47 @@
-// Disjoint sets whose members have a sign relative to each other.
+// Disjoint sets over the numbers 0 .. n-1 (union-find with path compression), plain and with a sign in every member.
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <numeric>
 #include <utility>
 #include <vector>
 
-namespace lamina::normals {
+namespace lamina {
 
-/// Over the numbers 0 .. n-1. Threads may work on sets that have nothing in common.
-class SignedForest {
+/// The smaller of two roots stays, so that a set's root is its smallest member, whatever the order of the unions.
+class UnionFind {
  public:
-  explicit SignedForest(std::size_t n) : parent_(n), sign_(n, 1) { std::iota(parent_.begin(), parent_.end(), 0U); }
+  UnionFind() = default;
+  explicit UnionFind(std::size_t n) { reset(n); }
+  /// n sets of one member each. Keeps its memory.
+  void reset(std::size_t n) {
+    parent_.resize(n);
+    std::iota(parent_.begin(), parent_.end(), 0U);
+  }
+  [[nodiscard]] std::size_t size() const { return parent_.size(); }
+  std::uint32_t find(std::uint32_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  /// False when a and b were in one set already.
+  bool unite(std::uint32_t a, std::uint32_t b) {
+    a = find(a);
+    b = find(b);
+    if (a == b) return false;
+    if (a > b) std::swap(a, b);
+    parent_[b] = a;
+    return true;
+  }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+/// Disjoint sets whose members have a sign relative to each other. Threads may work on sets that have nothing in
+/// common.
+class SignedUnionFind {
+ public:
+  explicit SignedUnionFind(std::size_t n) : parent_(n), sign_(n, 1) { std::iota(parent_.begin(), parent_.end(), 0U); }
 
   /// The set's root. sign(i) is relative to it until the next unite().
   std::uint32_t find(std::uint32_t i) {
@@ -51,4 +82,4 @@ class SignedForest {
   std::vector<std::int8_t> sign_;  ///< relative to the parent
 };
 
-}  // namespace lamina::normals
+}  // namespace lamina
