@@ -8,6 +8,7 @@
 #include "lamina/ranks.h"
 
 namespace lamina {
+
 namespace {
 
 std::optional<int> number_in(const char* variable) {

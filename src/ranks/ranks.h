@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "lamina/run.h"
-#include "ranks/bytes.h"
+#include "ranks/messages.h"
 
 namespace lamina::ranks {
 
@@ -19,9 +19,6 @@ struct Traffic {
   double waited = 0;  ///< seconds, for the other ranks and for messages under way
   std::uint64_t sent = 0, received = 0;
 };
-
-/// Where messages longer than `most` are cut: MPI counts bytes in an int.
-std::vector<std::size_t> message_lengths(std::size_t bytes, std::size_t most);
 
 /// All ranks the launcher started. Members are collective (all ranks call them, in one order) unless they say
 /// otherwise. Waiting ranks sleep, for a processor may have several. One thread at a time; failed_elsewhere() may be

@@ -1,13 +1,35 @@
+// An input that only rank 0 reads: it deals the rows out, so that the others store them.
 // The input read by all ranks: each has the samples of its rows in a store of its own.
 #pragma once
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
+#include "lamina/points.h"
 #include "ranks/ranks.h"
 #include "reconstruct/job.h"
+#include "store/ingest.h"
 
 namespace lamina::ranks {
+
+/// In the place of the input on the other ranks: the rows that rank 0 sends, in order.
+class DealtRows : public PointSource {
+ public:
+  DealtRows(Ranks& ranks, const PointSourceInfo& info);
+  /// Runs work that reads. Rank 0 meanwhile is in deal_rows().
+  void take(const std::function<void()>& work);
+  /// Throws Error(internal) when rank 0 has no more, for it or another has failed.
+  void read(std::uint64_t first, std::size_t count, SampleBatch& out) override;
+
+ private:
+  Ranks& ranks_;
+};
+
+/// Rank 0: does its own `work` with the source, then deals out what the others want, rank after rank, a batch ahead of
+/// them. Whatever fails, no rank is left waiting. `share`: the rows of a rank.
+void deal_rows(Ranks& ranks, PointSource& source, const std::function<void()>& work,
+               const std::function<RowSpan(int rank)>& share);
 
 struct SharedInput {
   StoredCloud cloud;       ///< its store has this rank's samples, and counts those of all (declare_shares())

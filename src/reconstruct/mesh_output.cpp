@@ -1,7 +1,6 @@
 #include "reconstruct/mesh_output.h"
 
 #include <tbb/task_arena.h>
-
 #include <utility>
 
 #include "reconstruct/final_vertices.h"
@@ -68,6 +67,28 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
     }
     clustered_.pop_front();
   }
+}
+
+void ClosingSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {
+  piece_.clear();
+  finder_.add(vertices, slab.triangles, piece_);
+  closer_.add(piece_);
+  vertices_ += vertices.size();
+  to_.write(slab, vertices);
+}
+
+holes::Addition ClosingSlabs::finish() {
+  piece_.clear();
+  finder_.finish(/*more=*/false, piece_);
+  closer_.add(piece_);
+  return closer_.finish(vertices_);
+}
+
+HoleStats close_holes(ClosingSlabs& slabs, MeshSink& sink) {
+  const holes::Addition addition = slabs.finish();
+  sink.append_vertices(addition.vertices);
+  sink.append_triangles(addition.triangles);
+  return slabs.stats();
 }
 
 }  // namespace lamina

@@ -1,7 +1,7 @@
-// The end of the pipeline: triangulated slabs are clustered, placed and written while the window goes on.
+// The end of the pipeline: triangulated slabs are clustered, placed and written while the window goes on; holes are
+// closed behind the last one.
 #pragma once
 #include <tbb/task_group.h>
-
 #include <atomic>
 #include <cstdint>
 #include <deque>
@@ -9,9 +9,12 @@
 #include <mutex>
 #include <vector>
 
+#include "boundary/hole_closer.h"
+#include "boundary/rim_finder.h"
 #include "clustering/cluster.h"
 #include "isosurface/iso_mesh.h"
 #include "lamina/frame.h"
+#include "lamina/surface.h"
 #include "meshes/mesh_sink.h"
 #include "reconstruct/final_vertices.h"
 
@@ -84,5 +87,27 @@ class MeshOutput {
   std::atomic<std::uint64_t> triangles_ = 0;
   tbb::task_group tasks_;
 };
+
+/// Passes slabs on and watches for rims.
+class ClosingSlabs final : public SlabSink {
+ public:
+  /// `settings`, `attributes`: as HoleCloser.
+  ClosingSlabs(const HoleSettings& settings, std::size_t attributes, SlabSink& to)
+      : closer_(settings, attributes), to_(to) {}
+  void write(const FinalSlab& slab, const VertexBatch& vertices) override;
+  /// All slabs have come: what is to be added to the mesh.
+  holes::Addition finish();
+  [[nodiscard]] const HoleStats& stats() const { return closer_.stats(); }
+
+ private:
+  holes::RimFinder finder_;
+  holes::HoleCloser closer_;
+  holes::RimPiece piece_;
+  std::uint64_t vertices_ = 0;
+  SlabSink& to_;
+};
+
+/// Adds to the mesh, which has all slabs, what closes its holes.
+HoleStats close_holes(ClosingSlabs& slabs, MeshSink& sink);
 
 }  // namespace lamina

@@ -5,10 +5,9 @@
 #include <filesystem>
 #include <optional>
 
-#include "chunks/checkpoint_folder.h"
 #include "chunks/cuts.h"
-#include "chunks/job.h"
-#include "chunks/new_folder.h"
+#include "chunks/folders.h"
+#include "chunks/part_identity.h"
 #include "chunks/part_slabs.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"

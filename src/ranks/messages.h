@@ -1,14 +1,81 @@
-// What ranks tell each other of the input.
+// What ranks tell each other, as bytes: all run one program on one kind of machine.
 #pragma once
+#include <algorithm>
 #include <array>
+#include <cstddef>
+#include <cstring>
+#include <span>
+#include <string>
+#include <type_traits>
 #include <vector>
 
+#include "lamina/error.h"
 #include "lamina/frame.h"
 #include "lamina/points.h"
-#include "ranks/bytes.h"
 #include "store/survey.h"
 
 namespace lamina::ranks {
+
+using Bytes = std::vector<std::byte>;
+
+class Packer {
+ public:
+  template <class T>
+  void put(const T& value) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    put_raw(&value, sizeof value);
+  }
+  void put(const std::string& text) {
+    put(text.size());
+    put_raw(text.data(), text.size());
+  }
+  template <class T>
+  void put(const std::vector<T>& values) {
+    static_assert(std::is_trivially_copyable_v<T>);
+    put(values.size());
+    put_raw(values.data(), values.size() * sizeof(T));
+  }
+  [[nodiscard]] Bytes take() { return std::move(bytes_); }
+
+ private:
+  void put_raw(const void* data, std::size_t size) {
+    const auto* from = static_cast<const std::byte*>(data);
+    bytes_.insert(bytes_.end(), from, from + size);
+  }
+  Bytes bytes_;
+};
+
+/// In the order they were put.
+class Unpacker {
+ public:
+  explicit Unpacker(std::span<const std::byte> bytes) : left_(bytes) {}
+  template <class T>
+  T get() {
+    static_assert(std::is_trivially_copyable_v<T>);
+    T value{};
+    get_raw(&value, sizeof value);
+    return value;
+  }
+  std::string get_text() {
+    std::string text(get<std::size_t>(), '\0');
+    get_raw(text.data(), text.size());
+    return text;
+  }
+  template <class T>
+  std::vector<T> get_list() {
+    std::vector<T> values(get<std::size_t>());
+    get_raw(values.data(), values.size() * sizeof(T));
+    return values;
+  }
+
+ private:
+  void get_raw(void* to, std::size_t size) {
+    if (size > left_.size()) throw Error(ExitCode::internal, "ranks: a message is shorter than what it should hold");
+    if (size > 0) std::memcpy(to, left_.data(), size);
+    left_ = left_.subspan(size);
+  }
+  std::span<const std::byte> left_;
+};
 
 inline void put(Packer& out, const PointSourceInfo& info) {
   out.put(info.path);
@@ -79,6 +146,13 @@ inline Frame get_frame(Unpacker& in) {
   for (int r = 0; r < 3; ++r) frame.rotation.row(r) = get_vector(in);
   frame.step = in.get<double>();
   return frame;
+}
+
+/// Where messages longer than `most` are cut: MPI counts bytes in an int.
+inline std::vector<std::size_t> message_lengths(std::size_t bytes, std::size_t most) {
+  std::vector<std::size_t> lengths;
+  for (; bytes > 0; bytes -= lengths.back()) lengths.push_back(std::min(bytes, most));
+  return lengths;
 }
 
 }  // namespace lamina::ranks

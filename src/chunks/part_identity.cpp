@@ -1,4 +1,4 @@
-#include "chunks/job.h"
+#include "chunks/part_identity.h"
 
 #include <fmt/format.h>
 
