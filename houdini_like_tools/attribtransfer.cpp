@@ -65,7 +65,7 @@ void add_attribtransfer(CLI::App& app) {
       ->type_name("FILE")
       ->group("Output");
   const std::string group = "Transfer";
-  tool->add_option("--attributes", o->settings.attributes, "Names, separated by commas; without it all")
+  tool->add_option("--attributes", o->settings.attributes, "Attributes to transfer, separated by commas [all]")
       ->delimiter(',')
       ->allow_extra_args(false)
       ->type_name("NAME,...")
@@ -74,17 +74,21 @@ void add_attribtransfer(CLI::App& app) {
                                                   {"weighted", TransferMode::weighted}};
   tool->add_option_function<std::string>(
           "--mode", [o, words](const std::string& word) { o->settings.mode = words.at(word); },
-          "The nearest point's value, or the weighted mean of the points in reach [nearest]")
+          "The nearest point's value, or the weighted mean of the points within --distance [nearest]")
       ->check(CLI::IsMember({"nearest", "weighted"}).description(""))
       ->type_name("nearest|weighted")
       ->group(group);
   tool->add_option("--distance", o->settings.distance,
-                   "Reach; 0: nearest: no limit, weighted: twice the points' own radii")
+                   "How far a point acts; 0: without limit (nearest), twice the points' own radii (weighted)")
       ->type_name("LENGTH")
       ->capture_default_str()
       ->group(group);
   add_columns(*tool, o->columns);
   add_run_options(*tool, o->run);
+  add_notes(
+      *tool,
+      "Points without a radius want --distance for the weighted mean. Memory: the mesh and four million points at a "
+      "time.");
   add_examples(*tool,
                "  lamina attribtransfer mesh.ply scan.ply --attributes red,green,blue -o coloured.ply\n"
                "  lamina attribtransfer mesh.ply scan.ply --mode weighted --distance 0.2 -o smooth.ply");

@@ -113,12 +113,17 @@ void run_check(const CheckOptions& o) {
 void add_check(CLI::App& app) {
   auto* tool = app.add_subcommand("check", "Check that a mesh is finite, manifold, oriented and closed");
   auto o = std::make_shared<CheckOptions>();
-  tool->add_option("MESH", o->mesh, "mesh to check: .ply .obj .off .stl, each also as .gz")->required();
+  tool->add_option("MESH", o->mesh, "Mesh to check: .ply .obj .off .stl, each also as .gz")->required()->type_name("");
   tool->add_option("--expect", o->expect,
-                   "exit with 6 when the mesh is not: manifold, or closed (manifold without boundary)")
-      ->check(CLI::IsMember({"manifold", "closed"}));
-  tool->add_option("--threads", o->run.threads, "0: all")->capture_default_str();
-  tool->add_flag("--json", o->json, "print JSON");
+                   "Exit with 6 when the mesh is not manifold, or not closed (manifold without boundary)")
+      ->check(CLI::IsMember({"manifold", "closed"}).description(""))
+      ->type_name("manifold|closed");
+  tool->add_option("--threads", o->run.threads, "Number of threads; 0 is every core")
+      ->type_name("N")
+      ->capture_default_str()
+      ->group("Run");
+  tool->add_flag("--json", o->json, "Print JSON");
+  add_notes(*tool, "The mesh is held in memory.");
   add_examples(*tool, "  lamina check mesh.ply --expect manifold");
   tool->callback([o] { run_check(*o); });
 }

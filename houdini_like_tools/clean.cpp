@@ -58,6 +58,12 @@ void add_clean(CLI::App& app) {
   add_bad_samples(*tool, o->bad);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);
+  add_notes(
+      *tool,
+      "Points are left out in this order: outside the box, by number, duplicates, outliers, more than wanted. Those "
+      "that stay keep their order and every value. lamina surface does the same while it reads, by the same options. "
+      "Where merging and thinning may choose, the point that comes first along the cloud stays; of equal positions "
+      "the first in the file. Memory: a bit for each point and 256 MB, the rest is on disk.");
   add_examples(*tool,
                "  lamina clean scan.ply --merge 0 --outliers 3 -o cleaned.ply\n"
                "  lamina clean scan.ply --spacing 0.05 -o thinned.ply");

@@ -86,11 +86,12 @@ void add_clip(CLI::App& app) {
                 o->region.box = Box{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
               })
       ->group("Region");
-  add_repeated_numbers(*tool, "--plane", 6, "X,Y,Z,NX,NY,NZ",
-                       "Keep what lies on the side of the plane through X,Y,Z to which NX,NY,NZ points; repeatable",
-                       [o](const auto& v) {
-                         o->region.half_spaces.push_back({{v[0], v[1], v[2]}, {v[3], v[4], v[5]}});
-                       })
+  add_repeated_numbers(
+      *tool, "--plane", 6, "X,Y,Z,NX,NY,NZ",
+      "Keep what lies on the side of the plane through X,Y,Z to which NX,NY,NZ points; may be repeated",
+      [o](const auto& v) {
+        o->region.half_spaces.push_back({{v[0], v[1], v[2]}, {v[3], v[4], v[5]}});
+      })
       ->group("Region");
   const std::map<std::string, Keep> words{{"inside", Keep::inside}, {"outside", Keep::outside}};
   tool->add_option_function<std::string>(
@@ -103,6 +104,10 @@ void add_clip(CLI::App& app) {
   add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);
+  add_notes(
+      *tool,
+      "Points and voxels are kept or not. Triangles are cut, and the cut edges stay open; a level set is open from "
+      "then on. Points stream, meshes and volumes are held.");
   add_examples(*tool,
                "  lamina clip scan.ply --box -1,0,-1,1,0.8,1 -o part.ply\n"
                "  lamina clip mesh.ply --plane 0,0,0,0,1,0 -o upper.ply\n"

@@ -71,13 +71,25 @@ void run_compare(const CompareOptions& o) {
 void add_compare(CLI::App& app) {
   auto* tool = app.add_subcommand("compare", "Measure the two-sided distance between mesh A and mesh B, the truth");
   auto o = std::make_shared<CompareOptions>();
-  tool->add_option("A", o->a, "mesh (or points) to judge")->required();
-  tool->add_option("B", o->b, "the truth: mesh (or points); relative figures divide by its box's diagonal")->required();
-  tool->add_option("--count", o->settings.count, "samples per side, spread by area")->capture_default_str();
-  tool->add_flag("--vertices", o->settings.vertices, "measure at the vertices instead: what of the error is their own");
-  tool->add_option("--seed", o->settings.seed)->capture_default_str();
-  tool->add_option("--threads", o->run.threads, "0: all")->capture_default_str();
-  tool->add_flag("--json", o->json, "print JSON");
+  tool->add_option("A", o->a, "Mesh (or points) to judge")->required()->type_name("");
+  tool->add_option("B", o->b, "The truth: mesh (or points); relative figures divide by its box's diagonal")
+      ->required()
+      ->type_name("");
+  tool->add_option("--count", o->settings.count, "Samples per side, spread by area")
+      ->type_name("N")
+      ->capture_default_str();
+  tool->add_flag("--vertices", o->settings.vertices,
+                 "Measure at the vertices instead of at samples: the part of the error that is their own");
+  tool->add_option("--seed", o->settings.seed, "Another seed, other samples")->type_name("N")->capture_default_str();
+  tool->add_option("--threads", o->run.threads, "Number of threads; 0 is every core")
+      ->type_name("N")
+      ->capture_default_str()
+      ->group("Run");
+  tool->add_flag("--json", o->json, "Print JSON");
+  add_notes(
+      *tool,
+      "Both meshes are held in memory. Distances are in the meshes' units: root mean square, mean, 99th percentile and "
+      "maximum of samples of A to the surface of B, and of B to that of A.");
   add_examples(*tool, "  lamina compare mesh.ply other.obj --count 2000");
   tool->callback([o] { run_compare(*o); });
 }

@@ -185,18 +185,18 @@ void add_convert(CLI::App& app) {
   auto* tool = app.add_subcommand("convert", "Write points or a mesh in another format");
   auto o = std::make_shared<ConvertOptions>();
   add_files(*tool, o->input, "Points (streamed), mesh or volume (.vdb: level set or points)", o->output,
-            "Points, mesh (.ply .obj .off .stl) or volume (.vdb: of a mesh its level set, of points a points grid)");
+            "File to write: points (.ply .xyz .csv .pcd .las), mesh (.ply .obj .off .stl) or volume (.vdb)");
   tool->add_flag("--vertices", o->vertices, "Write a mesh's vertices as points")->group("Output");
   const std::string volume = "Volume";
   tool->add_option("--grid", o->grid, "Name of the grid to read, or of the points grid to write")
       ->type_name("NAME")
       ->group(volume);
   tool->add_option("--voxelsize", o->volume.voxel,
-                   "Edge of a voxel; 0: of a level set the mean length of the edges, of points for eight in a voxel")
+                   "Edge of a voxel; 0: the mean length of the mesh's edges, or eight points in a voxel")
       ->type_name("LENGTH")
       ->capture_default_str()
       ->group(volume);
-  tool->add_option("--halfbandvoxels", o->volume.band, "Half width of a level set's band, in voxels")
+  tool->add_option("--halfbandvoxels", o->volume.band, "Half width of a level set's band, in voxels, 1 to 1000")
       ->type_name("N")
       ->capture_default_str()
       ->group(volume);
@@ -204,16 +204,22 @@ void add_convert(CLI::App& app) {
       ->type_name("A")
       ->capture_default_str()
       ->group(volume);
-  tool->add_option("--isovalue", o->meshing.isovalue, "Mesh of a level set: at this distance from the surface")
+  tool->add_option("--isovalue", o->meshing.isovalue,
+                   "Mesh of a level set: at this distance from the surface, inside its band")
       ->type_name("LENGTH")
       ->capture_default_str()
       ->group(volume);
-  tool->add_flag("--fog", o->fog, "Make a fog volume of a level set")->group(volume);
+  tool->add_flag("--fog", o->fog, "Make a fog volume (grid density) of a level set")->group(volume);
   tool->add_flag("--half", o->volume.half, "Store a level set or fog in 16-bit floats")->group(volume);
   add_columns(*tool, o->columns);
   add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);
+  add_notes(
+      *tool,
+      "The ending of the output says what is made. A mesh becomes a level set where that is .vdb, and a level set a "
+      "mesh where it is not; points become an OpenVDB points grid, and such a grid points. Points stream from file "
+      "to file; meshes, volumes and points on their way to or from a .vdb are held in memory.");
   add_examples(*tool,
                "  lamina convert mesh.ply -o mesh.obj\n"
                "  lamina convert mesh.ply -o mesh.vdb --voxelsize 0.05\n"

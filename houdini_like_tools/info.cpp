@@ -215,6 +215,10 @@ void add_info(CLI::App& app) {
   tool->add_flag("--json", o->json, "Print JSON");
   add_columns(*tool, o->columns);
   add_run_options(*tool, o->run);
+  add_notes(*tool,
+            "Tells the number of points, vertices or voxels, the box, every attribute with its type and range, and a "
+            "histogram of the radii; of a .vdb every grid with its tree, transform and metadata. Points are read in "
+            "batches, meshes are held.");
   add_examples(*tool, "  lamina info scan.ply\n  lamina info mesh.ply --json");
   tool->callback([o] { run_info(*o); });
 }

@@ -1,8 +1,6 @@
-// lamina man: manual pages, made from the tools' own options.
+// lamina man: manual pages and the reference, made from the tools' own options.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -60,18 +58,22 @@ std::string entry_text(const OptionEntry& entry) {
   }
   if (!entry.value.empty()) names += fmt::format(" \\fI{}\\fR", literal(entry.value));
   std::string text = fmt::format(".TP\n{}\n{}", names, literal(entry.description));
+  if (!entry.range.empty()) text += literal(fmt::format(" ({})", entry.range));
   if (!entry.fallback.empty()) text += literal(fmt::format(" [{}]", entry.fallback));
   return text + ".\n";
 }
 
+std::string description(const CLI::App& tool) {
+  std::string text;
+  for (const std::string& note : notes_of(tool))
+    text += fmt::format("{}\n{}\n", text.empty() ? ".SH DESCRIPTION" : ".PP", literal(note));
+  return text;
+}
+
 std::string options(const CLI::App& tool) {
   const std::vector<OptionEntry> table = option_table(tool);
-  std::vector<std::string> groups;
-  for (const OptionEntry& entry : table) {
-    if (std::find(groups.begin(), groups.end(), entry.group) == groups.end()) groups.push_back(entry.group);
-  }
   std::string text = ".SH OPTIONS\n";
-  for (const std::string& group : groups) {
+  for (const std::string& group : groups_of(table)) {
     text += fmt::format(".SS {}\n", literal(group));
     for (const OptionEntry& entry : table)
       if (entry.group == group) text += entry_text(entry);
@@ -79,40 +81,25 @@ std::string options(const CLI::App& tool) {
   return text;
 }
 
-/// The footer's lines that are indented.
 std::string examples(const CLI::App& tool) {
-  const std::string footer = tool.get_footer();
-  if (footer.empty()) return {};
-  std::string text = ".SH EXAMPLES\n.nf\n";
-  for (std::size_t at = 0; at < footer.size();) {
-    const std::size_t end = std::min(footer.find('\n', at), footer.size());
-    const std::string_view line = std::string_view(footer).substr(at, end - at);
-    if (line.starts_with("  ")) text += literal(line.substr(2)) + "\n";
-    at = end + 1;
-  }
-  return text + ".fi\n";
+  std::string text;
+  for (const std::string& line : examples_of(tool)) text += literal(line) + "\n";
+  return text.empty() ? "" : ".SH EXAMPLES\n.nf\n" + text + ".fi\n";
 }
 
 std::string exit_status() {
-  constexpr std::array<const char*, 7> kMeanings{"done",
-                                                 "a defect of the program, or cancelled",
-                                                 "options that cannot be meant",
-                                                 "input missing, truncated, of another format, or without what the job "
-                                                 "needs",
-                                                 "memory or disk: does not fit, ran out, or the output cannot be "
-                                                 "written",
-                                                 "nothing came out",
-                                                 "lamina check \\-\\-expect: the mesh is not what was promised"};
+  const auto& meanings = exit_code_meanings();
   std::string text = ".SH EXIT STATUS\n";
-  for (std::size_t code = 0; code < kMeanings.size(); ++code)
-    text += fmt::format(".TP\n.B {}\n{}.\n", code, kMeanings.at(code));
+  for (std::size_t code = 0; code < meanings.size(); ++code)
+    text += fmt::format(".TP\n.B {}\n{}.\n", code, literal(meanings.at(code)));
   return text;
 }
 
 std::string tool_page(const CLI::App& tool) {
   const std::string page = "lamina-" + tool.get_name();
   return title(page) + fmt::format(".SH NAME\n{} \\- {}\n", literal(page), literal(tool.get_description())) +
-         synopsis(tool) + options(tool) + examples(tool) + exit_status() + ".SH SEE ALSO\n.BR lamina (1)\n";
+         synopsis(tool) + description(tool) + options(tool) + examples(tool) + exit_status() +
+         ".SH SEE ALSO\n.BR lamina (1)\n";
 }
 
 std::string main_page(const CLI::App& app) {
@@ -128,9 +115,14 @@ std::string main_page(const CLI::App& app) {
 
 struct ManOptions {
   std::string tool, folder;
+  bool reference = false;
 };
 
 void run_man(const CLI::App& app, const ManOptions& o) {
+  if (o.reference) {
+    fmt::print("{}", reference_page(app));
+    return;
+  }
   if (!o.folder.empty()) {
     const std::filesystem::path folder = o.folder;
     ResultFile((folder / "lamina.1").string()).write(main_page(app));
@@ -159,6 +151,7 @@ void add_man(CLI::App& app) {
   tool->add_option("--all", o->folder, "Write all pages into this folder instead")
       ->check(CLI::ExistingDirectory)
       ->type_name("DIR");
+  tool->add_flag("--reference", o->reference, "Print docs/reference.md instead: all options of all tools");
   tool->callback([&app, o] { run_man(app, *o); });
 }
 

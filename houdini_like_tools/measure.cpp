@@ -114,6 +114,10 @@ void add_measure(CLI::App& app) {
       ->type_name("");
   tool->add_flag("--json", o->json, "Print JSON");
   add_run_options(*tool, o->run);
+  add_notes(
+      *tool,
+      "Tells area, volume (where the mesh is closed), edge lengths, boundary, curvature, and each connected part. The "
+      "mesh is held in memory.");
   add_examples(*tool, "  lamina measure mesh.ply\n  lamina measure mesh.ply --json");
   tool->callback([o] { run_measure(*o); });
 }

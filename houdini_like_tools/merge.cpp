@@ -115,12 +115,11 @@ void add_merge(CLI::App& app) {
             for (const std::string& name : names) o->inputs.push_back(pipe_name(name));
           },
           "Points (streamed) or meshes, in the order in which they are to stand: files, folders, patterns, scan lists "
-          "(.conf), FILE@POSE.txt; - for PLY on standard input. Or all parts of a mesh that 'lamina surface --chunk' "
-          "made, "
-          "in any order")
+          "(.conf), FILE@POSE.txt; - for PLY on standard input. Or all parts of a mesh that lamina surface --chunk "
+          "made, in any order")
       ->required()
       ->expected(1, 1000000)
-      ->type_name("");
+      ->type_name(" ");
   tool->add_option_function<std::string>(
           "-o,--output", [o](const std::string& name) { o->output = pipe_name(name); },
           "File of the same kind; - for PLY on standard output")
@@ -131,7 +130,7 @@ void add_merge(CLI::App& app) {
       {"refuse", MixedAttributes::refuse}, {"fill", MixedAttributes::fill}, {"intersect", MixedAttributes::intersect}};
   tool->add_option_function<std::string>(
           "--mixed", [o, words](const std::string& word) { o->mixed = words.at(word); },
-          "Attributes that not all have: refuse; fill with 0; intersect: leave out [refuse]")
+          "Attributes that not all inputs have: refuse, naming them; fill with 0; intersect: leave out [refuse]")
       ->check(CLI::IsMember({"refuse", "fill", "intersect"}).description(""))
       ->type_name("refuse|fill|intersect")
       ->group("Input");
@@ -139,6 +138,12 @@ void add_merge(CLI::App& app) {
   add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);
+  add_notes(
+      *tool,
+      "Points and meshes follow one another in the order given. Volumes are united: the files of a --vdb-split "
+      "sequence, level sets as solids, grids of other names side by side; the result is held in memory. The parts of "
+      "lamina surface --chunk are joined to the one mesh, streaming; a part that is missing, there twice, damaged or "
+      "of another run is named. Points stream, meshes are held.");
   add_examples(*tool,
                "  lamina merge scan.ply more.ply -o both.ply\n"
                "  lamina merge scan.ply plain.ply --mixed intersect -o common.ply");

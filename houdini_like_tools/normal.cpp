@@ -78,27 +78,38 @@ void run_normal(const NormalOptions& o) {
 void add_normal(CLI::App& app) {
   auto* tool = app.add_subcommand("normal", "Find normals of points, or turn those they have to one side");
   auto o = std::make_shared<NormalOptions>();
-  tool->add_option("INPUT", o->inputs,
-                   "points of any format; several files, folders, patterns or scan lists are one cloud; - for standard "
-                   "input")
-      ->required();
+  tool->add_option(
+          "INPUT", o->inputs,
+          "Points of any format; several files, folders, patterns or scan lists are one cloud; - for PLY on standard "
+          "input")
+      ->required()
+      ->type_name("");
   tool->add_option_function<std::string>(
           "-o,--output", [o](const std::string& name) { o->output = pipe_name(name); },
-          "the points with normals: .ply .xyz .csv .pcd .las; - for PLY on standard output")
+          "Points to write: .ply .xyz .csv .pcd .las; - for PLY on standard output. Samples that lie on no surface "
+          "have the "
+          "normal 0 0 0")
       ->type_name("FILE")
       ->group("Output");
   const std::string group = "Normals";
-  tool->add_flag("--reorient", o->reorient, "keep the directions the input has, change signs only")->group(group);
-  tool->add_flag("--missing", o->missing, "keep the normals the input has, find those it lacks")->group(group);
-  tool->add_flag("--check", o->check, "change and write nothing: tell the share of sign conflicts")->group(group);
+  tool->add_flag("--reorient", o->reorient, "Keep the directions the input has, change signs only")->group(group);
+  tool->add_flag("--missing", o->missing, "Keep the normals the input has, find those it lacks")->group(group);
+  tool->add_flag("--check", o->check, "Change and write nothing: tell the share of sign conflicts")->group(group);
   add_normals_options(*tool, o->settings, group);
   add_columns(*tool, o->columns);
   add_bad_samples(*tool, o->settings.bad_samples);
   add_precision(*tool, o->precision);
-  tool->add_option("--stats", o->stats, "write counts and conflicts by slab to this JSON file, - for standard output")
+  tool->add_option("--stats", o->stats, "Write counts and conflicts by slab to this JSON file; - for standard output")
       ->type_name("FILE.json")
       ->group("Run");
   add_run_options(*tool, o->run);
+  add_notes(
+      *tool,
+      "Each normal comes from the plane through the nearest samples. Its sign comes from the scanner's position or an "
+      "up direction where one is known; without, every surface turns its outside out. Signs travel from neighbour to "
+      "neighbour, so that places seen at a grazing angle follow those seen well. The share of neighbours that still "
+      "contradict each other is reported, with a warning past two percent. Memory goes with the cross-section of the "
+      "cloud, and 64 MB; the rest is on disk.");
   add_examples(*tool,
                "  lamina normal scan.ply -o with_normals.ply\n"
                "  lamina normal scan.ply --k 8 --up 0,0,1 -o up.ply\n"

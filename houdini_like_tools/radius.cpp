@@ -55,15 +55,15 @@ void add_radius(CLI::App& app) {
   add_files(*tool, o->input, "Points; a radius they have is replaced", o->output, "Points with a radius");
   const std::string group = "Radius";
   PointRadiiSettings& s = o->settings;
-  tool->add_option("--density", s.density, "Samples a counting cell needs to give a radius")
+  tool->add_option("--density", s.density, "Samples a counting cell needs to give a radius, 2 to 4096")
       ->type_name("N")
       ->capture_default_str()
       ->group(group);
-  tool->add_option("--particlescale", s.particlescale, "Multiply every radius")
+  tool->add_option("--particlescale", s.particlescale, "Multiply every radius by K, up to 1000")
       ->type_name("K")
       ->capture_default_str()
       ->group(group);
-  tool->add_option("--minradius", s.minradius, "Raise smaller radii to this")
+  tool->add_option("--minradius", s.minradius, "Raise smaller radii to this; 0: none")
       ->type_name("LENGTH")
       ->capture_default_str()
       ->group(group);
@@ -81,6 +81,10 @@ void add_radius(CLI::App& app) {
   add_bad_samples(*tool, s.bad_samples);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);
+  add_notes(
+      *tool,
+      "The radius is the one lamina surface would use. Normals are not needed. Memory: 256 MB and some cells, the rest "
+      "is on disk.");
   add_examples(*tool,
                "  lamina radius scan.ply -o with_radii.ply\n"
                "  lamina radius scan.ply --particlescale 0.5 --name pscale -o particles.ply");

@@ -56,7 +56,7 @@ void run_render(const RenderOptions& o) {
 
 void add_camera_options(CLI::App& tool, RenderSettings& s) {
   add_numbers(tool, "--view", ',', 2, "AZIMUTH,ELEVATION",
-              "Where the camera stands, degrees around and above; 0,0 is the front [30,20]",
+              "Where the camera stands, in degrees around and above; 0,0 is the front [30,20]",
               [&s](const auto& v) {
                 s.azimuth = v[0];
                 s.elevation = v[1];
@@ -78,7 +78,7 @@ void add_camera_options(CLI::App& tool, RenderSettings& s) {
       ->type_name("x|y|z")
       ->group("Camera");
   add_numbers(tool, "--zoom", ',', 4, "X,Y,Z,RADIUS",
-              "Look at a place: this ball fills the picture, what hides it is cut away",
+              "Look at a place: this ball fills the picture, and what hides it is cut away [everything]",
               [&s](const auto& v) {
                 if (!(v[3] > 0)) throw CLI::ValidationError("--zoom", "the radius must be positive");
                 s.zoom = RenderSettings::Zoom{{v[0], v[1], v[2]}, v[3]};
@@ -100,7 +100,7 @@ void add_look_options(CLI::App& tool, RenderSettings& s) {
   tool.add_flag("--mark-boundary", s.mark_boundary, "Edges of only one triangle in red, over everything")
       ->group("Look");
   tool.add_option("--point-radius", s.point_radius,
-                  "Radius of points' discs in input units; 0: half their own radius, or from density")
+                  "Radius of points' discs; 0: half their own radius, or from the density")
       ->check(CLI::NonNegativeNumber.description(""))
       ->type_name("LENGTH")
       ->capture_default_str()
@@ -110,7 +110,8 @@ void add_look_options(CLI::App& tool, RenderSettings& s) {
 void add_paint_options(CLI::App& tool, PaintOptions& paint) {
   tool.add_option(
           "--paint", paint.what,
-          "Values as colours, blue to red: distance from --reference, or the name of an attribute (radius, ...)")
+          "Values of a mesh or of points as colours, blue to red: the distance from --reference, radius, or any other "
+          "attribute by name; the scale is printed")
       ->type_name("distance|NAME")
       ->group("Look");
   tool.add_option("--reference", paint.reference, "The mesh or .vdb level set from which --paint distance measures")
@@ -154,7 +155,7 @@ void add_render(CLI::App& app) {
       ->required()
       ->type_name("FILE")
       ->group("Picture");
-  add_numbers(*tool, "--size", 'x', 2, "WxH", "Pixels of the whole picture [1024x1024]",
+  add_numbers(*tool, "--size", 'x', 2, "WxH", "Pixels of the whole picture, sides of 1 to 16384 [1024x1024]",
               [o](const std::vector<double>& v) {
                 for (const double side : v) {
                   if (side != std::floor(side) || side < 1 || side > 16384) {
@@ -178,6 +179,12 @@ void add_render(CLI::App& app) {
       ->type_name("NAME")
       ->group("Look");
   add_run_options(*tool, o->run);
+  add_notes(
+      *tool,
+      "Needs no screen. Back faces are tinted blue. Point files are drawn in batches and may be larger than memory; "
+      "meshes and volumes are held. Level sets are drawn by OpenVDB's ray intersector, smooth, in the colours of "
+      "their grid Cd, open ones without their band's rim; with --flat, --wireframe, --mark-boundary or --paint they "
+      "are meshed first. OpenVDB points are drawn as points, fogs by the light that their density lets through.");
   add_examples(*tool,
                "  lamina render mesh.ply --size 200x200 -o mesh.png\n"
                "  lamina render scan.ply --size 200x200 --up z -o scan.png\n"

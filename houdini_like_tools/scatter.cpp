@@ -63,36 +63,48 @@ void run_scatter(const ScatterOptions& o, bool scanning) {
 }  // namespace
 
 void add_scatter(CLI::App& app) {
-  auto* tool =
-      app.add_subcommand("scatter", "Scatter points with normals (and colours) over a surface, uniformly by area");
+  auto* tool = app.add_subcommand(
+      "scatter", "Scatter points with normals (and colours) over a mesh or a shape, uniformly by area");
   auto o = std::make_shared<ScatterOptions>();
-  auto* mesh = tool->add_option("MESH", o->mesh, "mesh to sample: .ply .obj .off .stl, each also as .gz");
-  auto* shape = tool->add_option("--shape", o->shape, "a procedural shape instead of a mesh")
+  auto* mesh =
+      tool->add_option("MESH", o->mesh, "Mesh to sample: .ply .obj .off .stl, each also as .gz")->type_name("");
+  auto* shape = tool->add_option("--shape", o->shape, "A procedural shape instead of a mesh")
                     ->check(CLI::IsMember(known_shapes()));
   mesh->excludes(shape);
   tool->add_flag("--colour,--color", o->colour,
-                 "give the shape an analytic pattern of colours (a mesh and the amphora bring their own)")
+                 "Give the shape an analytic pattern of colours; a mesh and the amphora bring their own")
       ->needs(shape);
-  tool->add_option("-o,--output", o->output, "points to write: binary little-endian PLY, - for standard output")
-      ->required();
-  tool->add_option("--count", o->settings.count, "number of samples")->capture_default_str();
-  tool->add_option("--seed", o->settings.seed, "another seed, another cloud")->capture_default_str();
+  tool->add_option("-o,--output", o->output, "Points to write: binary little-endian PLY, - for standard output")
+      ->required()
+      ->type_name("FILE");
+  tool->add_option("--count", o->settings.count, "Number of samples")->type_name("N")->capture_default_str();
+  tool->add_option("--seed", o->settings.seed, "Another seed, another cloud")->type_name("N")->capture_default_str();
   tool->add_option("--noise", o->settings.noise,
-                   "k: move every coordinate by up to k/2 local spacings either way, uniformly")
+                   "Move every coordinate by up to K/2 local spacings either way, uniformly")
+      ->type_name("K")
       ->capture_default_str();
-  tool->add_option(
-          "--density-ratio,--varying", o->settings.density_ratio,
-          "D: let the density fall D-fold, evenly by octaves, along the longest axis (spacing grows by sqrt(D))")
+  tool->add_option("--density-ratio,--varying", o->settings.density_ratio,
+                   "Let the density fall D-fold, evenly by octaves, along the longest axis (the spacing grows by the "
+                   "root of D); up "
+                   "to 1000000")
+      ->type_name("D")
       ->capture_default_str();
-  tool->add_flag("--double", o->settings.double_positions, "write double positions");
+  tool->add_flag("--double", o->settings.double_positions, "Write double positions");
   auto* scanning = tool->add_option(
       "--scan", o->scan.views,
-      "VIEWS: instead of scattering, scan the mesh (or the amphora) from so many sides; adds confidence");
-  tool->add_option("--scan-noise", o->scan.noise, "range noise, standard deviation in grid spacings")
+      "Instead of scattering, scan the mesh (or --shape amphora) with a make-believe range camera from so many sides; "
+      "adds confidence");
+  scanning->type_name("VIEWS");
+  tool->add_option("--scan-noise", o->scan.noise, "Range noise of --scan: a standard deviation in grid spacings")
+      ->type_name("K")
       ->capture_default_str()
       ->needs(scanning);
-  tool->add_option("--threads", o->run.threads, "0: all")->capture_default_str();
-  tool->add_flag("--quiet", o->quiet, "no summary");
+  tool->add_option("--threads", o->run.threads, "Number of threads; 0 is every core")
+      ->type_name("N")
+      ->capture_default_str()
+      ->group("Run");
+  tool->add_flag("--quiet", o->quiet, "No summary")->group("Run");
+  add_notes(*tool, "The mesh is held in memory, the points are not.");
   add_examples(*tool,
                "  lamina scatter mesh.ply --count 5000 -o points.ply\n"
                "  lamina scatter --shape torus --count 5000 --noise 1 -o noisy.ply");

@@ -80,7 +80,7 @@ void add_sort(CLI::App& app) {
           "Points; - for PLY on standard input. With --store several files, folders, patterns or scan lists")
       ->required()
       ->expected(1, 1000000)
-      ->type_name("");
+      ->type_name(" ");
   auto* output = tool->add_option_function<std::string>(
                          "-o,--output", [o](const std::string& name) { o->output = pipe_name(name); },
                          "Points; - for PLY on standard output")
@@ -93,8 +93,9 @@ void add_sort(CLI::App& app) {
                                              {"spatial", SortKey::spatial}};
   auto* by = tool->add_option_function<std::string>(
                      "--by", [o, words](const std::string& word) { o->settings.key = words.at(word); },
-                     "An axis; sweep: the dominant axis, as a reconstruction sweeps; spatial: neighbours in space "
-                     "become neighbours in the file [spatial]")
+                     "An axis; sweep: the cloud's dominant axis, as a reconstruction sweeps; spatial: a space-filling "
+                     "curve, so "
+                     "that neighbours in space are neighbours in the file [spatial]")
                  ->check(CLI::IsMember({"x", "y", "z", "sweep", "spatial"}).description(""))
                  ->type_name("x|y|z|sweep|spatial")
                  ->group("Order");
@@ -120,12 +121,14 @@ void add_sort(CLI::App& app) {
   tool->add_option_function<std::string>(
           "--frame",
           [o](const std::string& word) { o->reading.frame = word == "axis" ? FrameMode::axis : FrameMode::pca; },
-          "Of the store: sweep along the dominant axis, or along the longest input axis [pca]")
+          "Of the store: sweep along the cloud's dominant axis, or along the longest input axis [pca]")
       ->check(CLI::IsMember({"pca", "axis"}).description(""))
       ->type_name("pca|axis")
       ->needs(folder)
       ->group(store);
-  tool->add_option("--particlescale", o->reading.radius_scale, "Multiplies the radii that the input gives")
+  tool->add_option("--particlescale", o->reading.radius_scale,
+                   "Multiply the radii that the input gives by K; lamina surface scales those it estimates")
+      ->type_name("K")
       ->capture_default_str()
       ->needs(folder)
       ->group(store);
@@ -134,6 +137,12 @@ void add_sort(CLI::App& app) {
   add_bad_samples(*tool, o->settings.bad_samples);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);
+  add_notes(
+      *tool,
+      "Values stay the same bits, and equal keys keep their order. With --store one cloud of any number of inputs goes "
+      "into a folder with an index, the frame and checksums, from which lamina surface reconstructs, in chunks on many "
+      "machines if need be; the store can be cleaned and given normals on the way. Memory: 256 MB, the rest is on "
+      "disk.");
   add_examples(*tool,
                "  lamina sort scan.ply --by sweep -o swept.ply\n"
                "  lamina sort scan.ply --store scan.store\n"

@@ -126,34 +126,43 @@ void add_surface(CLI::App& app) {
   SurfaceSettings& s = o->settings;
   tool->add_option(
           "INPUT", o->inputs,
-          "points with normals: PLY, OBJ, XYZ and other text, PTX, PCD, LAS, also gzipped; several files, "
-          "folders, patterns or scan lists (.conf) are one cloud; FILE@POSE.txt moves a file by the 4x4 matrix "
-          "in POSE.txt; - or stdin.ply for standard input")
-      ->required();
+          "Points with normals: PLY, OBJ, XYZ and other text, PTX, PCD, LAS, points of a .vdb, also gzipped; several "
+          "files, folders, patterns or scan lists (.conf) are one cloud; FILE@POSE.txt moves a file by the 4x4 matrix "
+          "in POSE.txt. Or a store that lamina sort --store made. - for PLY on standard input")
+      ->required()
+      ->type_name("");
   auto* output = tool->add_option(
       "-o,--output", s.output,
-      "mesh to write: binary PLY, named .ply; - or stdout.ply for standard output (| lamina convert - -o mesh.obj)");
+      "Mesh to write: binary PLY, named .ply; - for standard output, and from there to other formats: '| lamina "
+      "convert - -o mesh.obj'. Not needed with --dry-run and --print-tasks");
+  output->type_name("FILE");
 
   const std::string samples = "Samples";
-  tool->add_option("--columns", s.columns,
-                   "what the columns of text files hold: names as in x,y,z,nx,ny,nz,red:uchar,-, - for those to skip")
-      ->type_name("NAMES")
-      ->group(samples);
-  tool->add_option("--frame", s.frame, "pca: sweep along the dominant axis; axis: along the longest input axis")
+  add_columns(*tool, s.columns, samples);
+  tool->add_option("--frame", s.frame,
+                   "pca: sweep along the cloud's dominant axis, for the least memory; axis: along the longest input "
+                   "axis, so that "
+                   "voxels lie along the input's axes")
       ->transform(words<FrameMode>({{"pca", FrameMode::pca}, {"axis", FrameMode::axis}}))
       ->option_text("pca|axis [pca; axis with --vdb]")
       ->group(samples);
-  tool->add_option("--bad-samples", s.bad_samples, "non-finite, no normal, radius <= 0: leave out, or refuse the file")
+  tool->add_option(
+          "--bad-samples", s.bad_samples,
+          "Samples that are not finite, have no normal or a radius of 0 or less: leave out, or refuse the file")
       ->transform(words<BadSamples>({{"drop", BadSamples::drop}, {"refuse", BadSamples::refuse}}))
       ->option_text("drop|refuse [drop]")
       ->group(samples);
-  tool->add_option("--particlescale", s.radius_scale, "multiplies every sample's radius, given or estimated")
+  tool->add_option("--particlescale", s.radius_scale,
+                   "Multiply every sample's radius, given or estimated, by K; up to 1000")
+      ->type_name("K")
       ->capture_default_str()
       ->group(samples);
-  tool->add_option("--density", s.density, "samples a counting cell needs to give a radius")
+  tool->add_option("--density", s.density, "Samples a counting cell needs to give a radius, 2 to 4096")
+      ->type_name("N")
       ->capture_default_str()
       ->group(samples);
-  add_length(*tool, "--max-radius", s.max_radius, "discard samples with a larger radius as undersampled; 0: none")
+  add_length(*tool, "--max-radius", s.max_radius,
+             "Discard samples with a larger radius as undersampled; r is the median radius here; 0: none")
       ->group(samples);
 
   add_clean_options(*tool, s.clean, "Cleaning");
@@ -163,54 +172,88 @@ void add_surface(CLI::App& app) {
   add_fit_options(*tool, s);
 
   const std::string mesh = "Mesh";
-  tool->add_option(
-          "--boundary", s.boundary,
-          "reject where the projection lies farther than this (in R) from the average of its samples; 0: never")
+  tool->add_option("--boundary", s.boundary,
+                   "Reject the surface where the projection lies farther than K influence radii R from the average of "
+                   "its samples; "
+                   "0: never")
+      ->type_name("K")
       ->capture_default_str()
       ->group(mesh);
-  tool->add_option("--cluster", s.cluster, "vertex clustering; free may change the topology")
+  tool->add_option("--cluster", s.cluster,
+                   "Vertex clustering: none, preserving the topology, or free, which may change it")
       ->transform(words<ClusterMode>(
           {{"none", ClusterMode::none}, {"free", ClusterMode::free}, {"preserving", ClusterMode::preserving}}))
       ->option_text("none|free|preserving [preserving]")
       ->group(mesh);
-  tool->add_option("--chord", s.chord, "outward shift of clustered vertices, times curvature and cell squared")
+  tool->add_option("--chord", s.chord,
+                   "Outward shift of clustered vertices: K times the curvature times the cell squared; 0 to 1")
+      ->type_name("K")
       ->capture_default_str()
       ->group(mesh);
-  tool->add_flag("--level", s.vertex_levels,
-                 "give vertices their octree level, 0 the finest, as property level; 'lamina render --paint level'")
+  tool->add_flag(
+          "--level", s.vertex_levels,
+          "Give vertices their octree level, 0 the finest, as property level: 'lamina render mesh.ply --paint level'")
       ->group(mesh);
 
   tool->add_flag("--curvature", s.vertex_curvature,
-                 "give vertices the mean curvature, 1 / length, as property curvature; convex is positive")
+                 "Give vertices the mean curvature (1 / length, positive where convex) as property curvature; needs "
+                 "the sphere fit")
       ->group(mesh);
 
   add_hole_options(*tool, s, mesh);
-  tool->add_option("--prune", s.prune_triangles, "leave out connected parts of fewer triangles")
+  tool->add_option("--prune", s.prune_triangles, "Leave out connected parts of fewer than N triangles; 0: none")
       ->type_name("N")
       ->capture_default_str()
       ->group(mesh);
-  add_length(*tool, "--prune-size", s.prune_size, "leave out parts whose box has a shorter diagonal; 0: none")
+  add_length(*tool, "--prune-size", s.prune_size,
+             "Leave out connected parts whose box has a shorter diagonal; r is the median radius here; 0: none")
       ->group(mesh);
-  tool->add_flag("--local", s.local, "write coordinates less a round shift, for programs that read floats")
+  tool->add_flag("--local", s.local,
+                 "Subtract a round shift from the coordinates, for programs that read floats; the statistics, the "
+                 "PLY's comment "
+                 "shift and the .vdb's metadata shift name it")
       ->group(mesh);
 
   add_volume_options(*tool, s.volume);
   add_parts_options(*tool, o->parts);
 
-  tool->add_option("--window", s.window, "slabs each stage advances at once")->capture_default_str()->group("Run");
+  tool->add_option("--window", s.window,
+                   "Slabs each stage advances at once, 1 to 1024; more keeps many cores busier and takes memory")
+      ->type_name("N")
+      ->capture_default_str()
+      ->group("Run");
   auto* dry =
-      tool->add_flag("--dry-run", s.dry_run, "print levels, slabs, expected memory, disk and time; write nothing")
+      tool->add_flag("--dry-run", s.dry_run, "Print levels, slabs, expected memory, disk and time; write nothing")
           ->group("Run");
-  tool->add_option("--preview", o->preview, "draw the finished mesh; one too large to be held as its vertices")
+  tool->add_option(
+          "--preview", o->preview,
+          "Draw the finished mesh; as its vertices where it is too large to be held: four times its file within "
+          "--max-memory, or 1 GB")
       ->type_name("OUT.png")
       ->group("Run");
-  tool->add_option("--stats", o->stats, "write counts, times and memory to this JSON file, - for standard output")
+  tool->add_option("--stats", o->stats, "Write counts, times and memory to this JSON file; - for standard output")
       ->type_name("FILE.json")
       ->group("Run");
   add_run_options(*tool, o->run);
+  add_notes(
+      *tool,
+      "Of a point it takes x y z nx ny nz, radius or pscale, quality or confidence; every other property arrives at "
+      "the "
+      "vertices in its own type. Without radii they come from the local density. Memory goes with the cross-section of "
+      "the cloud, not with its length, and the mesh is the same bytes for any number of threads, chunks and ranks.\n"
+      "With --vdb the signed distance that the mesh is extracted from is written as well: a level set in the input's "
+      "coordinates. It exists only near data; where the surface is open its metadata say so (open), and voxels far "
+      "from "
+      "any data count as outside. Voxels have the size of most cells, values of finer and coarser cells are resampled "
+      "to "
+      "them. It is written slab by slab: one file, however large the cloud.\n"
+      "Under mpirun several processes work on one mesh; --threads and --max-memory are each one's own. --vdb, cleaning "
+      "(but that of a store), pruning, --local, --checkpoint, --chunk, --dry-run and standard output are for runs "
+      "without it.");
   add_examples(*tool,
                "  lamina surface scan.ply -o mesh_of_scan.ply\n"
-               "  lamina surface scan.ply --dry-run");
+               "  lamina surface scan.ply --dry-run\n"
+               "  lamina surface scan.ply -o smooth.ply --blend auto --vdb smooth.vdb --stats smooth.json");
   tool->callback([o, tool, output, dry] {
     if (o->parts.tasks > 0) return print_tasks(*tool, o->inputs.front(), o->settings.output, o->parts);
     if (output->count() == 0 && dry->count() == 0) throw CLI::RequiredError("--output");

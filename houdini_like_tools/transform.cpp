@@ -134,6 +134,11 @@ void add_transform(CLI::App& app) {
   add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);
+  add_notes(
+      *tool,
+      "All is computed in double. Normals turn with the positions; radii and distances grow with the scale. A mirrored "
+      "mesh keeps its outside outside. Volumes move by their transforms, so no voxel is resampled; a level set cannot "
+      "be stretched or sheared. Points stream, meshes and volumes are held.");
   add_examples(*tool,
                "  lamina transform scan.ply --scale 0.001 --rotate -90,0,0 -o metres_y_up.ply\n"
                "  lamina transform mesh.ply --translate -10,0,2.5 -o moved.obj\n"

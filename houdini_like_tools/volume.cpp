@@ -58,7 +58,8 @@ void add_volume(CLI::App& app) {
       ->type_name("LENGTH")
       ->capture_default_str()
       ->group(grid);
-  tool->add_option("--halfbandvoxels,--band", s.band, "Half width of the band that holds distances, in voxels")
+  tool->add_option("--halfbandvoxels,--band", s.band,
+                   "Half width of the band that holds distances, in voxels, 1 to 1000")
       ->type_name("N")
       ->capture_default_str()
       ->group(grid);
@@ -66,19 +67,26 @@ void add_volume(CLI::App& app) {
       {"auto", VolumeSign::automatic}, {"inside", VolumeSign::inside}, {"none", VolumeSign::none}};
   tool->add_option_function<std::string>(
           "--sign", [&s, signs](const std::string& word) { s.sign = signs.at(word); },
-          "inside: negative inside, a level set; none: distances only; auto: by whether the mesh is closed [auto]")
+          "inside: negative inside, a level set; none: distances without a sign; auto: by whether the mesh is closed "
+          "[auto]")
       ->check(CLI::IsMember({"auto", "inside", "none"}).description(""))
       ->type_name("auto|inside|none")
       ->group(grid);
-  tool->add_option("--name", s.name, "Name of the distance grid")
+  tool->add_option("--name", s.name, "Name of the distance grid, other than Cd")
       ->type_name("NAME")
       ->capture_default_str()
       ->group(grid);
   tool->add_flag_callback(
           "--no-colour,--no-color", [&s] { s.colours = false; }, "Leave out the colours (Cd)")
       ->group(grid);
-  tool->add_flag("--half", s.half, "Store 16-bit floats")->group(grid);
+  tool->add_flag("--half", s.half, "Store 16-bit floats: half the file")->group(grid);
   add_run_options(*tool, o->run);
+  add_notes(
+      *tool,
+      "A closed mesh becomes a level set with exact distances, negative inside. A mesh with a boundary becomes "
+      "distances without a sign, and the tool says so. Colours become a second grid Cd (0 to 1, as they stand in the "
+      "file) with the colour of the nearest point. Both lie in the mesh's own coordinates, voxels on multiples of "
+      "their edge. Equal meshes give equal bytes. Mesh and volume are held in memory.");
   add_examples(*tool, "  lamina volume mesh.ply --voxelsize 0.05 -o mesh.vdb");
   tool->callback([o] { run_volume(*o); });
 }

@@ -72,13 +72,14 @@ std::string folder_beside(const std::string& output) {
 }  // namespace
 
 void add_run_options(CLI::App& app, RunOptions& options) {
-  app.add_option("--threads", options.threads, "Number of threads; 0 is every core")
+  app.add_option("--threads", options.threads,
+                 "Number of threads; 0 is every core. The result is the same bytes for any number [0]")
       ->check(CLI::Range(0, 4096))
       ->type_name("N")
       ->group("Run");
   app.add_flag("-q,--quiet", options.quiet, "No progress, only warnings and errors")->group("Run");
-  app.add_option("--tmp-dir", options.tmp_dir, "Folder for temporary files; default: beside the output")
-      ->check(CLI::ExistingDirectory)
+  app.add_option("--tmp-dir", options.tmp_dir, "Folder for temporary files [beside the output]")
+      ->check(CLI::ExistingDirectory.description(""))
       ->type_name("DIR")
       ->group("Run");
   app.add_option_function<std::string>(
@@ -90,7 +91,7 @@ void add_run_options(CLI::App& app, RunOptions& options) {
              throw CLI::ValidationError("--max-memory", e.what());
            }
          },
-         "Refuse to start what would need more, such as 512M or 4G")
+         "Refuse to start what would need more memory, such as 512M or 4G [no limit]")
       ->type_name("SIZE")
       ->group("Run");
 }

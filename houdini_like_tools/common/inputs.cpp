@@ -25,11 +25,13 @@ void add_bad_samples(CLI::App& app, BadSamples& bad, const std::string& what) {
       ->group("Input");
 }
 
-void add_columns(CLI::App& app, std::string& columns) {
-  app.add_option("--columns", columns,
-                 "What the columns of text files hold: names as in x,y,z,nx,ny,nz,red:uchar,-, - for those to skip")
+void add_columns(CLI::App& app, std::string& columns, const std::string& group) {
+  app.add_option(
+         "--columns", columns,
+         "What the columns of text files hold: names as in x,y,z,nx,ny,nz,red:uchar,-, where - is a column to skip [by "
+         "header line, else by the numbers]")
       ->type_name("NAMES")
-      ->group("Input");
+      ->group(group);
 }
 
 std::unique_ptr<PointSource> open_point_input(const std::string& path, const std::string& columns,

@@ -18,8 +18,8 @@ std::string pipe_name(const std::string& name);
 
 /// --bad-samples drop|refuse, in the group "Input"; `what` may be bad.
 void add_bad_samples(CLI::App& app, BadSamples& bad, const std::string& what = "Points");
-/// --columns NAMES, in the group "Input": PointSettings::columns.
-void add_columns(CLI::App& app, std::string& columns);
+/// --columns NAMES: PointSettings::columns.
+void add_columns(CLI::App& app, std::string& columns, const std::string& group = "Input");
 
 /// open_points(), saying what the reader found worth saying.
 std::unique_ptr<PointSource> open_point_input(const std::string& path, const std::string& columns,

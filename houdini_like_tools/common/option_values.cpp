@@ -82,7 +82,7 @@ CLI::Option* add_length(CLI::App& app, const std::string& names, Length& value, 
   return app
       .add_option_function<std::string>(
           names, [&value, shown](const std::string& text) { value = length_of(shown, text); }, description)
-      ->type_name("LENGTH")
+      ->type_name("LENGTH|Kr|KR")
       ->default_str(to_string(value));
 }
 

@@ -102,22 +102,28 @@ void add_parts_options(CLI::App& tool, PartsOptions& o) {
             o.chunk = parse_chunk(text);
             o.chunked = true;
           },
-          "reconstruct only the I-th of N chunks of a store (lamina sort --store); the output is a part for lamina "
+          "Reconstruct only the I-th of N chunks of a store (lamina sort --store); the output is a part for lamina "
           "merge")
       ->type_name("I/N")
       ->group(group);
-  auto* tasks = tool.add_option("--print-tasks", o.tasks,
-                                "print the command lines for a queue: N chunks, then the merge; run nothing")
-                    ->check(CLI::Range(1, 100000).description(""))
-                    ->type_name("N")
-                    ->group(group);
-  tool.add_flag("--json", o.json, "print the tasks as JSON")->needs(tasks)->group(group);
+  auto* tasks =
+      tool.add_option(
+              "--print-tasks", o.tasks,
+              "Print the command lines for a queue with the options given: N chunks, then the merge; run nothing")
+          ->check(CLI::Range(1, 100000).description(""))
+          ->type_name("N")
+          ->group(group);
+  tool.add_flag("--json", o.json, "Print the tasks as JSON: command, output, and what each comes after")
+      ->needs(tasks)
+      ->group(group);
   auto* checkpoint =
       tool.add_option("--checkpoint", o.checkpoint.directory,
-                      "keep what is done in this folder, so that a run that was killed can go on; removed at the end")
+                      "Keep what is done in this folder, so that a run that was killed can go on; removed at the end")
           ->type_name("DIR")
           ->group(group);
-  tool.add_flag("--resume", o.checkpoint.resume, "go on with what --checkpoint has")->needs(checkpoint)->group(group);
+  tool.add_flag("--resume", o.checkpoint.resume, "Go on with what --checkpoint has; begin where it has nothing")
+      ->needs(checkpoint)
+      ->group(group);
 }
 
 PartsResult run_parts(const SurfaceSettings& settings, const PartsOptions& options, const RunContext& context) {

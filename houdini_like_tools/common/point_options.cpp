@@ -24,39 +24,41 @@ void take_viewpoint(NormalsSettings& settings, const std::string& text) {
 }  // namespace
 
 void add_clean_options(CLI::App& app, CleanSettings& s, const std::string& group) {
-  add_numbers(app, "--clip", ',', 6, "X0,Y0,Z0,X1,Y1,Z1", "take only samples in this box, given by two corners",
+  add_numbers(app, "--clip", ',', 6, "X0,Y0,Z0,X1,Y1,Z1", "Take only samples in this box, given by two corners",
               [&s](const std::vector<double>& v) {
                 s.pick.clip = Box{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
               })
       ->group(group);
-  app.add_option("--every", s.pick.every, "take the first of so many samples")
+  app.add_option("--every", s.pick.every, "Take the first of every N samples")
       ->type_name("N")
       ->capture_default_str()
       ->group(group);
   app.add_option_function<double>(
          "--merge", [&s](double length) { s.merge = length; },
-         "leave out samples within LENGTH of another that face the same way; 0: at the same place")
+         "Leave out samples within LENGTH of another that face the same way; 0: at the same place [none]")
       ->type_name("LENGTH")
       ->group(group);
-  app.add_option("--outliers", s.sigma,
-                 "leave out samples whose mean distance to their neighbours lies more than so many standard deviations "
-                 "above the mean; 0: none")
+  app.add_option(
+         "--outliers", s.sigma,
+         "Leave out samples whose mean distance to their neighbours lies more than T standard deviations above the "
+         "mean; 0: none. 3 takes stray points and next to nothing else")
       ->type_name("T")
       ->capture_default_str()
       ->group(group);
-  app.add_option("--neighbours,--neighbors", s.neighbours, "neighbours that --outliers looks at")
+  app.add_option("--neighbours,--neighbors", s.neighbours, "Neighbours that --outliers looks at, 1 to 256")
       ->type_name("N")
       ->capture_default_str()
       ->group(group);
-  app.add_option("--spacing", s.spacing, "thin out: no two samples nearer than LENGTH; 0: all")
+  app.add_option("--spacing", s.spacing, "Thin out: no two samples nearer than LENGTH; 0: keep all")
       ->type_name("LENGTH")
       ->capture_default_str()
       ->group(group);
 }
 
 void add_normals_choice(CLI::App& tool, NormalsChoice& normals, const std::string& group) {
-  tool.add_option("--normals", normals,
-                  "whose normals: the file's; auto: found where the file has none; estimate: all found")
+  tool.add_option(
+          "--normals", normals,
+          "Whose normals: the file's; auto: the file's, and found for the samples that have none; estimate: all found")
       ->transform(words<NormalsChoice>(
           {{"file", NormalsChoice::file}, {"auto", NormalsChoice::automatic}, {"estimate", NormalsChoice::estimate}}))
       ->option_text("file|auto|estimate [file]")
@@ -64,11 +66,11 @@ void add_normals_choice(CLI::App& tool, NormalsChoice& normals, const std::strin
 }
 
 void add_normals_options(CLI::App& tool, NormalsSettings& s, const std::string& group) {
-  tool.add_option("--k", s.k, "nearest samples that a normal's plane is fitted to")
+  tool.add_option("--k", s.k, "Nearest samples that a normal's plane is fitted to, 3 to 64")
       ->type_name("N")
       ->capture_default_str()
       ->group(group);
-  tool.add_option("--radius", s.radius, "fit to all samples within this instead; 0: to the nearest")
+  tool.add_option("--radius", s.radius, "Fit to all samples within this distance instead; 0: to the nearest")
       ->type_name("LENGTH")
       ->capture_default_str()
       ->group(group);
@@ -77,17 +79,20 @@ void add_normals_options(CLI::App& tool, NormalsSettings& s, const std::string& 
           [&s](const std::vector<std::string>& texts) {
             for (const std::string& text : texts) take_viewpoint(s, text);
           },
-          "normals face this scanner position, the nearest of several, or each scan its own where there are as many; "
-          "pose: where each input's pose puts its origin; none: not even the scanners the files know")
+          "Normals face this scanner position. May be repeated: a sample faces the nearest of several, or its own "
+          "scan's "
+          "where there are as many as files (or scans of a PTX). pose: where each input's pose puts its origin; none: "
+          "ignore the scanners that the files name")
       ->type_name("X,Y,Z|pose|none")
       ->allow_extra_args(false)
       ->group(group);
-  add_numbers(tool, "--up", ',', 3, "X,Y,Z", "normals face this direction: 0,0,1 for scans from the air",
+  add_numbers(tool, "--up", ',', 3, "X,Y,Z", "Normals face this direction: 0,0,1 for scans from the air",
               [&s](const std::vector<double>& v) {
                 s.viewpoints.push_back({{v[0], v[1], v[2]}, true});
               })
       ->group(group);
-  tool.add_flag("--flip", s.flip, "turn all normals found or turned to the other side at the end")->group(group);
+  tool.add_flag("--flip", s.flip, "Turn all normals that were found or turned to the other side at the end")
+      ->group(group);
 }
 
 }  // namespace lamina::tools

@@ -25,45 +25,49 @@ void add_fit_options(CLI::App& tool, SurfaceSettings& s) {
   const std::string fit = "Fit";
   add_number_or_auto(
       tool, "--blend", fmt::format("{:g}", *s.blend),
-      "H: the influence radius R is H times a sample's radius r; auto: H, and --cell and --refit where these "
-      "are not given, by the cloud's noise and the evenness of its sampling",
+      "The influence radius R is H times a sample's radius r, H up to 64; noise wants 2 to 3. auto: H, and --cell and "
+      "--refit where these are not given, by the cloud's noise and the evenness of its sampling",
       [&s](const std::optional<double>& number) { s.blend = number; })
+      ->option_text(fmt::format("H|auto [{:g}]", *s.blend))
       ->group(fit);
   add_number_or_auto(
       tool, "--refit", "0, with --blend auto: auto",
-      "first replace normals by those fitted to the samples within so many radii; 0: keep them; auto: keep "
-      "them but for noise that --blend auto finds",
+      "First replace normals by those fitted to the samples within so many radii r, up to 8; 0: keep them; auto: keep "
+      "them unless --blend auto finds noise",
       [&s](const std::optional<double>& number) { s.refit = number; })
+      ->option_text("RADII|auto [0; auto with --blend auto]")
       ->group(fit);
-  add_number_or_auto(tool, "--steps", "1", "N: projection steps; auto: as many as each corner needs",
+  add_number_or_auto(tool, "--steps", "1", "Projection steps, 1 to 16; auto: as many as each corner needs, at most 16",
                      [&s](const std::optional<double>& number) { s.steps = steps_of(number); })
       ->option_text("N|auto [1]")
       ->group(fit);
   tool.add_option("--step-tolerance", s.step_tolerance,
-                  "with --steps auto: a corner is done when a step moves it no more than so many radii r")
+                  "With --steps auto: a corner is done when a step moves it no more than T radii r; up to 1")
+      ->type_name("T")
       ->capture_default_str()
       ->group(fit);
-  tool.add_option("--fit", s.fit, "surface fitted to the samples around a corner")
+  tool.add_option("--fit", s.fit, "Surface fitted to the samples around a corner")
       ->transform(words<FitMode>({{"plane", FitMode::plane}, {"sphere", FitMode::sphere}}))
       ->option_text("plane|sphere [sphere]")
       ->group(fit);
-  tool.add_flag("--diffuse", s.diffuse, "project cell centres and average them at the corners: smoother")->group(fit);
+  tool.add_flag("--diffuse", s.diffuse, "Project cell centres and average them at the corners: smoother")->group(fit);
 
   const std::string lattice = "Octree";
   tool.add_option_function<std::string>(
           "--cell", [&s](const std::string& text) { s.cell = length_of("--cell", text); },
-          "largest leaf cell: a length, or times the smallest r or R around")
-      ->option_text("LENGTH [0.9R, with --blend auto: chosen]")
+          "Largest leaf cell: a length, or a multiple of the smallest r or R around")
+      ->option_text("LENGTH|Kr|KR [0.9R; chosen with --blend auto]")
       ->group(lattice);
-  tool.add_option("--levels", s.levels, "octree levels; 0: as the radii ask, at least 4")
+  tool.add_option("--levels", s.levels, "Octree levels, 1 to 12; 0: as the radii ask, at least 4")
+      ->type_name("N")
       ->capture_default_str()
       ->group(lattice);
 }
 
 void add_hole_options(CLI::App& tool, SurfaceSettings& settings, const std::string& group) {
   tool.add_option("--close-holes", settings.close_holes,
-                  "close holes with a rim shorter than so many influence radii where the surface around tells how it "
-                  "goes on; 0: none")
+                  "Close holes with a rim shorter than so many influence radii R where the surface around shows how it "
+                  "continues; 0: none. Grids keep their holes")
       ->type_name("RADII")
       ->capture_default_str()
       ->group(group);
@@ -72,9 +76,9 @@ void add_hole_options(CLI::App& tool, SurfaceSettings& settings, const std::stri
           [&settings](const std::string& word) {
             settings.watertight = word == "auto" ? std::nullopt : std::optional(word == "yes");
           },
-          "close all holes, whatever lies around, unless a rim longer than three times --close-holes shows that the "
+          "Close all holes, whatever lies around, unless a rim longer than three times --close-holes shows that the "
           "surface is an open one; auto: where --blend auto finds a clean, even cloud")
-      ->check(CLI::IsMember({"auto", "yes", "no"}))
+      ->check(CLI::IsMember({"auto", "yes", "no"}).description(""))
       ->type_name("auto|yes|no")
       ->default_str("auto")
       ->group(group);
@@ -82,32 +86,42 @@ void add_hole_options(CLI::App& tool, SurfaceSettings& settings, const std::stri
 
 void add_volume_options(CLI::App& tool, VolumeExport& v) {
   const std::string volume = "Volume";
-  tool.add_option("--vdb", v.path, "write the signed distance as an OpenVDB level set, grid surface, too")
+  tool.add_option("--vdb", v.path, "Also write the signed distance as an OpenVDB level set, grid surface")
       ->type_name("OUT.vdb")
       ->group(volume);
-  tool.add_option("--vdb-grids", v.grids,
-                  "further grids: N, Cd, weight, curvature, any attribute; auto: Cd with colours")
+  tool.add_option(
+          "--vdb-grids", v.grids,
+          "Further grids over the same voxels: N, Cd, weight, curvature, any attribute; auto: Cd where the points have "
+          "colours")
       ->delimiter(',')
       ->expected(1, -1)
       ->option_text("NAME,... [auto]")
       ->group(volume);
-  tool.add_option("--vdb-precision", v.half, "numbers of 16 or 32 bits")
+  tool.add_option("--vdb-precision", v.half, "Numbers of 16 or 32 bits")
       ->transform(words<bool>({{"half", true}, {"float", false}}))
       ->option_text("half|float [half]")
       ->group(volume);
-  tool.add_option("--vdb-band", v.band, "half width of the band, voxels")->capture_default_str()->group(volume);
-  tool.add_option("--vdb-voxelsize", v.voxel,
-                  "edge of a voxel: the octree's nearest cell size is taken; 0: most cells'")
+  tool.add_option("--vdb-band", v.band, "Half width of the band in voxels, 1 to 8")
+      ->type_name("N")
       ->capture_default_str()
       ->group(volume);
-  tool.add_flag("--vdb-levels", v.levels, "one grid per level of the octree, surface_L0 the finest, for inspection")
+  tool.add_option(
+          "--vdb-voxelsize", v.voxel,
+          "Edge of a voxel: the octree's nearest cell size is taken, and a length more than twice beyond all of them "
+          "refused; 0: the size of most cells")
+      ->type_name("LENGTH")
+      ->capture_default_str()
+      ->group(volume);
+  tool.add_flag("--vdb-levels", v.levels, "One grid per level of the octree, surface_L0 the finest, for inspection")
       ->group(volume);
   tool.add_option_function<std::string>(
           "--vdb-split", [&v](const std::string& text) { v.split = parse_bytes(text); },
-          "begin a new file, OUT.0001.vdb ..., after so many bytes of voxels in memory")
+          "Begin a new file (OUT.0001.vdb ..., which load as frames) after so many bytes of voxels in memory")
       ->type_name("SIZE")
       ->group(volume);
-  tool.add_option("--vdb-points", v.points, "write the projected corners as an OpenVDB points grid (P, N, Cd, pscale)")
+  tool.add_option(
+          "--vdb-points", v.points,
+          "Write the projected corners near the surface as an OpenVDB points grid: P, N, Cd, pscale, attributes")
       ->type_name("OUT.vdb")
       ->group(volume);
 }
