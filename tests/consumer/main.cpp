@@ -1,12 +1,22 @@
-// Uses the installed headers and library: a length read from text, and the version the package was built as.
-#include <cstdio>
+// Points to a mesh in a dozen lines; the README shows this file.
+#include <iostream>
 
-#include "lamina/length.h"
-#include "lamina/run.h"
+#include "lamina/error.h"
+#include "lamina/surface.h"
 
-int main() {
-  const lamina::Length length = lamina::parse_length("0.5R");
-  const double world = lamina::resolve(length, 2.0, 3.0);
-  std::printf("lamina %s: 0.5R = %g\n", lamina::version().data(), world);
-  return world == 3.0 ? 0 : 1;
+int main(int argc, char** argv) {
+  if (argc != 3) return 2;
+  lamina::SurfaceSettings settings;
+  settings.input = argv[1];
+  settings.output = argv[2];
+  settings.blend = 2;  // a wide support, for noise
+  lamina::RunContext run;
+  run.log = [](lamina::LogLevel, std::string_view text) { std::cerr << text << '\n'; };
+  try {
+    const lamina::SurfaceStats stats = lamina::reconstruct_surface(settings, run);
+    std::cout << stats.vertices << " vertices, " << stats.triangles << " triangles\n";
+  } catch (const lamina::Error& error) {
+    std::cerr << error.what() << '\n';
+    return static_cast<int>(error.code());
+  }
 }

@@ -1,4 +1,4 @@
-# Installs the build to a fresh prefix, then configures, builds and runs the consumer against it.
+# Installs the build to a fresh prefix, then configures and builds the consumer against it and runs it over CLOUD.
 set(prefix ${WORK_DIR}/prefix)
 file(REMOVE_RECURSE ${WORK_DIR})
 function(run)
@@ -8,5 +8,6 @@ run(${CMAKE_COMMAND} --install ${BUILD_DIR} --prefix ${prefix})
 run(${CMAKE_COMMAND} -S ${CONSUMER_DIR} -B ${WORK_DIR}/build -G ${GENERATOR}
     -DCMAKE_PREFIX_PATH=${prefix} -DWANTED_VERSION=${VERSION} -DCMAKE_BUILD_TYPE=Release)
 run(${CMAKE_COMMAND} --build ${WORK_DIR}/build)
-run(${WORK_DIR}/build/consumer)
+run(${WORK_DIR}/build/consumer ${CLOUD} ${WORK_DIR}/mesh.ply)
+run(${prefix}/bin/lamina check ${WORK_DIR}/mesh.ply --expect manifold)
 run(${prefix}/bin/lamina --version)

@@ -1,6 +1,8 @@
-// The README's option tables and the program's help must name the same options.
+// What the README says is true as far as a program can tell: options, links, and the example of the library.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <map>
 #include <regex>
 #include <set>
@@ -12,87 +14,75 @@
 namespace lamina::tools {
 namespace {
 
-using Options = std::set<std::string>;
+using test::read_text;
 
-// Section title -> long options in the first column of its tables.
-std::map<std::string, Options> readme_tables() {
-  std::map<std::string, Options> tables;
-  std::istringstream lines(test::read_text(LAMINA_SOURCE_DIR "/README.md"));
-  std::string line, section;
-  const std::regex option("--[a-z0-9][a-z0-9-]*");
-  while (std::getline(lines, line)) {
-    if (line.starts_with("#")) section = line.substr(line.find(' ') + 1);
-    if (!line.starts_with("| `-")) continue;
-    const std::string cell = line.substr(0, line.find(" | ", 2));
-    for (auto it = std::sregex_iterator(cell.begin(), cell.end(), option); it != std::sregex_iterator(); ++it) {
-      tables[section].insert(it->str());
-    }
-  }
-  return tables;
+std::string readme() {
+  return read_text(LAMINA_SOURCE_DIR "/README.md");
 }
 
-// The options a help text defines: those that begin a line, after an optional short name.
-Options help_options(const std::vector<std::string>& words) {
-  const test::Outcome outcome = test::run_lamina(words);
-  EXPECT_EQ(outcome.code, 0) << outcome.err;
-  Options options;
-  std::istringstream lines(outcome.out);
-  std::string line;
-  const std::regex definition("^  (?:-[A-Za-z0-9], ?)*((?:--[a-z0-9][a-z0-9-]*(?:, ?)?)+).*");
-  const std::regex option("--[a-z0-9][a-z0-9-]*");
-  while (std::getline(lines, line)) {
-    std::smatch match;
-    if (!std::regex_match(line, match, definition)) continue;
-    const std::string names = match[1];
-    for (auto it = std::sregex_iterator(names.begin(), names.end(), option); it != std::sregex_iterator(); ++it) {
-      options.insert(it->str());
-    }
-  }
+std::set<std::string> options_in(const std::string& text) {
+  std::set<std::string> options;
+  const std::regex option("(?:^|[^a-z-])(--[a-z][a-z-]*[a-z]|--k)(?![a-z-])");
+  for (auto it = std::sregex_iterator(text.begin(), text.end(), option); it != std::sregex_iterator(); ++it)
+    options.insert((*it)[1]);
   return options;
 }
 
-std::set<std::string> tool_names() {
-  std::set<std::string> names;
-  std::istringstream lines(test::run_lamina({"--help"}).out);
-  std::string line;
-  bool listing = false;
-  while (std::getline(lines, line)) {
-    std::smatch match;
-    if (line == "Tools:") listing = true;
-    if (listing && std::regex_match(line, match, std::regex("^  ([a-z][a-z0-9_-]*) .*"))) names.insert(match[1]);
-  }
-  return names;
+/// The commands of a line's pipes and lists that run lamina: name of the tool, and the whole command.
+std::vector<std::pair<std::string, std::string>> commands(const std::string& line) {
+  std::vector<std::pair<std::string, std::string>> found;
+  const std::regex command("lamina ([a-z]+)( [^|&;>]*)?");
+  for (auto it = std::sregex_iterator(line.begin(), line.end(), command); it != std::sregex_iterator(); ++it)
+    found.emplace_back((*it)[1], (*it)[2]);
+  return found;
 }
 
-TEST(Readme, OptionTablesMatchTheProgram) {
-  const auto tables = readme_tables();
-  const Options& shared = tables.at("Every working tool");
-  Options shared_seen;
-  for (const std::string& tool : tool_names()) {
-    const Options in_help = help_options({tool, "--help"});
-    const auto table = tables.find("lamina " + tool);
-    if (table == tables.end()) {
-      ADD_FAILURE() << "README has no section 'lamina " << tool << "' with an option table";
-      continue;
-    }
-    for (const std::string& option : in_help) {
-      EXPECT_TRUE(table->second.contains(option) || shared.contains(option)) << tool << ": README lacks " << option;
-      if (shared.contains(option)) shared_seen.insert(option);
-    }
-    for (const std::string& option : table->second) {
-      EXPECT_TRUE(in_help.contains(option)) << tool << ": README promises " << option;
+TEST(Readme, ItsCommandsHaveToolsAndOptionsThatExist) {
+  std::istringstream lines(readme());
+  std::map<std::string, std::set<std::string>> known;
+  bool code = false;
+  int seen = 0;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("```")) code = !code;
+    if (!code) continue;
+    for (const auto& [tool, words] : commands(line)) {
+      if (!known.contains(tool)) {
+        const auto help = test::run_lamina({tool, "--help"});
+        ASSERT_EQ(help.code, 0) << line;
+        known[tool] = options_in(help.out);
+      }
+      for (const std::string& option : options_in(words)) {
+        EXPECT_TRUE(known[tool].contains(option)) << "lamina " << tool << " has no " << option << "\n" << line;
+        ++seen;
+      }
     }
   }
-  EXPECT_EQ(shared_seen, shared) << "an option of the shared table is in no tool";
+  EXPECT_GT(seen, 20);
 }
 
-TEST(Readme, EverySectionOfAToolHasItsTool) {
-  const auto tools = tool_names();
-  for (const auto& [section, options] : readme_tables()) {
-    if (section.starts_with("lamina ")) {
-      EXPECT_TRUE(tools.contains(section.substr(7))) << section;
-    }
-  }
+TEST(Readme, EveryOptionInItsTextExists) {
+  std::set<std::string> known = options_in(read_text(LAMINA_SOURCE_DIR "/docs/reference.md"));
+  known.insert({"--help", "--build", "--preset", "--install", "--bind-to"});
+  for (const std::string& option : options_in(readme())) EXPECT_TRUE(known.contains(option)) << option;
+}
+
+TEST(Readme, ItsLinksLeadSomewhere) {
+  const std::string text = readme();
+  const std::regex link(R"(\]\(([^)#:]+)(#[^)]*)?\))");
+  int seen = 0;
+  for (auto it = std::sregex_iterator(text.begin(), text.end(), link); it != std::sregex_iterator(); ++it, ++seen)
+    EXPECT_TRUE(std::filesystem::exists(LAMINA_SOURCE_DIR "/" + (*it)[1].str())) << (*it)[1];
+  EXPECT_GT(seen, 10);
+}
+
+TEST(Readme, ItsProgramIsTheOneThatIsCompiled) {
+  EXPECT_THAT(readme(),
+              ::testing::HasSubstr("```cpp\n" + read_text(LAMINA_SOURCE_DIR "/tests/consumer/main.cpp") + "```\n"));
+}
+
+TEST(Readme, IsShort) {
+  const std::string text = readme();
+  EXPECT_LE(std::count(text.begin(), text.end(), '\n'), 200);
 }
 
 }  // namespace
