@@ -6,8 +6,8 @@
 
 #include "common/help.h"
 #include "common/inputs.h"
-#include "lamina/check.h"
 #include "lamina/error.h"
+#include "lamina/measure.h"
 #include "tool.h"
 
 namespace lamina::tools {

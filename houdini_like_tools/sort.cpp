@@ -13,8 +13,8 @@
 #include "common/point_options.h"
 #include "common/text.h"
 #include "lamina/chunk.h"
+#include "lamina/edit_points.h"
 #include "lamina/error.h"
-#include "lamina/sort_points.h"
 #include "tool.h"
 
 namespace lamina::tools {

@@ -1,4 +1,5 @@
-// Scalar attributes a sample or vertex carries besides position and normal: colours and anything else in the file.
+// Scalar attributes that samples and vertices carry besides position and normal: colours, and anything else in the
+// file.
 #pragma once
 #include <cstddef>
 #include <optional>
@@ -8,9 +9,10 @@
 
 namespace lamina {
 
+/// The types of PLY: integers of 1, 2 and 4 bytes, and floating point numbers of 4 and 8.
 enum class ScalarType { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 
-/// Size in bytes of one value of a scalar type.
+/// Bytes of one value.
 constexpr int byte_size(ScalarType t) {
   switch (t) {
     case ScalarType::int8:
@@ -29,7 +31,7 @@ constexpr int byte_size(ScalarType t) {
   return 0;
 }
 
-/// True when a float holds every value of the type.
+/// True when a 32-bit float holds every value of the type exactly.
 constexpr bool fits_float(ScalarType t) {
   return t == ScalarType::float32 || byte_size(t) < 4;
 }
@@ -42,14 +44,15 @@ struct AttributeSpec {
   bool operator==(const AttributeSpec&) const = default;
 };
 
-/// Whether an attribute of that name is a channel of the colour.
+/// True for the names of colour channels: red, green, blue, alpha.
 inline bool is_colour(std::string_view name) {
   return name == "red" || name == "green" || name == "blue" || name == "alpha";
 }
 
+/// The attributes of a cloud or mesh, in the order of their arrays.
 using AttributeLayout = std::vector<AttributeSpec>;
 
-/// Where the attribute of that name is; nothing when there is none.
+/// The index of the first attribute of that name; empty when there is none.
 inline std::optional<std::size_t> find_attribute(const AttributeLayout& layout, const std::string& name) {
   for (std::size_t i = 0; i < layout.size(); ++i)
     if (layout[i].name == name) return i;

@@ -1,4 +1,4 @@
-// The part of points or a mesh that lies in a box and before planes, or all but that part.
+// Clipping points and meshes: what lies inside a convex region of a box and half spaces stays, or what lies outside.
 #pragma once
 #include <array>
 #include <optional>
@@ -16,14 +16,15 @@ struct HalfSpace {
   std::array<double, 3> normal{0, 0, 1};  ///< any length but 0
 };
 
+/// An axis-aligned box, faces included.
 struct Box {
   std::array<double, 3> low{}, high{};
 };
 
-/// Rows that are taken from the input at all; the others are never stored.
+/// Which rows of an input are read at all; the others are never stored.
 struct RowPick {
   std::optional<Box> clip;  ///< faces included; input coordinates
-  std::uint64_t every = 1;  ///< >= 1: of so many rows the first
+  std::uint64_t every = 1;  ///< >= 1: takes the first of every so many rows
   [[nodiscard]] bool takes_all() const { return !clip && every <= 1; }
 };
 
@@ -33,18 +34,19 @@ struct ClipRegion {
   std::vector<HalfSpace> half_spaces;
 };
 
+/// Which side of a region stays.
 enum class Keep { inside, outside };
 
-/// True when the point lies in the region; exact for boxes.
+/// True when the point lies in the region. Exact for boxes; for half spaces as exact as one dot product in double.
 bool contains(const ClipRegion& region, const std::array<double, 3>& point);
 
-/// Drops the rows on the wrong side.
+/// Drops the rows of the other side; `keep` says which side stays. The others keep their order.
 void clip_rows(SampleBatch& batch, const ClipRegion& region, Keep keep);
 
-/// Cuts triangles where they cross the region's faces: vertices made on the cut interpolate normals and attributes, and
-/// are shared by the triangles on both sides of an edge, so that a manifold mesh stays manifold. The hole is left open.
-/// Vertices that no triangle uses any more are dropped; without triangles the vertices are clipped as points.
-/// Throws Error(usage) for a region without faces, an empty box, a normal of length 0 or numbers that are not finite.
+/// Cuts triangles where they cross the region's faces. New vertices interpolate normals and attributes, and the
+/// triangles on both sides of an edge share them: a manifold mesh stays manifold. The cut is left open. Vertices that
+/// no triangle uses any more are dropped; a mesh without triangles is clipped as points. Throws Error(usage) for a
+/// region without faces, an empty box, a normal of length 0 or numbers that are not finite.
 TriangleMesh clip_mesh(const TriangleMesh& mesh, const ClipRegion& region, Keep keep, const RunContext& run = {});
 
 /// Throws Error(usage) as clip_mesh() does.

@@ -1,4 +1,4 @@
-// What became of the gaps of a reconstructed mesh: those closed, and those left open.
+// Which gaps of a reconstructed mesh are closed, and what became of each.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -7,34 +7,35 @@
 
 namespace lamina {
 
-/// A closed run of boundary edges.
+/// A boundary loop: a closed run of boundary edges.
 struct OpenLoop {
   std::array<double, 3> position{};  ///< middle of its box, output coordinates
   double length = 0;                 ///< output units
-  double radii = 0;                  ///< the same in local influence radii
+  double radii = 0;                  ///< the same length in local influence radii
   std::uint64_t edges = 0;
-  /// Why it stays open: "long", "outer rim" (the surface lies inside of it), "bent" (the surface around does not tell
-  /// how it goes on), "occupied" (other boundary runs through it).
+  /// Why it stays open: "long", "outer rim" (the surface lies inside it), "bent" (the surface around it does not tell
+  /// how to continue), "occupied" (another boundary runs through it).
   std::string reason;
 };
 
-/// Which boundary loops are closed.
+/// Which boundary loops to close.
 struct HoleSettings {
-  /// Loops of so many local influence radii are closed where the surface around tells how; 0: none.
+  /// Local influence radii: loops up to this length are closed where the surface around them tells how. 0: none.
   double longest = 8;
-  /// Where no loop is longer than kWatertight times that, the cloud is of a closed thing: its loops are all closed,
-  /// whatever lies around, by the surface of least area.
+  /// Where no loop is longer than kWatertight times `longest`, the scanned object is taken to be closed: all loops are
+  /// closed, whatever lies around them, by the triangulation of least area.
   bool watertight = false;
   static constexpr double kWatertight = 3;
 };
 
+/// Loops closed and left open; edges are boundary edges.
 struct HoleStats {
   std::uint64_t closed = 0, closed_edges = 0;
   std::uint64_t vertices = 0, triangles = 0;  ///< added
   std::uint64_t open = 0, open_edges = 0;
-  double open_length = 0;
-  static constexpr std::size_t kListed = 100;
-  std::vector<OpenLoop> longest;  ///< of those left open, longest first
+  double open_length = 0;                      ///< output units
+  static constexpr std::size_t kListed = 100;  ///< loops in `longest` at most
+  std::vector<OpenLoop> longest;               ///< of those left open, longest first
 };
 
 /// One line for a log.

@@ -1,4 +1,4 @@
-// What is in a file: how much of it, where, and between which values.
+// What a file holds: how many points or triangles, where they lie, and the range of every column.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -14,12 +14,12 @@ namespace lamina {
 
 enum class FileContent { points, mesh, volume };
 
-/// What a file holds, by its first bytes and its name: .vdb volumes; OFF, STL, and OBJ and PLY that name faces,
-/// each also as .gz: meshes; everything else: points, for open_points() to judge.
+/// The kind of a file by its first bytes and its name. .vdb files are volumes; OFF and STL files are meshes, and so are
+/// OBJ and PLY files with faces, each also as .gz; everything else is taken for points, for open_points() to judge.
 ///
-/// "-" is standard input. A pipe can be read only once: it is first spooled to an unnamed file in `tmp_dir` (empty: the
-/// system's), which takes the place of the process's standard input, so that open_points("-") and read_mesh("-") read
-/// it from its beginning.
+/// "-" is standard input. A pipe can be read only once: it is spooled to an unnamed file in `tmp_dir` (empty: the
+/// system's), which replaces the process's standard input, so that open_points("-") and read_mesh("-") read it from its
+/// beginning.
 /// Throws Error(unreadable) when the file cannot be opened or read, Error(usage) when standard input is a terminal,
 /// Error(budget) when there is no room to spool.
 FileContent content_of(const std::string& path, const std::string& tmp_dir = {});
@@ -39,25 +39,29 @@ struct HistogramBin {
   std::uint64_t count = 0;
 };
 
+/// A cloud; lengths in the input's units.
 struct PointsInfo {
   std::uint64_t count = 0;
-  std::uint64_t bad_rows = 0;  ///< a position or radius is not finite
-  std::array<double, 3> low{}, high{};
+  std::uint64_t bad_rows = 0;           ///< a position or radius is not finite
+  std::array<double, 3> low{}, high{};  ///< box of the finite coordinates
   bool double_precision = false;
-  std::vector<ColumnRange> columns;  ///< x y z, nx ny nz, radius, quality, attributes
-  double normal_length_low = 0, normal_length_high = 0;
-  std::vector<HistogramBin> radii;  ///< half octaves, from the smallest to the largest radius above 0
+  std::vector<ColumnRange> columns;                      ///< x y z, nx ny nz, radius, quality, attributes
+  double normal_length_low = 0, normal_length_high = 0;  ///< 0 without normals
+  std::vector<HistogramBin> radii;  ///< bins of half an octave, from the smallest to the largest radius above 0
 };
 
-/// Reads the source once. Throws what the source throws, and Error(internal) when cancelled.
+/// Reads the source once, a few batches in memory at a time. Throws what the source throws, and Error(internal) when
+/// cancelled.
 PointsInfo describe_points(PointSource& source, const RunContext& run = {});
 
+/// A mesh; lengths in its own units.
 struct MeshInfo {
   std::uint64_t vertices = 0, triangles = 0;
-  std::array<double, 3> low{}, high{};
-  std::vector<ColumnRange> columns;  ///< x y z, nx ny nz, attributes
+  std::array<double, 3> low{}, high{};  ///< box of the finite coordinates
+  std::vector<ColumnRange> columns;     ///< x y z, nx ny nz, attributes
 };
 
+/// Looks at all vertices, also those in no triangle. Throws nothing.
 MeshInfo describe_mesh(const TriangleMesh& mesh);
 
 }  // namespace lamina

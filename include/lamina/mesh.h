@@ -1,4 +1,5 @@
-// A triangle mesh held whole in memory: for measuring, checking, scattering and rendering; never on the streamed path.
+// Triangle meshes held in memory, for measuring, checking, scattering and rendering. Reconstruction never holds one: it
+// streams.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -10,35 +11,36 @@
 
 namespace lamina {
 
+/// Vertices and the triangles that index them; seen from outside these run counter-clockwise.
 struct TriangleMesh {
-  std::vector<std::array<double, 3>> positions;
-  std::vector<std::array<float, 3>> normals;  ///< per vertex, empty or one each
-  AttributeLayout layout;                     ///< names and types of `attributes`; colours as in attributes.h
-  std::vector<std::vector<float>> attributes;
-  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< polygons come triangulated
+  std::vector<std::array<double, 3>> positions;         ///< in the units of the file
+  std::vector<std::array<float, 3>> normals;            ///< one for each vertex, of any length; or empty
+  AttributeLayout layout;                               ///< names and types of `attributes`; colours as in attributes.h
+  std::vector<std::vector<float>> attributes;           ///< one array for each attribute, one value for each vertex
+  std::vector<std::array<std::uint32_t, 3>> triangles;  ///< vertex indices
 };
 
 /// What to do with vertices whose coordinates are NaN or infinite.
 enum class NonFinite {
   refuse,  ///< Error(unreadable) naming the first
-  keep,    ///< read as they stand, from PLY: for those who count them, or drop_non_finite()
+  keep,    ///< read as they stand (PLY only), to be counted or dropped (drop_non_finite())
 };
 
-/// Reads OBJ, OFF, PLY or STL, each also as .gz, by extension and content; STL's equal positions are welded. PLY keeps
-/// every scalar property of its vertices (lists are passed over); the other formats bring normals
-/// and colours. Positions keep double precision, except in STL, whose own precision is float. Every face is
-/// kept, non-manifold ones too. A file without faces gives a mesh without triangles. Throws Error(unreadable) naming
-/// the file, the place and what is wrong: missing, truncated, counts that lie, a face naming a vertex that is not
-/// there, a polygon of fewer than three.
+/// Reads OBJ, OFF, PLY or STL, each also as .gz, by extension and content. PLY brings every scalar property of its
+/// vertices (lists are skipped), the other formats normals and colours. Positions keep double precision, except in STL,
+/// which holds floats and whose equal positions are welded. Polygons are triangulated, and every face is kept, also
+/// where the mesh is not manifold. A file without faces gives a mesh without triangles. Throws Error(unreadable) naming
+/// the file, the place and what is wrong: missing, truncated, wrong counts, a face with a vertex that is not there or
+/// with fewer than three.
 TriangleMesh read_mesh(const std::string& path, NonFinite non_finite = NonFinite::refuse);
 
-/// Leaves out vertices that are not finite, with the triangles at them; the others keep their order. Returns how many
-/// vertices went.
+/// Drops vertices that are not finite and the triangles at them; the others keep their order. Returns the number of
+/// vertices dropped.
 std::size_t drop_non_finite(TriangleMesh& mesh);
 
-/// Writes PLY, OBJ, OFF or STL by extension; beside, then renamed. "-" is standard output, as PLY. Positions read back
-/// as the same bits (as floats from STL). Throws Error(budget) when the file cannot be written, Error(usage) for
-/// another extension.
+/// Writes PLY, OBJ, OFF or STL, by extension; "-" is standard output, as PLY. The file appears under its name when it
+/// is complete. Positions read back as the same bits (from STL as floats). Throws Error(budget) when the file cannot be
+/// written, Error(usage) for another extension.
 void write_mesh(const TriangleMesh& mesh, const std::string& path);
 
 }  // namespace lamina

@@ -1,5 +1,4 @@
-// Point files, read in batches of rows: one implementation per format under src/points/. docs/formats.md describes the
-// formats for users.
+// Point files, read in batches of rows. docs/formats.md describes the formats.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -12,35 +11,37 @@
 
 namespace lamina {
 
-/// Rows from `first` on, up to the next part's, were measured together.
+/// One scan of an input: the rows from `first` on, up to the next scan's.
 struct ScanPart {
   enum class Scanner : std::uint8_t {
     unknown,
     position,     ///< it stood at `at`
-    direction,    ///< it stood far away in this direction
-    pose_origin,  ///< `at` is where the pose puts the file's origin: there may have been the scanner
+    direction,    ///< it stood far away in the direction `at`
+    pose_origin,  ///< `at` is where the pose puts the origin of the file: the scanner may have stood there
   };
   std::uint64_t first = 0;
   Scanner scanner = Scanner::unknown;
   std::array<double, 3> at{};  ///< input coordinates
 };
 
+/// What a source has.
 struct PointSourceInfo {
-  std::string path;               ///< as given by the user, for messages
-  std::uint64_t count = 0;        ///< rows read() gives
-  bool has_normals = false;       ///< nx ny nz all present
-  bool has_radius = false;        ///< radius, else pscale
-  bool has_quality = false;       ///< quality, else confidence
-  std::string radius_name;        ///< as the file calls it; empty: none
-  std::string quality_name;       ///< as the file calls it; empty: none
-  bool random_access = false;     ///< read() may be called for any row, from several threads
-  bool double_precision = false;  ///< positions need more than float32
-  bool geographic = false;        ///< x and y are degrees of longitude and latitude: no job can measure in them
-  std::vector<ScanPart> scans;    ///< ascending, the first begins with row 0; empty: one part, nothing known
-  AttributeLayout attributes;     ///< every other scalar property of the points, file order (colours keep their type)
-  std::vector<std::string> remarks;  ///< what the user should know: guesses, things left out; one line each
+  std::string path;                  ///< as given by the user, for messages
+  std::uint64_t count = 0;           ///< rows
+  bool has_normals = false;          ///< nx ny nz all present
+  bool has_radius = false;           ///< by the column radius, else pscale
+  bool has_quality = false;          ///< by the column quality, else confidence
+  std::string radius_name;           ///< as the file calls it; empty: none
+  std::string quality_name;          ///< as the file calls it; empty: none
+  bool random_access = false;        ///< read() takes any row, from several threads at once
+  bool double_precision = false;     ///< positions need more than float32
+  bool geographic = false;           ///< x and y are degrees of longitude and latitude, in which no job can measure
+  std::vector<ScanPart> scans;       ///< ascending, the first begins with row 0; empty: one scan, nothing known of it
+  AttributeLayout attributes;        ///< every other scalar property, in the file's order and types
+  std::vector<std::string> remarks;  ///< what the user should know, one line each: guesses, things left out
 };
 
+/// Rows of points. One thread at a time, unless info().random_access.
 class PointSource {
  public:
   virtual ~PointSource() = default;
@@ -48,10 +49,10 @@ class PointSource {
   PointSource& operator=(const PointSource&) = delete;
   [[nodiscard]] const PointSourceInfo& info() const { return info_; }
 
-  /// Reads rows [first, first + count) clipped to info().count into `out` (resized, arrays reused). Values come as they
-  /// stand in the file: non-finite coordinates are the caller's to judge. Sequential sources (random_access == false)
-  /// want first == the row after the last one read, or 0 to start over.
-  /// Throws Error(unreadable) naming file, row or line, and what is wrong.
+  /// Reads the rows [first, first + count), clipped to info().count, into `out`, whose arrays are resized and reused.
+  /// Values come as they stand in the file, also where they are not finite. Sequential sources (random_access == false)
+  /// take the row after the last one read, or 0 to start over.
+  /// Throws Error(unreadable) naming the file, the row or line, and what is wrong.
   virtual void read(std::uint64_t first, std::size_t count, SampleBatch& out) = 0;
 
  protected:
@@ -59,61 +60,64 @@ class PointSource {
   PointSourceInfo info_;
 };
 
+/// How files are read.
 struct PointSettings {
-  std::string tmp_dir;  ///< for what must be spooled or unpacked; empty: the system's temporary folder
-  /// What the columns of text files (XYZ, CSV, ...) hold: names separated by commas, as in "x,y,z,red,green,blue,-".
-  /// `-` skips a column; NAME:TYPE with a PLY type fixes the type (red:ushort). Empty: by the file's header line, else
+  std::string tmp_dir;  ///< folder for what must be spooled or unpacked; empty: the system's
+  /// The columns of text files (XYZ, CSV, ...): names separated by commas, as in "x,y,z,red,green,blue,-". `-` skips a
+  /// column; NAME:TYPE with a PLY type fixes its type (red:ushort). Empty: taken from the file's header line, else
   /// guessed from the numbers. Other formats ignore it.
   std::string columns;
 };
 
-/// Opens a point file by its content, and by its ending where the content leaves open what it is. "-" is standard
-/// input; pipes are first spooled to an unlinked file in `tmp_dir`, and gzip is unpacked to one. docs/formats.md lists
-/// the formats: PLY (also with a range grid), OBJ, XYZ and its kin, PTX, PCD, LAS, OpenVDB points (whole in memory).
+/// Opens a point file by its content, and by its ending where the content does not tell the format: PLY (also with a
+/// range grid), OBJ, XYZ and other text, PTX, PCD, LAS, OpenVDB points (held in memory); docs/formats.md has the
+/// details.
+/// "-" is standard input. Pipes are spooled to an unnamed file in `tmp_dir`, and .gz files are unpacked to one.
 ///
-/// PLY, properties of element `vertex`: x y z; nx ny nz; radius (else pscale); quality (else confidence); every other
-/// one is an attribute, carried as float, integers of 32 bits and doubles in SampleBatch::exact as well. Positions in
-/// an ascii file keep all their digits even where the header says float, as georeferenced ones need them. Binary files
-/// and those of lines are random_access (ascii PLY is not) and never mapped: resident memory does not grow with the
-/// file.
+/// Properties of PLY's element `vertex`: x y z; nx ny nz; radius (else pscale); quality (else confidence). Every other
+/// one is an attribute, held as float, and integers of 32 bits and doubles in SampleBatch::exact as well. Positions of
+/// an ascii file keep all their digits even where the header says float, as georeferenced ones need. Binary files and
+/// text files are random_access (ascii PLY is not) and never mapped: resident memory does not grow with the file.
 ///
-/// Throws Error(unreadable) naming the file and the place: missing file, directory, empty file, unknown format,
-/// malformed header, no points, no x y z, an incomplete normal, a column named twice, a list among a PLY vertex's
-/// properties, a file shorter or longer than its header's counts promise (ascii: known when the last row is read).
-/// Throws Error(budget) when `tmp_dir` cannot take what is spooled, Error(usage) for columns that cannot be meant.
+/// Throws Error(unreadable) naming the file and the place: a file that is missing, a directory, empty or of unknown
+/// format; a malformed header, no points, no x y z, an incomplete normal, a column named twice, a list among a PLY
+/// vertex's properties, a file shorter or longer than its header says (ascii: known when the last row is read). Throws
+/// Error(budget) when `tmp_dir` cannot take what is spooled, Error(usage) for columns that make no sense.
 std::unique_ptr<PointSource> open_points(const std::string& path, const PointSettings& settings);
 std::unique_ptr<PointSource> open_points(const std::string& path, const std::string& tmp_dir = {});
 
-/// Affine, row by row: p' = M p, the last row 0 0 0 1.
+/// An affine map, row by row: p' = M p, the last row 0 0 0 1.
 using Pose = std::array<std::array<double, 4>, 4>;
 
+/// One file of several, with its pose.
 struct PointInput {
   std::string path;
-  bool posed = false;
+  bool posed = false;  ///< `pose` was given
   Pose pose{{{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
   bool seen_along_z = false;  ///< its scanner looked down its own z axis, as those of Stanford's scan lists do
 };
 
-/// What the user named, as files in order: a folder is every point file in it (by ending, sorted by name, not its
-/// subfolders), a name with * ? or [ that is no file is a pattern, a Stanford scan list (.conf) is the scans it names
-/// with their poses, and FILE@POSE.txt is a file with the 4x4 matrix in POSE.txt (16 numbers, row by row), which also
-/// goes with folders, patterns and lists. "-" stays itself.
-/// Throws Error(unreadable) naming what is missing, empty or malformed, Error(usage) for an empty list.
+/// The files that the names stand for, in order. A folder stands for every point file in it (by ending, sorted by name,
+/// without subfolders), a name with * ? or [ that is not a file for the files that match, a Stanford scan list (.conf)
+/// for its scans in their poses, and NAME@POSE.txt for any of these in the pose of the 4x4 matrix in POSE.txt (16
+/// numbers, row by row). "-" stays itself. Throws Error(unreadable) naming what is missing, empty or malformed,
+/// Error(usage) for an empty list.
 std::vector<PointInput> expand_inputs(const std::vector<std::string>& names);
 
-/// The same points in a pose: normals by the inverse transpose, radii by the cube root of the volume change, scanners
-/// moved along. Where nothing is known of these, the origin may have been one, or with `seen_along_z` one was far away
-/// on the source's z axis.
-/// Throws Error(unreadable) for a pose that is singular or not finite.
+/// The same points in a pose: normals go by the inverse transpose, radii by the cube root of the change of volume, and
+/// scanners move along. Where the source knows no scanner, its origin may have been one
+/// (ScanPart::Scanner::pose_origin), or, with `seen_along_z`, it was far away on the source's z axis. Throws
+/// Error(unreadable) for a pose that is singular or not finite.
 std::unique_ptr<PointSource> pose_points(std::unique_ptr<PointSource> source, const Pose& pose,
                                          bool seen_along_z = false);
 
-/// Several sources as one, rows in order. Attributes are the union by name, in the widest type that a source has
-/// (colours are rescaled between 8 bits, 16 bits and 0-1); what a source lacks is 0, quality 1. Normals and radii must
-/// be everybody's, else they are nobody's and a remark says whose are missing.
+/// Several sources as one, rows in order. Attributes are united by name, in the widest type of any source (colours are
+/// rescaled between 8 bits, 16 bits and 0-1); where a source lacks one it is 0, and a quality is 1. Normals and radii
+/// stay only where every source has them; a remark names those that have none. Throws Error(usage) for an empty list.
 std::unique_ptr<PointSource> join_points(std::vector<std::unique_ptr<PointSource>> sources);
 
-/// All of the above: one stream of all that the names stand for.
+/// expand_inputs(), open_points(), pose_points() and join_points() in one: all the points that the names stand for.
+/// Throws as these do.
 std::unique_ptr<PointSource> open_points(const std::vector<std::string>& names, const PointSettings& settings);
 
 }  // namespace lamina

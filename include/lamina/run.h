@@ -1,4 +1,5 @@
-// What a job is told about the run it is part of: threads, memory, cancel, and where progress and messages go.
+// What a job is told about the run it is part of: threads, memory, temporary files, cancelling, progress and messages;
+// and the version of the library.
 #pragma once
 #include <atomic>
 #include <cstddef>
@@ -11,6 +12,7 @@ namespace lamina {
 
 enum class LogLevel { info, warning };
 
+/// How far a job is.
 struct Progress {
   std::string_view stage;           ///< "read", "surface", ...
   std::uint64_t samples_done = 0;   ///< samples that have left the stage
@@ -19,14 +21,16 @@ struct Progress {
   std::int64_t slabs_total = 0;  ///< 0 when unknown
 };
 
-/// Plain settings; a default-constructed context is silent, uncancellable and uses every core.
+/// A default-constructed context is silent, cannot be cancelled and uses every core. Every result is the same for any
+/// number of threads.
 struct RunContext {
   int threads = 0;             ///< 0: as many as the machine has
-  std::size_t max_memory = 0;  ///< bytes, 0: no limit
-  std::string tmp_dir;         ///< empty: next to the output
+  std::size_t max_memory = 0;  ///< bytes of the process; 0: no limit. A job that needs more throws Error(budget)
+  std::string tmp_dir;         ///< folder for temporary files; empty: next to the output, or the system's
   std::function<void(const Progress&)> progress;
   std::function<void(LogLevel, std::string_view)> log;
-  const std::atomic<bool>* cancel = nullptr;  ///< set by the caller, e.g. from a signal handler
+  const std::atomic<bool>* cancel = nullptr;  ///< the caller sets it, from any thread or a signal handler; jobs then
+                                              ///< throw Error(internal, "cancelled") and leave no files
 
   [[nodiscard]] bool cancelled() const { return cancel != nullptr && cancel->load(std::memory_order_relaxed); }
   void info(std::string_view m) const {
@@ -37,7 +41,7 @@ struct RunContext {
   }
 };
 
-/// "major.minor.patch"; the view ends with a null character.
+/// The version of the library, as written into the files it makes: "major.minor.patch", null-terminated.
 std::string_view version();
 
 }  // namespace lamina

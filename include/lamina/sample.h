@@ -1,4 +1,4 @@
-// Samples as they come from a file, in the input's own coordinates.
+// Samples as they come from a file, in its own coordinates.
 #pragma once
 #include <cstddef>
 #include <cstdint>

@@ -18,14 +18,17 @@
 
 namespace lamina {
 
-enum class FitMode { plane, sphere };  ///< METHOD 3.2; algebraic sphere of Guennebaud & Gross 2007
+/// What is fitted to the samples around a point (Cuccuru et al. 2009, section 3.2): a weighted plane, or the algebraic
+/// sphere of Guennebaud and Gross 2007.
+enum class FitMode { plane, sphere };
+/// Whose normals are used.
 enum class NormalsChoice {
   file,       ///< the input's; an input without any is refused
-  automatic,  ///< the input's where they are usable, found for the others (NormalsMode::complete)
-  estimate,   ///< all found, whatever the input has
+  automatic,  ///< the input's where they are usable; the others are found (NormalsMode::complete)
+  estimate,   ///< all are found, whatever the input has
 };
 
-/// Lengths are in the input's units, or multiples of the radius (length.h).
+/// The job. Lengths are in the input's units; a Length may be in multiples of the radius instead (length.h).
 struct SurfaceSettings {
   std::string input;  ///< point file, folder, pattern or scan list (expand_inputs()); "-" is standard input
   std::vector<std::string> more_inputs;  ///< taken together with `input`, as one cloud
@@ -35,51 +38,50 @@ struct SurfaceSettings {
   std::optional<FrameMode> frame;  ///< unset: pca, or axis where grids are asked for (they have the input's axes then)
   BadSamples bad_samples = BadSamples::drop;  ///< non-finite, without a normal, with a radius <= 0
   NormalsChoice normals = NormalsChoice::file;
-  NormalsSettings normal_search;      ///< how those that are found are; mode and bad_samples follow the others
-  double radius_scale = 1;            ///< > 0: multiplies every sample's radius, given or estimated
-  std::uint32_t density = 16;         ///< samples a counting cell must hold to give a radius (paper, section 3.1), >= 2
-  CleanSettings clean;                ///< what is left out before radii are estimated
-  Length max_radius;                  ///< samples with a larger radius are discarded as undersampled; 0: none
-  std::optional<double> blend = 1.2;  ///< H > 0: R = H r (paper, section 3.2); unset: chosen, with `cell` and `refit`
-                                      ///< where these are unset, by the cloud's noise and the evenness of its
-                                      ///< sampling (SurfacePlan says what)
-  /// >= 0, at most 8: before anything is projected each normal is replaced by that of the sphere fitted to the samples
-  /// within so many radii that face where it does; 0: normals stay. Unset: chosen where `blend` is, else 0.
+  NormalsSettings normal_search;  ///< how normals are found; its mode and bad_samples are those of this job
+  double radius_scale = 1;        ///< > 0: multiplies every sample's radius, given or estimated
+  std::uint32_t density = 16;  ///< samples a counting cell must hold to give a radius (Cuccuru et al. 2009, 3.1), >= 2
+  CleanSettings clean;         ///< what is left out before radii are estimated
+  Length max_radius;           ///< samples with a larger radius are discarded as undersampled; 0: none
+  /// H > 0: the influence radius R = H r (section 3.2). Unset: chosen by the noise of the cloud and the evenness of its
+  /// sampling, together with `cell` and `refit` where these are unset (SurfacePlan holds the choice).
+  std::optional<double> blend = 1.2;
+  /// 0..8, radii: before anything is projected each normal is replaced by that of the sphere fitted to the samples
+  /// within this distance that face the same way; 0: normals stay. Unset: chosen where `blend` is, else 0.
   std::optional<double> refit;
-  int steps = 1;                 ///< N in 1..16: projection steps; 0: as many as each corner needs, at most 16
-  double step_tolerance = 0.01;  ///< with 0 steps: a corner is done when a step moves it no more than so many r
+  int steps = 1;                 ///< projection steps, 1..16; 0: as many as each corner needs, at most 16
+  double step_tolerance = 0.01;  ///< with 0 steps: a corner is done when a step moves it no farther than this, in r
   FitMode fit = FitMode::sphere;
-  bool diffuse = false;        ///< project cell centres, then corners by their cells (paper, section 3.3)
+  bool diffuse = false;        ///< project cell centres, and corners by their cells (section 3.3)
   std::optional<Length> cell;  ///< largest leaf cell a radius allows; leaves are half to all of it. Unset: chosen where
                                ///< `blend` is, else 0.9 R
   int levels = 0;              ///< octree levels, 1..12; 0: as the radii ask, at least 4
-  double boundary = 0;         ///< isovertices whose corners' projections lie farther than this from the average of
-                               ///< their samples (in R) are rejected; 0: no limit
+  double boundary = 0;         ///< R: isovertices whose corners project farther than this from the average of their
+                               ///< samples are rejected; 0: no limit
   ClusterMode cluster = ClusterMode::preserving;
-  double chord = 0.2;          ///< outward shift of clustered vertices, in curvature times cell squared; 0: none
-  bool vertex_levels = false;  ///< give vertices an attribute `level`: of the octree, 0 the finest
+  double chord = 0.2;          ///< outward shift of clustered vertices, in curvature times cell size squared; 0: none
+  bool vertex_levels = false;  ///< give vertices an attribute `level`: the octree level, 0 the finest
   /// Give vertices an attribute `curvature`: mean curvature of the fitted sphere, 1 / input unit, positive where the
-  /// surface is convex seen from outside.
+  /// surface is convex.
   bool vertex_curvature = false;
-  /// Boundary loops shorter than this, in local influence radii R, are closed where the surface around them tells how
-  /// it goes on; 0: none, and none with ClusterMode::free. R is taken from the octree's cells, which follow it by
-  /// powers of two.
+  /// Boundary loops shorter than this, in local influence radii R, are closed where the surface around them tells how.
+  /// 0, or ClusterMode::free: none are. R is taken from the cells of the octree, which follow it by powers of two.
   double close_holes = 8;
-  /// Where no loop is longer than three times that, the cloud is of a closed thing, and all loops are closed. Unset:
-  /// chosen where `blend` is, else not.
+  /// Close all loops where none is longer than three times close_holes: the scanned object is taken to be closed then.
+  /// Unset: chosen where `blend` is, else false.
   std::optional<bool> watertight;
-  std::uint64_t prune_triangles = 0;  ///< connected parts of the mesh with fewer triangles are left out
-  Length prune_size;     ///< parts whose box has a shorter diagonal, too; `r`, `R`: of the median sample; 0: none
-  bool local = false;    ///< write coordinates less a shift (SurfaceStats::shift), which floats then hold
-  int window = 1;        ///< slabs that each stage advances at once, >= 1: more is faster on many cores, takes memory
-  bool dry_run = false;  ///< plan only: reads the input, writes nothing
+  std::uint64_t prune_triangles = 0;  ///< connected parts of the mesh with fewer triangles are dropped
+  Length prune_size;   ///< so are parts whose box has a shorter diagonal; `r`, `R`: of the median sample; 0: none
+  bool local = false;  ///< subtract a shift (SurfaceStats::shift) from coordinates, so that floats hold them
+  int window = 1;      ///< >= 1: slabs that each stage advances at once; more is faster on many cores and takes memory
+  bool dry_run = false;  ///< only plan: read the input, write nothing
   VolumeExport volume;   ///< grids to write beside the mesh
 };
 
-/// What the settings came to for this cloud. Lengths in the input's units.
+/// What the settings mean for this cloud. Lengths in the input's units.
 struct SurfacePlan {
-  std::uint64_t samples = 0;       ///< usable ones
-  std::array<double, 3> extent{};  ///< of the bounding box along the frame's axes, sweep axis last
+  std::uint64_t samples = 0;       ///< usable
+  std::array<double, 3> extent{};  ///< of the bounding box along the axes of the frame, sweep axis last
   double radius_low = 0, radius_median = 0, radius_high = 0;  ///< 1 %, 50 %, 99 % of r
   double noise = 0;             ///< median distance of samples from the surface their neighbours suggest, in radii
   double blend = 0, refit = 0;  ///< as given or chosen
@@ -109,7 +111,7 @@ struct Rejected {
   std::optional<std::uint64_t> first_row;  ///< of the input, counted from 0, where known
 };
 
-/// Connected parts of the mesh, where pruning was asked for.
+/// Connected parts of the mesh, where some were to be dropped.
 struct PruneCounts {
   std::uint64_t kept = 0, removed = 0, removed_triangles = 0;
 };
@@ -142,10 +144,10 @@ struct SurfaceStats {
   std::uint64_t disk_bytes = 0;   ///< temporary: the most that the samples' store and the faces took at once
 };
 
-/// Runs the job. Reports the plan through `run.info`, progress through `run.progress`; obeys run.cancel by throwing
-/// Error(internal, "cancelled"), and run.max_memory by refusing before the sweep. Threads: run.threads (all stages).
-/// The output is the same bytes for any number of threads and any window. Throws Error: unreadable (input), usage
-/// (settings that contradict each other or the cloud), budget (memory, disk, output), empty (no surface).
+/// Reconstructs the surface of a cloud (Cuccuru et al. 2009; docs/method.md) and streams it to a mesh file. Reports the
+/// plan through run.info() and progress through run.progress. The bytes are the same for any number of threads and any
+/// window. Throws Error: unreadable (the input), usage (settings out of range, or that contradict each other or the
+/// cloud), budget (run.max_memory, before the sweep; disk; output), empty (no surface), internal (cancelled).
 SurfaceStats reconstruct_surface(const SurfaceSettings& settings, const RunContext& run);
 
 }  // namespace lamina

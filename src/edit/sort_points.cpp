@@ -1,4 +1,4 @@
-#include "lamina/sort_points.h"
+#include "lamina/edit_points.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

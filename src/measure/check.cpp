@@ -1,4 +1,4 @@
-#include "lamina/check.h"
+#include "lamina/measure.h"
 
 #include <algorithm>
 #include <bit>

@@ -1,4 +1,4 @@
-#include "lamina/check.h"
+#include "lamina/measure.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck.h>

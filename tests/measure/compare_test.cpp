@@ -1,4 +1,4 @@
-#include "lamina/compare.h"
+#include "lamina/measure.h"
 
 #include <gtest/gtest.h>
 

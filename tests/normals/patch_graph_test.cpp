@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
-#include "normals/patch_graph.h"
 #include "base/union_find.h"
+#include "normals/patch_graph.h"
 
 namespace lamina::normals {
 namespace {

@@ -4,8 +4,7 @@
 
 #include <cmath>
 
-#include "lamina/check.h"
-#include "lamina/compare.h"
+#include "lamina/measure.h"
 #include "meshes/mesh_files.h"
 #include "meshes/vec3.h"
 #include "support/paths.h"

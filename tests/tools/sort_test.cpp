@@ -1,4 +1,4 @@
-#include "lamina/sort_points.h"
+#include "lamina/edit_points.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
