@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstdlib>
 
+#include "common/option_values.h"
 #include "support/program.h"
 
 namespace lamina::tools {

@@ -27,14 +27,14 @@ TEST(Reference, IsWhatTheProgramPrints) {
 }
 
 /// The names of everything in it: a.b of objects, a[] of lists.
-void add_fields(const Json& json, const std::string& path, Fields& fields) {
-  if (json.is_object() && !json.empty()) {
+void add_fields(const Json& node, const std::string& path, Fields& fields) {
+  if (node.is_object() && !node.empty()) {
     const bool free_names = path.ends_with("].attributes") || path.ends_with("].metadata");
-    for (const auto& [name, value] : json.items())
+    for (const auto& [name, value] : node.items())
       add_fields(value, (path.empty() ? "" : path + ".") + (free_names ? "NAME" : name), fields);
-  } else if (json.is_array()) {
-    if (json.empty()) fields.insert(path + "[]");
-    for (const Json& value : json) add_fields(value, path + "[]", fields);
+  } else if (node.is_array()) {
+    if (node.empty()) fields.insert(path + "[]");
+    for (const Json& value : node) add_fields(value, path + "[]", fields);
   } else {
     fields.insert(path);
   }
