@@ -6,6 +6,10 @@ namespace openvdb {
 OPENVDB_USE_VERSION_NAMESPACE
 namespace OPENVDB_VERSION_NAME {
 
+#ifdef LAMINA_GRIDS_IN_OPENVDB
+// What its library lacks, as it is inlined there; where another is missing, the linker names it.
+template Grid<Vec3STree>::Ptr Grid<Vec3STree>::create(Vec3STree::Ptr);
+#else
 template class Grid<BoolTree>;
 template class Grid<DoubleTree>;
 template class Grid<FloatTree>;
@@ -24,6 +28,7 @@ template class tree::Tree<MaskTree::RootNodeType>;
 template class tree::Tree<Vec3DTree::RootNodeType>;
 template class tree::Tree<Vec3STree::RootNodeType>;
 template class tree::Tree<points::PointDataTree::RootNodeType>;
+#endif
 
 }  // namespace OPENVDB_VERSION_NAME
 }  // namespace openvdb

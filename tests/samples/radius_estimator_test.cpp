@@ -18,10 +18,10 @@ namespace {
 
 using Point = std::array<std::int32_t, 3>;
 using Cloud = std::vector<Point>;
-using Cell = std::array<std::int64_t, 3>;
+using GridCell = std::array<std::int64_t, 3>;
 
-Cell cell_of(const Point& p, std::int64_t side) {
-  Cell c{};
+GridCell cell_of(const Point& p, std::int64_t side) {
+  GridCell c{};
   for (std::size_t a = 0; a < 3; ++a)
     c[a] = static_cast<std::int64_t>(std::floor(static_cast<double>(p[a]) / static_cast<double>(side)));
   return c;
@@ -50,34 +50,34 @@ class Oracle {
 
  private:
   [[nodiscard]] std::int64_t side(int level) const { return static_cast<std::int64_t>(s_.finest_cell) << level; }
-  [[nodiscard]] std::uint64_t count(int level, const Cell& c) const {
+  [[nodiscard]] std::uint64_t count(int level, const GridCell& c) const {
     const auto& counts = counts_[static_cast<std::size_t>(level)];
     const auto found = counts.find(c);
     return found == counts.end() ? 0 : found->second;
   }
-  [[nodiscard]] double own(int level, const Cell& c) const {
+  [[nodiscard]] double own(int level, const GridCell& c) const {
     return 2 * std::sqrt(static_cast<double>(side(level)) * static_cast<double>(side(level)) /
                          static_cast<double>(count(level, c)));
   }
-  [[nodiscard]] bool refined(int level, const Cell& c) const {
+  [[nodiscard]] bool refined(int level, const GridCell& c) const {
     for (int i = 0; level > 0 && i < 8; ++i) {
       if (count(level - 1, {2 * c[0] + (i & 1), 2 * c[1] + (i >> 1 & 1), 2 * c[2] + (i >> 2)}) >= s_.min_samples)
         return true;
     }
     return false;
   }
-  [[nodiscard]] double bound(int level, const Cell& c) const {
+  [[nodiscard]] double bound(int level, const GridCell& c) const {
     double least = std::numeric_limits<double>::infinity();
     const std::uint64_t enough = level + 1 == s_.levels ? 1 : s_.min_samples;
     for (int i = 0; i < 27; ++i) {
-      const Cell n{c[0] + i % 3 - 1, c[1] + i / 3 % 3 - 1, c[2] + i / 9 - 1};
+      const GridCell n{c[0] + i % 3 - 1, c[1] + i / 3 % 3 - 1, c[2] + i / 9 - 1};
       if (count(level, n) >= enough && !refined(level, n)) least = std::min(least, own(level, n));
     }
     return s_.neighbour_bound * least;
   }
 
   RadiiSettings s_;
-  std::vector<std::map<Cell, std::uint64_t>> counts_;
+  std::vector<std::map<GridCell, std::uint64_t>> counts_;
 };
 
 /// Radii of a cloud sorted by z, pushed in buckets that end before the given z values.
