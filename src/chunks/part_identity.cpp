@@ -5,7 +5,7 @@
 #include "lamina/error.h"
 #include "lamina/run.h"
 #include "reconstruct/stored_cloud.h"
-#include "samples/clean_ingested.h"
+#include "samples/cleaning.h"
 
 namespace lamina {
 

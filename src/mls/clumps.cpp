@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "samples/digit_sort.h"
+#include "samples/block_order.h"
 
 namespace lamina {
 namespace {

@@ -7,7 +7,7 @@
 #include "lattice/lattice.h"
 #include "mls/clumps.h"
 #include "mls/kernel.h"
-#include "samples/normal_filter.h"
+#include "samples/sample_feed.h"
 
 namespace lamina {
 

@@ -8,7 +8,7 @@
 
 #include "lamina/error.h"
 #include "normals/sample_window.h"
-#include "store/unit_normal.h"
+#include "store/block_codec.h"
 
 namespace lamina::normals {
 namespace {
@@ -17,7 +17,7 @@ constexpr std::size_t kRowsAtOnce = std::size_t{1} << 15;
 
 std::array<float, 3> normal_of(const NormalCode& code) {
   std::array<float, 3> n{};
-  unpack_normals(&code[0], &code[1], &code[2], 1, &n[0], &n[1], &n[2]);
+  unpack_normals({&code[0], &code[1], &code[2]}, 1, {&n[0], &n[1], &n[2]});
   return n;
 }
 
@@ -58,7 +58,7 @@ class PointsWithNormals final : public PointSource {
 
 NormalCode code_of(const std::array<float, 3>& normal) {
   NormalCode code{};
-  pack_normals(&normal[0], &normal[1], &normal[2], 1, &code[0], &code[1], &code[2]);
+  pack_normals({&normal[0], &normal[1], &normal[2]}, 1, {&code[0], &code[1], &code[2]});
   return code;
 }
 

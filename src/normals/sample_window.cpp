@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "store/numbered_rows.h"
+#include "store/row_ids.h"
 
 namespace lamina::normals {
 namespace {

@@ -17,10 +17,10 @@
 #include "normals/row_normals.h"
 #include "normals/sample_window.h"
 #include "normals/viewpoints.h"
-#include "samples/radii.h"
+#include "samples/sampling_survey.h"
 #include "store/ingest.h"
-#include "store/numbered_rows.h"
-#include "store/survey.h"
+#include "store/input_survey.h"
+#include "store/row_ids.h"
 
 namespace lamina {
 namespace {
@@ -90,11 +90,11 @@ class Job {
     const std::string directory = run_.tmp_dir.empty() ? system_tmp_dir() : run_.tmp_dir;
     RunContext silent = run_;  // what is left out is told by whoever takes the rows
     silent.log = nullptr;
-    NumberedRows points(source_, settings_.mode != NormalsMode::estimate);
+    RowIdSource points(source_, settings_.mode != NormalsMode::estimate);
     const Survey survey = survey_input(points, settings_.bad_samples, silent);
     const Frame frame = choose_frame(survey, FrameMode::pca);
     turn_ = frame.rotation.transpose();
-    const Ingested in = ingest(points, survey, frame, 1, directory, run_);
+    const Ingested in = ingest(points, survey, frame, directory, run_);
     const std::vector<Viewpoint> everywhere =
         settings_.viewpoints.size() > 1 && settings_.viewpoints.size() == source_.info().scans.size()
             ? std::vector<Viewpoint>{}

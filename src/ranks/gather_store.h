@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "ranks/ranks.h"
-#include "samples/radii.h"
 #include "samples/sample_feed.h"
+#include "samples/sampling_survey.h"
 
 namespace lamina::ranks {
 

@@ -12,7 +12,7 @@
 #include "lamina/error.h"
 #include "lamina/frame.h"
 #include "lamina/points.h"
-#include "store/survey.h"
+#include "store/input_survey.h"
 
 namespace lamina::ranks {
 

@@ -246,7 +246,7 @@ class Reading {
   bool fill(const Survey& survey) {
     ranks_.together([&] {
       const auto work = [&] {
-        ingested_.emplace(ingest(*source_, survey, frame_, settings_.radius_scale, directory_, job_.run, {}, rows_));
+        ingested_.emplace(ingest(*source_, survey, frame_, directory_, job_.run, {settings_.radius_scale, {}, rows_}));
       };
       job_.watch.time("store", [&] {
         if (shared_) {

@@ -6,7 +6,7 @@
 #include "lamina/surface.h"
 #include "mls/project.h"
 #include "mls/refit_normals.h"
-#include "samples/radii.h"
+#include "samples/sampling_survey.h"
 #include "samples/sample_feed.h"
 
 namespace lamina {

@@ -11,7 +11,7 @@
 #include "base/ply_type.h"
 #include "lamina/error.h"
 #include "reconstruct/stored_cloud.h"
-#include "samples/clean_ingested.h"
+#include "samples/cleaning.h"
 
 namespace lamina {
 namespace {

@@ -16,8 +16,8 @@
 #include "lamina/error.h"
 #include "reconstruct/plan.h"
 #include "store/ingest.h"
-#include "store/numbered_rows.h"
-#include "store/survey.h"
+#include "store/input_survey.h"
+#include "store/row_ids.h"
 
 namespace lamina {
 namespace {
@@ -168,10 +168,10 @@ PointRadiiReport write_radii(PointSource& source, PointsWriter& writer, const Po
   require_memory(run, kProgram + records, source.info().path, "finding radii");
   RunContext silent = run;  // what is left out is told by whoever writes the rows
   silent.log = nullptr;
-  NumberedRows positions(source);
+  RowIdSource positions(source);
   const Survey survey = survey_input(positions, settings.bad_samples, silent);
   const Frame frame = choose_frame(survey, FrameMode::pca);
-  StoredCloud cloud{positions.info(), frame, ingest(positions, survey, frame, 1, directory, run)};
+  StoredCloud cloud{positions.info(), frame, ingest(positions, survey, frame, directory, run)};
   cloud.info.has_radius = false;
   const SlabStore& store = cloud.ingested.store;
   SurfaceSettings as_reconstructed;

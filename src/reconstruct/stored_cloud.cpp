@@ -11,8 +11,8 @@
 #include "lamina/error.h"
 #include "reconstruct/job.h"
 #include "reconstruct/kept_input.h"
-#include "samples/clean_ingested.h"
-#include "store/survey.h"
+#include "samples/cleaning.h"
+#include "store/input_survey.h"
 
 namespace lamina {
 namespace {
@@ -68,7 +68,7 @@ StoredCloud ingest_all(PointSource& source, const SurfaceSettings& settings, con
     const Frame frame = choose_frame(*survey, chosen_frame(settings));
     std::optional<Ingested> ingested;
     job.watch.time("store", [&] {
-      ingested.emplace(ingest(source, *survey, frame, settings.radius_scale, place, job.run, pick));
+      ingested.emplace(ingest(source, *survey, frame, place, job.run, {settings.radius_scale, pick}));
     });
     return StoredCloud{source.info(), frame, std::move(*ingested)};
   };
@@ -92,7 +92,7 @@ void clean_cloud(StoredCloud& cloud, const SurfaceSettings& settings, const std:
   counts.skipped = in.census.skipped;
   if (settings.clean.looks_around()) {
     job.watch.time("clean", [&] {
-      clean_ingested(in, settings.clean, cloud.frame.step, input_name(settings), tmp, counts, job.run);
+      clean_ingested(in, {settings.clean, cloud.frame.step, tmp}, input_name(settings), counts, job.run);
     });
   }
   if (const std::string said = describe(counts); !said.empty())

@@ -10,7 +10,7 @@
 #include "lamina/points.h"
 #include "lamina/run.h"
 #include "lamina/surface.h"
-#include "samples/radii.h"
+#include "samples/sampling_survey.h"
 #include "store/ingest.h"
 
 namespace lamina {

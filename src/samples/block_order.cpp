@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "base/floor_divide.h"
-#include "samples/digit_sort.h"
 
 namespace lamina {
 namespace {

@@ -8,11 +8,10 @@
 #include "base/with_threads.h"
 #include "edit/batch_pipe.h"
 #include "lamina/error.h"
-#include "samples/clean_store.h"
+#include "samples/cleaning.h"
 #include "store/ingest.h"
-#include "store/numbered_rows.h"
-#include "store/row_pick.h"
-#include "store/survey.h"
+#include "store/input_survey.h"
+#include "store/row_ids.h"
 
 namespace lamina {
 namespace {
@@ -27,11 +26,11 @@ std::vector<bool> rows_to_drop(PointSource& source, const CleanSettings& setting
   require_memory(run, kProgram + masks, source.info().path, "cleaning");
   RunContext silent = run;  // what is left out is told by whoever writes the rows
   silent.log = nullptr;
-  NumberedRows rows(source);
+  RowIdSource rows(source);
   const Survey survey = survey_input(rows, bad, silent, settings.pick);
   const Frame frame = choose_frame(survey, FrameMode::pca);
-  const Ingested in = ingest(rows, survey, frame, 1, directory, run, settings.pick);
-  const clean::KeepMasks keep = clean::choose_samples(in.store, settings, frame.step, directory, counts, run);
+  const Ingested in = ingest(rows, survey, frame, directory, run, {1, settings.pick});
+  const KeepMasks keep = choose_samples(in.store, {settings, frame.step, directory}, counts, run);
   std::vector<bool> drop(source.info().count, false);
   LocalSamples samples;
   for (std::size_t b = 0; b < keep.size(); ++b) {
@@ -61,10 +60,10 @@ CleanReport clean_points(PointSource& source, PointsWriter& writer, const CleanS
     std::vector<std::uint8_t> stays(batch.size());
     for (std::size_t i = 0; i < batch.size(); ++i) {
       const std::uint64_t row = batch.first + i;
-      const clean::Pick pick = clean::judge(settings.pick, batch, i, row);
-      counts.skipped += pick == clean::Pick::skipped ? 1 : 0;
-      counts.clipped += pick == clean::Pick::clipped ? 1 : 0;
-      stays[i] = pick == clean::Pick::taken && (drop.empty() || !drop[row]) ? 1 : 0;
+      const Pick pick = judge(settings.pick, batch, i, row);
+      counts.skipped += pick == Pick::skipped ? 1 : 0;
+      counts.clipped += pick == Pick::clipped ? 1 : 0;
+      stays[i] = pick == Pick::taken && (drop.empty() || !drop[row]) ? 1 : 0;
     }
     const EditReport rows = clean_rows(batch, std::move(stays));
     if (rows.bad_rows > 0 && bad == BadSamples::refuse) refuse_bad_row(rows, source.info().path);

@@ -1,4 +1,5 @@
-// Statistical outliers: samples whose neighbours are much farther away than is usual in the cloud.
+// Statistical outliers: samples whose nearest neighbours are much farther away than is usual in the cloud (Rusu et al.
+// 2008, "Towards 3D point cloud based object maps for household environments").
 #pragma once
 #include <cstdint>
 #include <string>
@@ -7,7 +8,24 @@
 #include "lamina/run.h"
 #include "store/slab_store.h"
 
-namespace lamina::clean {
+namespace lamina {
+
+/// Positions in fixed-point steps; parallel arrays.
+struct Positions {
+  std::vector<std::int32_t> x, y, z;
+  [[nodiscard]] std::size_t size() const { return x.size(); }
+};
+
+/// Neighbours are looked for as far as so many cells, a dozen spacings; farther ones count as if they were there.
+inline constexpr int kFarthestCells = 6;
+
+/// For each of the first `wanted` positions the mean distance (steps) to its `neighbours` nearest among all the others,
+/// distances beyond kFarthestCells cells counting as that. Depends on the set of positions alone. `cell` >= 1024.
+std::vector<float> mean_distances(const Positions& positions, std::size_t wanted, std::uint32_t neighbours,
+                                  std::int32_t cell);
+
+/// The least cell, half octaves from 1024 on, that holds `wanted` of the positions on average, empty ones not counted.
+std::int32_t counting_cell(const Positions& positions, double wanted);
 
 /// Which samples of each bucket stay.
 using KeepMasks = std::vector<std::vector<bool>>;
@@ -27,4 +45,4 @@ struct Outliers {
 Outliers drop_outliers(const SlabStore& store, const OutlierRule& rule, const std::string& directory, KeepMasks& masks,
                        const RunContext& run);
 
-}  // namespace lamina::clean
+}  // namespace lamina

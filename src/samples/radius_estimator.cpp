@@ -8,7 +8,7 @@
 #include "base/floor_divide.h"
 #include "lamina/error.h"
 #include "samples/cell_octree.h"
-#include "samples/radii.h"
+#include "samples/radius_estimator.h"
 
 namespace lamina {
 namespace {

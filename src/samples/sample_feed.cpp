@@ -216,7 +216,8 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       const float r = known.radius[i];
       out.support[i] = r * blend;
-      // q_i is proportional to the sampling density 1 / r^2 (METHOD 3.1), scaled by the finest cell to stay near one.
+      // q_i is proportional to the sampling density 1 / r^2 (Cuccuru et al. 2009, section 3.1), scaled by the finest
+      // cell to stay near one.
       const float q = r > 0 ? finest / r : 0.0F;
       out.weight[i] = q * q * (has_quality ? out.samples.quality[i] : 1.0F);
       out.level[i] = fixed ? std::uint8_t{0} : level_for(static_cast<double>(r) * ratio, lattice_);

@@ -1,6 +1,8 @@
 // Hands the stages their samples: buckets of the store with radii, levels and weights, read again whenever they are
-// needed and kept only within a budget (METHOD 3.4: samples are re-streamed, never stored per cell).
+// needed and kept only within a budget (samples are streamed again, never stored per cell: Cuccuru et al.
+// 2009, section 3.4).
 #pragma once
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -11,11 +13,32 @@
 #include "lamina/length.h"
 #include "lattice/lattice.h"
 #include "samples/bucket_cache.h"
-#include "samples/normal_filter.h"
-#include "samples/radii.h"
+#include "samples/radius_estimator.h"
 #include "store/slab_store.h"
 
 namespace lamina {
+
+struct UnitNormals {
+  std::vector<float> x, y, z;
+};
+
+/// Normals better than the input's, found from the samples around as these pass.
+/// Buckets come in ascending order with the input's normals, and get theirs when all that may act on them has come.
+class NormalFilter {
+ public:
+  NormalFilter() = default;
+  virtual ~NormalFilter() = default;
+  NormalFilter(const NormalFilter&) = delete;
+  NormalFilter& operator=(const NormalFilter&) = delete;
+  /// As far as samples act, steps.
+  [[nodiscard]] virtual double reach() const = 0;
+  /// A bucket's samples and the radii they have (steps; 0: left out).
+  virtual void add(std::size_t bucket, const LocalSamples& samples, const std::vector<float>& radii) = 0;
+  /// Of a bucket that was added, in its order; all samples within reach() have been added.
+  virtual UnitNormals find(std::size_t bucket) = 0;
+  /// Samples below z act on nothing more.
+  virtual void forget_below(std::int64_t z) = 0;
+};
 
 using Batch = std::vector<std::shared_ptr<const ActiveBucket>>;
 

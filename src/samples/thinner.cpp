@@ -6,12 +6,12 @@
 
 #include "base/cell_hash.h"
 
-namespace lamina::clean {
+namespace lamina {
 namespace {
 
 constexpr std::size_t kFewest = 1 << 10;
 
-std::int64_t floor_div(std::int64_t a, std::int64_t b) {
+std::int64_t cell_along(std::int64_t a, std::int64_t b) {
   return a / b - static_cast<std::int64_t>(a % b != 0 && a < 0);
 }
 
@@ -28,13 +28,13 @@ std::size_t Thinner::place(std::int64_t x, std::int64_t y, std::int64_t z) const
 }
 
 std::size_t Thinner::home(const Kept& k) const {
-  return place(floor_div(k.x, cell_), floor_div(k.y, cell_), floor_div(k.z, cell_));
+  return place(cell_along(k.x, cell_), cell_along(k.y, cell_), cell_along(k.z, cell_));
 }
 
 bool Thinner::is_near_kept(const Kept& s) const {
-  const auto reach = static_cast<std::int64_t>(distance_);
-  const auto first = [&](std::int64_t v) { return floor_div(v - reach, cell_); };
-  const auto last = [&](std::int64_t v) { return floor_div(v + reach, cell_); };
+  const auto within = static_cast<std::int64_t>(distance_);
+  const auto first = [&](std::int64_t v) { return cell_along(v - within, cell_); };
+  const auto last = [&](std::int64_t v) { return cell_along(v + within, cell_); };
   for (std::int64_t z = first(s.z); z <= last(s.z); ++z) {
     for (std::int64_t y = first(s.y); y <= last(s.y); ++y) {
       for (std::int64_t x = first(s.x); x <= last(s.x); ++x) {
@@ -87,4 +87,4 @@ std::uint64_t Thinner::thin(const LocalSamples& samples, std::vector<bool>& keep
   return dropped;
 }
 
-}  // namespace lamina::clean
+}  // namespace lamina

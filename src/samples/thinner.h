@@ -5,7 +5,7 @@
 
 #include "store/slab_store.h"
 
-namespace lamina::clean {
+namespace lamina {
 
 /// Greedy, in the order of the samples: one is left out when a kept one lies within the distance and its normal does
 /// not point the other way. Buckets come by ascending z; kept samples that lie farther below than the distance are
@@ -37,4 +37,4 @@ class Thinner {
   std::vector<std::uint32_t> heads_;  ///< by the hash of a cell; their number is a power of two
 };
 
-}  // namespace lamina::clean
+}  // namespace lamina

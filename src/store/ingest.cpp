@@ -93,8 +93,8 @@ std::pair<std::int32_t, std::int32_t> range_of(const std::vector<std::int32_t>& 
 }
 
 /// Fills the rest of a piece from `piece.rows`.
-void to_local(IngestPiece& piece, const AttributeLayout& layout, const Frame& frame, double radius_scale,
-              double quality_scale, const RowPick& pick) {
+void to_local(IngestPiece& piece, const AttributeLayout& layout, const Frame& frame, const IngestSettings& settings,
+              double quality_scale) {
   const SampleBatch& rows = piece.rows;
   LocalSamples& out = piece.local;
   Census& census = piece.census;
@@ -103,11 +103,11 @@ void to_local(IngestPiece& piece, const AttributeLayout& layout, const Frame& fr
   resize(out, rows, rows.size());
   const Eigen::Matrix3d turn = frame.rotation;
   const Eigen::Matrix3d scale = frame.rotation / frame.step;
-  const double radius = radius_scale / frame.step;
+  const double radius = settings.radius_scale / frame.step;
   double farthest = 0;
   std::size_t n = 0;
   for (std::size_t i = 0; i < rows.size(); ++i) {
-    if (!census.takes(pick, rows, i)) continue;
+    if (!census.takes(settings.pick, rows, i)) continue;
     const Defect defect = defect_of(rows, i);
     if (defect != Defect::none) {
       census.reject(defect, rows.first + i);
@@ -171,8 +171,8 @@ StoreSettings store_settings(const Survey& survey, const Frame& frame, const Sto
 
 }  // namespace
 
-Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, double radius_scale,
-                const StorePlace& place, const RunContext& run, const RowPick& pick, const RowSpan& rows) {
+Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, const StorePlace& place,
+                const RunContext& run, const IngestSettings& settings) {
   const PointSourceInfo& info = source.info();
   const StoreSettings buckets = store_settings(survey, frame, place);
   SlabStoreWriter writer({info.has_radius, info.has_quality, info.attributes}, buckets);
@@ -182,8 +182,8 @@ Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, d
   const double quality = quality_scale(survey);
   const std::int64_t top = buckets.z_min + static_cast<std::int64_t>(buckets.buckets) * buckets.bucket_height;
   PiecePool pool;
-  const std::uint64_t end = std::min(rows.end, info.count);
-  std::uint64_t next = std::min(rows.first, end);
+  const std::uint64_t end = std::min(settings.rows.end, info.count);
+  std::uint64_t next = std::min(settings.rows.first, end);
   const std::uint64_t count = end - next;
   std::uint64_t done = 0;
   std::atomic<bool> stopped = false;
@@ -203,7 +203,7 @@ Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, d
   };
   const auto convert = [&](IngestPiece* piece) {
     if (info.random_access) read(piece->rows);
-    to_local(*piece, info.attributes, frame, radius_scale, quality, pick);
+    to_local(*piece, info.attributes, frame, settings, quality);
     return piece;
   };
   const auto append = [&](IngestPiece* piece) {

@@ -10,8 +10,8 @@
 #include "lamina/points.h"
 #include "lamina/run.h"
 #include "lattice/extent.h"
+#include "store/input_survey.h"
 #include "store/slab_store.h"
-#include "store/survey.h"
 
 namespace lamina {
 
@@ -34,9 +34,15 @@ struct RowSpan {
   std::uint64_t first = 0, end = std::numeric_limits<std::uint64_t>::max();
 };
 
+struct IngestSettings {
+  double radius_scale = 1;  ///< multiplies given radii
+  RowPick pick{};
+  RowSpan rows{};
+};
+
 /// Reads the input, or some of its rows, into the store; samples with a defect are left out. After a survey of all rows
 /// the result is always complete; after one of a part it need not be.
-Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, double radius_scale,
-                const StorePlace& place, const RunContext& run, const RowPick& pick = {}, const RowSpan& rows = {});
+Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, const StorePlace& place,
+                const RunContext& run, const IngestSettings& settings = {});
 
 }  // namespace lamina

@@ -1,6 +1,7 @@
 // A store that outlives its run: the index of its blocks beside the files they lie in.
 #include <fcntl.h>
 #include <fmt/format.h>
+
 #include <zlib.h>
 
 #include <algorithm>
@@ -11,7 +12,7 @@
 
 #include "base/output_file.h"
 #include "lamina/error.h"
-#include "store/store_impl.h"
+#include "store/store_blocks.h"
 
 namespace lamina {
 namespace {

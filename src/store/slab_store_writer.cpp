@@ -1,19 +1,130 @@
+// Fills a store: samples wait in a pool, bucket by bucket, and go to disk in compressed blocks.
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_pipeline.h>
 
 #include <algorithm>
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <memory>
 #include <numeric>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "base/floor_divide.h"
 #include "lamina/error.h"
-#include "store/bucket_buffers.h"
-#include "store/store_impl.h"
+#include "store/store_blocks.h"
 
 namespace lamina {
 namespace {
+
+/// Samples waiting for the disk, sorted into buckets: chunks of a fixed pool, chained per bucket.
+class BucketBuffers {
+ public:
+  /// The pool takes pool_bytes, rounded down to chunks, at least one chunk. Its memory is touched only as it is used.
+  BucketBuffers(const SampleColumns& columns, std::size_t buckets, std::size_t pool_bytes);
+
+  /// Adds rows [first, first + bucket_of.size()), less than 2^32 in all, to their buckets until the pool is full;
+  /// returns how many went in.
+  std::size_t add(const LocalSamples& samples, const PackedNormals& normals, std::size_t first,
+                  std::span<const std::uint32_t> bucket_of);
+  [[nodiscard]] std::size_t buckets() const { return count_.size(); }
+  [[nodiscard]] std::size_t waiting(std::size_t bucket) const { return count_[bucket]; }
+  [[nodiscard]] std::size_t chunks() const { return next_.size(); }
+  [[nodiscard]] std::size_t free_chunks() const { return chunks() - used_; }
+  /// The bucket's chunks in order, each full but the last.
+  [[nodiscard]] std::vector<const std::byte*> chunks_of(std::size_t bucket) const;
+  /// Empties a bucket.
+  void release(std::size_t bucket);
+
+ private:
+  static constexpr std::uint32_t kNone = ~0U;
+  [[nodiscard]] std::uint32_t take_chunk();
+
+  const SampleColumns& columns_;
+  std::size_t chunk_bytes_;
+  std::size_t used_ = 0;
+  std::uint32_t fresh_ = 0;          ///< chunks from here on have never been used
+  std::uint32_t free_ = kNone;       ///< chain of released chunks
+  std::vector<std::uint32_t> next_;  ///< chain, per chunk
+  std::vector<std::uint32_t> head_, tail_;
+  std::vector<std::size_t> count_;
+  std::vector<std::uint32_t> arriving_slots_;  ///< of the rows of one add()
+  std::vector<std::uint32_t> place_;           ///< per bucket: where its rows begin in the arrays below
+  std::vector<std::uint32_t> rows_, slots_;    ///< the same sorted by bucket, so that writes run along the chunks
+  std::unique_ptr<std::byte[]> pool_;
+};
+
+BucketBuffers::BucketBuffers(const SampleColumns& columns, std::size_t buckets, std::size_t pool_bytes)
+    : columns_(columns),
+      chunk_bytes_(kChunkRows * columns.row_bytes()),
+      head_(buckets, kNone),
+      tail_(buckets, kNone),
+      count_(buckets, 0) {
+  constexpr std::size_t most = kNone / kChunkRows;  // slots are 32 bits
+  next_.resize(std::clamp<std::size_t>(pool_bytes / chunk_bytes_, 1, most));
+  pool_ = std::make_unique_for_overwrite<std::byte[]>(chunks() * chunk_bytes_);
+}
+
+std::uint32_t BucketBuffers::take_chunk() {
+  ++used_;
+  if (free_ == kNone) return fresh_++;
+  const std::uint32_t chunk = free_;
+  free_ = next_[chunk];
+  return chunk;
+}
+
+std::size_t BucketBuffers::add(const LocalSamples& samples, const PackedNormals& normals, std::size_t first,
+                               std::span<const std::uint32_t> bucket_of) {
+  arriving_slots_.clear();
+  place_.assign(buckets() + 1, 0);
+  for (const std::uint32_t bucket : bucket_of) {
+    const auto row = static_cast<std::uint32_t>(count_[bucket] % kChunkRows);
+    if (row == 0) {
+      if (free_chunks() == 0) break;
+      const std::uint32_t chunk = take_chunk();
+      (count_[bucket] == 0 ? head_[bucket] : next_[tail_[bucket]]) = chunk;
+      tail_[bucket] = chunk;
+    }
+    ++count_[bucket];
+    ++place_[bucket + 1];
+    arriving_slots_.push_back(tail_[bucket] * kChunkRows + row);
+  }
+  const std::size_t added = arriving_slots_.size();
+  std::partial_sum(place_.begin(), place_.end(), place_.begin());
+  rows_.resize(added);
+  slots_.resize(added);
+  for (std::size_t i = 0; i < added; ++i) {
+    const std::uint32_t to = place_[bucket_of[i]]++;
+    rows_[to] = static_cast<std::uint32_t>(first + i);
+    slots_[to] = arriving_slots_[i];
+  }
+  const auto scatter = [&](std::size_t column) {
+    columns_.scatter(samples, normals, column, rows_, slots_, pool_.get());
+  };
+  tbb::parallel_for(std::size_t{0}, columns_.size(), scatter);
+  return added;
+}
+
+std::vector<const std::byte*> BucketBuffers::chunks_of(std::size_t bucket) const {
+  std::vector<const std::byte*> chunks((count_[bucket] + kChunkRows - 1) / kChunkRows);
+  std::uint32_t chunk = head_[bucket];
+  for (auto& c : chunks) {
+    c = pool_.get() + chunk * chunk_bytes_;
+    chunk = next_[chunk];
+  }
+  return chunks;
+}
+
+void BucketBuffers::release(std::size_t bucket) {
+  if (count_[bucket] == 0) return;
+  used_ -= (count_[bucket] + kChunkRows - 1) / kChunkRows;
+  next_[tail_[bucket]] = free_;
+  free_ = head_[bucket];
+  count_[bucket] = 0;
+}
 
 /// Samples taken from a batch at a time: their bucket numbers and slots stay in the cache.
 constexpr std::size_t kPieceRows = 32768;
@@ -95,8 +206,8 @@ void SlabStoreWriter::Impl::pack(const LocalSamples& s) {
   normals.resize(s.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, s.size(), 8192), [&](const auto& range) {
     const std::size_t i = range.begin();
-    pack_normals(s.nx.data() + i, s.ny.data() + i, s.nz.data() + i, range.size(), normals.u.data() + i,
-                 normals.v.data() + i, normals.low.data() + i);
+    pack_normals({s.nx.data() + i, s.ny.data() + i, s.nz.data() + i}, range.size(),
+                 {normals.u.data() + i, normals.v.data() + i, normals.low.data() + i});
   });
 }
 

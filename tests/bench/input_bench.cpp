@@ -5,7 +5,8 @@
 #include "bench/benches.h"
 #include "bench/measure.h"
 #include "lamina/scatter.h"
-#include "samples/radii.h"
+#include "samples/radius_estimator.h"
+#include "samples/sampling_survey.h"
 #include "store/slab_store.h"
 
 namespace lamina::bench {
@@ -120,7 +121,7 @@ void add_input_benches(const Scene& scene, const std::string& suffix) {
   add("ingest" + suffix, [&scene, nothing](benchmark::State& s) {
     const Survey survey = survey_input(*scene.source, BadSamples::drop, {});
     measure(s, scene.samples(), nothing,
-            [&](int) { ingest(*scene.source, survey, scene.plan.frame, 1, scene.folder, {}); });
+            [&](int) { ingest(*scene.source, survey, scene.plan.frame, scene.folder, {}); });
   });
   add("store_write" + suffix, [&scene](benchmark::State& s) { write_store(s, scene); });
   add("store_read" + suffix, [&scene, nothing](benchmark::State& s) {

@@ -11,7 +11,7 @@
 #include <random>
 
 #include "lamina/error.h"
-#include "samples/radii.h"
+#include "samples/radius_estimator.h"
 
 namespace lamina {
 namespace {

@@ -5,7 +5,7 @@
 #include <rapidcheck/gtest.h>
 #include <cmath>
 
-namespace lamina::clean {
+namespace lamina {
 namespace {
 
 LocalSamples some_samples(std::size_t count, int extent, bool two_sided) {
@@ -76,4 +76,4 @@ TEST(Thinner, SamplesThatAreNotThereNeitherStayNorDriveOthersOut) {
 }
 
 }  // namespace
-}  // namespace lamina::clean
+}  // namespace lamina

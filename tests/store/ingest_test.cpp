@@ -24,7 +24,7 @@ Stored store(const Cloud& cloud, double radius_scale = 1) {
   const Survey survey = survey_input(*source, BadSamples::drop, {});
   Stored out;
   out.frame = choose_frame(survey, FrameMode::pca);
-  const Ingested ingested = ingest(*source, survey, out.frame, radius_scale, folder.path(), {});
+  const Ingested ingested = ingest(*source, survey, out.frame, folder.path(), {}, {radius_scale});
   EXPECT_EQ(folder.entries(), 1);  // the store has no name
   out.extent = ingested.extent;
   out.buckets = ingested.store.buckets();

@@ -63,14 +63,14 @@ Read read_by_part(PointSource& source) {
   const auto part = survey_part(source);
   if (!part) throw std::runtime_error("no survey");
   Read out{*part, choose_frame(*part, FrameMode::pca), nullptr};
-  out.ingested = std::make_unique<Ingested>(ingest(source, *part, out.frame, 1, folder.path(), {}));
+  out.ingested = std::make_unique<Ingested>(ingest(source, *part, out.frame, folder.path(), {}));
   return out;
 }
 
 Ingested read_twice(PointSource& source) {
   const test::TemporaryFolder folder;
   const Survey survey = survey_input(source, BadSamples::drop, {});
-  return ingest(source, survey, choose_frame(survey, FrameMode::pca), 1, folder.path(), {});
+  return ingest(source, survey, choose_frame(survey, FrameMode::pca), folder.path(), {});
 }
 
 TEST(ReadOnce, PartOfASortedFileGivesTheFrameOfAll) {

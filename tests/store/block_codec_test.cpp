@@ -1,4 +1,4 @@
-#include "store/unit_normal.h"
+#include "store/block_codec.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
@@ -14,9 +14,9 @@ using Normal = std::array<float, 3>;
 
 Normal there_and_back(const Normal& n) {
   std::array<std::uint16_t, 3> packed{};
-  pack_normals(&n[0], &n[1], &n[2], 1, &packed[0], &packed[1], &packed[2]);
+  pack_normals({&n[0], &n[1], &n[2]}, 1, {&packed[0], &packed[1], &packed[2]});
   Normal out{};
-  unpack_normals(&packed[0], &packed[1], &packed[2], 1, &out[0], &out[1], &out[2]);
+  unpack_normals({&packed[0], &packed[1], &packed[2]}, 1, {&out[0], &out[1], &out[2]});
   return out;
 }
 

@@ -1,4 +1,4 @@
-// A first look at the input: what is usable, where it lies, and the frame to compute in (METHOD 3.1).
+// A first pass over the input: what is usable, where it lies, and the frame to compute in.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -12,6 +12,11 @@
 #include "lamina/run.h"
 
 namespace lamina {
+
+/// Whether a row is taken from the input at all.
+enum class Pick : std::uint8_t { taken, skipped, clipped };
+/// Of row i of a batch, which is the input's row `row`.
+Pick judge(const RowPick& pick, const SampleBatch& batch, std::size_t i, std::uint64_t row);
 
 /// Why a sample cannot be used.
 enum class Defect : std::uint8_t { none, position, normal, radius, quality };
@@ -46,6 +51,8 @@ struct Census {
   void merge(const Census& later);  ///< of the rows after those of this one
 };
 
+/// Of all rows: what the frame is chosen by. (What the samples say of the surface, a survey of the store finds:
+/// samples/sampling_survey.h.)
 struct Survey : Census {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
 };

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <random>
 
-#include "samples/radii.h"
+#include "samples/sampling_survey.h"
 
 namespace lamina {
 namespace {

@@ -1,4 +1,4 @@
-#include "samples/neighbour_grid.h"
+#include "samples/outliers.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-namespace lamina::clean {
+namespace lamina {
 namespace {
 
 Positions random_positions(std::size_t count, int extent, unsigned seed) {
@@ -60,4 +60,4 @@ TEST(CountingCell, HoldsAsManyAsAskedForOnAverage) {
 }
 
 }  // namespace
-}  // namespace lamina::clean
+}  // namespace lamina

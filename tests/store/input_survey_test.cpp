@@ -1,4 +1,4 @@
-#include "store/survey.h"
+#include "store/input_survey.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -1,4 +1,4 @@
-#include "store/numbered_rows.h"
+#include "store/row_ids.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,7 @@
 namespace lamina {
 namespace {
 
-constexpr std::size_t kDigits = NumberedRows::kDigits;
+constexpr std::size_t kDigits = RowIdSource::kDigits;
 constexpr std::uint64_t kGiven = 1ULL << 47;  ///< no file has so many rows
 constexpr double kShortest = 1e-24;           ///< squared length; a reconstruction takes no shorter normals either
 
@@ -16,15 +16,15 @@ bool is_usable(float x, float y, float z) {
   return std::isfinite(squared) && squared >= kShortest;
 }
 
-std::uint64_t number_of(const LocalSamples& samples, std::size_t i) {
-  std::uint64_t number = 0;
-  for (std::size_t d = 0; d < kDigits; ++d) number |= static_cast<std::uint64_t>(samples.attributes[d][i]) << (16 * d);
-  return number;
+std::uint64_t id_of(const LocalSamples& samples, std::size_t i) {
+  std::uint64_t id = 0;
+  for (std::size_t d = 0; d < kDigits; ++d) id |= static_cast<std::uint64_t>(samples.attributes[d][i]) << (16 * d);
+  return id;
 }
 
 }  // namespace
 
-NumberedRows::NumberedRows(PointSource& source, bool with_normals)
+RowIdSource::RowIdSource(PointSource& source, bool with_normals)
     : source_(source), with_normals_(with_normals && source.info().has_normals) {
   info_.path = source.info().path;
   info_.count = source.info().count;
@@ -33,7 +33,7 @@ NumberedRows::NumberedRows(PointSource& source, bool with_normals)
   for (std::size_t d = 0; d < kDigits; ++d) info_.attributes.push_back({fmt::format("row{}", d), ScalarType::uint16});
 }
 
-void NumberedRows::read(std::uint64_t first, std::size_t count, SampleBatch& out) {
+void RowIdSource::read(std::uint64_t first, std::size_t count, SampleBatch& out) {
   source_.read(first, count, out);
   const std::size_t n = out.size();
   if (!with_normals_) {
@@ -47,24 +47,24 @@ void NumberedRows::read(std::uint64_t first, std::size_t count, SampleBatch& out
   out.attributes.resize(kDigits);
   for (auto& digits : out.attributes) digits.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    std::uint64_t number = first + i;
+    std::uint64_t id = first + i;
     if (is_usable(out.nx[i], out.ny[i], out.nz[i])) {
-      number |= kGiven;
+      id |= kGiven;
     } else {
       out.nx[i] = 0;
       out.ny[i] = 0;
       out.nz[i] = 1;
     }
-    for (std::size_t d = 0; d < kDigits; ++d) out.attributes[d][i] = static_cast<float>((number >> (16 * d)) & 0xFFFFU);
+    for (std::size_t d = 0; d < kDigits; ++d) out.attributes[d][i] = static_cast<float>((id >> (16 * d)) & 0xFFFFU);
   }
 }
 
 std::uint64_t row_of(const LocalSamples& samples, std::size_t i) {
-  return number_of(samples, i) & ~kGiven;
+  return id_of(samples, i) & ~kGiven;
 }
 
 bool has_given_normal(const LocalSamples& samples, std::size_t i) {
-  return (number_of(samples, i) & kGiven) != 0;
+  return (id_of(samples, i) & kGiven) != 0;
 }
 
 }  // namespace lamina

@@ -1,5 +1,5 @@
 // Noise against what was put in: samples `spacing` apart, moved along the normal by up to k spacings either way.
-#include "samples/survey_noise.h"
+#include "samples/sampling_survey.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "store/survey.h"
+#include "store/input_survey.h"
 
 #include <fmt/format.h>
 #include <tbb/enumerable_thread_specific.h>
@@ -13,7 +13,6 @@
 #include <numeric>
 
 #include "lamina/error.h"
-#include "store/row_pick.h"
 
 namespace lamina {
 namespace {
@@ -128,10 +127,10 @@ void Census::reject(Defect defect, std::uint64_t row) {
 
 bool Census::takes(const RowPick& pick, const SampleBatch& batch, std::size_t i) {
   if (pick.takes_all()) return true;
-  const clean::Pick judged = clean::judge(pick, batch, i, batch.first + i);
-  skipped += judged == clean::Pick::skipped ? 1 : 0;
-  clipped += judged == clean::Pick::clipped ? 1 : 0;
-  return judged == clean::Pick::taken;
+  const Pick judged = judge(pick, batch, i, batch.first + i);
+  skipped += judged == Pick::skipped ? 1 : 0;
+  clipped += judged == Pick::clipped ? 1 : 0;
+  return judged == Pick::taken;
 }
 
 void Census::count_attributes(const SampleBatch& batch, const AttributeLayout& layout) {
@@ -161,6 +160,17 @@ void Census::merge(const Census& later) {
   skipped += later.skipped;
   low = low.cwiseMin(later.low);
   high = high.cwiseMax(later.high);
+}
+
+Pick judge(const RowPick& pick, const SampleBatch& batch, std::size_t i, std::uint64_t row) {
+  if (pick.every > 1 && row % pick.every != 0) return Pick::skipped;
+  if (!pick.clip) return Pick::taken;
+  const std::array<double, 3> p{batch.x[i], batch.y[i], batch.z[i]};
+  for (std::size_t k = 0; k < 3; ++k) {
+    // Not-a-number lies nowhere, and is somebody else's to count.
+    if (p[k] < pick.clip->low[k] || p[k] > pick.clip->high[k]) return Pick::clipped;
+  }
+  return Pick::taken;
 }
 
 const char* describe(Defect defect) {

@@ -1,10 +1,8 @@
-// Influence radii from local sampling density (METHOD 3.1): an octree of counts in a window that runs ahead of the
-// surface.
+// Influence radii from local sampling density (Cuccuru et al. 2009, section 3.1): an octree of counts in a window that
+// runs ahead of the surface.
 #pragma once
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <vector>
 
@@ -18,9 +16,12 @@ struct RadiiSettings {
                                    ///< that holds min_samples where the cloud is dense: twice the radius there or a
                                    ///< little more. Smaller ones cost time and memory and gain nothing
   int levels = 5;                  ///< 1..31; sides finest_cell * 2^0 .. 2^(levels-1)
-  std::uint32_t min_samples = 16;  ///< > 0; a sample takes the finest cell holding at least this many (METHOD 3.1), or
-                                   ///< the coarsest one when none does
-  float neighbour_bound = 1.5F;    ///< >= 1; a radius is at most this times the smallest one of the 27 cells around
+  std::uint32_t min_samples = 16;  ///< > 0; a sample takes the finest cell holding at least this many (Cuccuru et
+                                   ///< al. 2009, section 3.1), or the coarsest one when none does
+  /// >= 1; a radius is at most this times the smallest one of the 27 cells around. Counts of 16 scatter by a quarter,
+  /// radii by an eighth: bounds nearer to 1 would cut evenly sampled surfaces, wider ones leave the long radii of cells
+  /// that the surface merely clips.
+  float neighbour_bound = 1.5F;
 };
 
 /// Sliding estimator: push buckets of the store in ascending z, pop the radii of those whose surroundings are complete.
@@ -53,26 +54,5 @@ class RadiusEstimator {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
-
-/// Distribution of the density radius over a few buckets of the store, each seen at full density, with an octree of
-/// unbounded depth: what the lattice's finest cell and number of levels are chosen from before streaming.
-struct RadiusSurvey {
-  std::uint64_t samples = 0;            ///< samples looked at
-  float low = 0, median = 0, high = 0;  ///< 1 %, 50 %, 99 % quantiles, steps
-  float noise = 0;  ///< median distance of samples from the surface their neighbours suggest, in units of `median`
-};
-/// Looks at runs of buckets about evenly spaced samples, each run at least 16 radii tall, about `sample_limit` samples
-/// in all (more when one run of that height holds more; a store of no more than the limit is read whole, as one
-/// octree). Radii are not bounded by neighbours: clipped cells lengthen `high` by up to 2. Where the input gave radii
-/// (layout has_radius) the quantiles are those of the given radii. Memory: 20 bytes per sample of a run. Throws nothing
-/// of its own; all-zero radii when the store is empty or all samples coincide.
-RadiusSurvey survey_radii(const SlabStore& store, std::uint64_t sample_limit, std::uint32_t min_samples = 16);
-
-inline constexpr std::uint64_t kSurveySamples = 1u << 18;  ///< whose radii are looked at before streaming
-
-/// The same where a bucket's samples come from elsewhere: `read` fills them in as SlabStore::read() does.
-using ReadBucket = std::function<void(std::size_t bucket, LocalSamples& out)>;
-RadiusSurvey survey_radii(const SlabStore& store, const ReadBucket& read, std::uint64_t sample_limit,
-                          std::uint32_t min_samples = 16);
 
 }  // namespace lamina

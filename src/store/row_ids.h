@@ -1,5 +1,5 @@
-// Positions and usable normals of a source with the number of each row: what the slab store carries for jobs that look
-// at neighbours and come back to rows.
+// Positions and usable normals of a source with the id of each row, its place in the input: what the slab store carries
+// for jobs that look at neighbours and come back to rows.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -11,11 +11,11 @@ namespace lamina {
 
 /// What else the source has is left out. Rows without a usable normal, and all of them without `with_normals`, get
 /// (0, 0, 1).
-class NumberedRows final : public PointSource {
+class RowIdSource final : public PointSource {
  public:
-  static constexpr std::size_t kDigits = 3;  ///< of a row's number, 16 bits each: the store keeps them in two bytes
+  static constexpr std::size_t kDigits = 3;  ///< of a row's id, 16 bits each: the store keeps them in two bytes
 
-  explicit NumberedRows(PointSource& source, bool with_normals = true);
+  explicit RowIdSource(PointSource& source, bool with_normals = true);
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override;
 
  private:

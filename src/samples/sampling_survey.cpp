@@ -1,0 +1,295 @@
+#include "samples/sampling_survey.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "base/cell_hash.h"
+#include "samples/density_octree.h"
+
+namespace lamina {
+namespace {
+
+/// Runs of buckets are this many radii tall, so that most cells, and neighbourhoods, are seen whole.
+constexpr double kRunHeight = 16;
+
+/// Buckets [begin, end) looked at together.
+struct BucketRun {
+  std::size_t begin = 0, end = 0;
+};
+
+/// The bucket of the sample with this rank.
+std::size_t bucket_of_rank(const SlabStore& store, std::uint64_t rank) {
+  std::size_t b = 0;
+  while (b + 1 < store.buckets() && rank >= store.count(b)) rank -= store.count(b++);
+  return b;
+}
+
+std::uint64_t samples_in(const SlabStore& store, BucketRun run) {
+  std::uint64_t n = 0;
+  for (std::size_t b = run.begin; b < run.end; ++b) n += store.count(b);
+  return n;
+}
+
+double height_of(const SlabStore& store, BucketRun run) {
+  std::int32_t low = std::numeric_limits<std::int32_t>::max();
+  std::int32_t high = std::numeric_limits<std::int32_t>::min();
+  for (std::size_t b = run.begin; b < run.end; ++b) {
+    low = std::min(low, store.z_lower(b));
+    high = std::max(high, store.z_upper(b));
+  }
+  return static_cast<double>(high) - low;
+}
+
+LocalSamples read_positions(const SlabStore& store, const ReadBucket& read, BucketRun run) {
+  LocalSamples all, bucket;
+  for (std::size_t b = run.begin; b < run.end; ++b) {
+    if (store.count(b) == 0) continue;
+    read(b, bucket);
+    all.x.insert(all.x.end(), bucket.x.begin(), bucket.x.end());
+    all.y.insert(all.y.end(), bucket.y.begin(), bucket.y.end());
+    all.z.insert(all.z.end(), bucket.z.begin(), bucket.z.end());
+  }
+  return all;
+}
+
+// Density.
+
+/// Shares of the samples below RadiusSurvey's low, median and high: of a hundred thousand samples a thousand at either
+/// end, far more than single cells that the surface clips.
+constexpr double kLow = 0.01, kMiddle = 0.5, kHigh = 0.99;
+
+std::vector<WeightedRadius> run_radii(const SlabStore& store, const ReadBucket& read, BucketRun run,
+                                      std::uint32_t min_samples) {
+  const CutEnds cut{run.begin > 0, run.end < store.buckets()};
+  return density_radii(read_positions(store, read, run), cut, min_samples);
+}
+
+std::vector<WeightedRadius> given_radii(const ReadBucket& read, BucketRun run) {
+  std::vector<WeightedRadius> radii;
+  LocalSamples bucket;
+  for (std::size_t b = run.begin; b < run.end; ++b) {
+    read(b, bucket);
+    for (const float r : bucket.radius) radii.push_back({r, 1});
+  }
+  return radii;
+}
+
+/// How many buckets make a run tall enough.
+std::size_t buckets_in_run(const SlabStore& store, const ReadBucket& read, std::uint64_t sample_limit,
+                           std::uint32_t min_samples) {
+  const std::size_t middle = bucket_of_rank(store, store.total() / 2);
+  for (std::size_t n = 1;; n *= 2) {
+    const std::size_t begin = middle - std::min(middle, n / 2);
+    const BucketRun run{begin, std::min(store.buckets(), begin + n)};
+    if (samples_in(store, run) >= sample_limit || run.end - run.begin == store.buckets()) return n;
+    const auto radii = run_radii(store, read, run, min_samples);
+    if (radii.empty()) continue;
+    if (height_of(store, run) >= kRunHeight * static_cast<double>(quantile(radii, samples_of(radii), kMiddle)))
+      return n;
+  }
+}
+
+/// Runs of `size` buckets about evenly spaced ranks, as many as the limit allows; they do not overlap.
+std::vector<BucketRun> choose_runs(const SlabStore& store, std::uint64_t sample_limit, std::size_t size) {
+  if (store.total() <= sample_limit) return {{0, store.buckets()}};
+  const double share = static_cast<double>(sample_limit) / static_cast<double>(store.total());
+  const double most = static_cast<double>(store.buckets()) / static_cast<double>(size);
+  const auto number = static_cast<std::uint64_t>(std::max(1.0, std::floor(share * most)));
+  std::vector<BucketRun> runs;
+  std::size_t free = 0;
+  for (std::uint64_t i = 0; i < number; ++i) {
+    const auto rank = static_cast<double>(store.total()) * (static_cast<double>(i) + 0.5) / static_cast<double>(number);
+    const std::size_t middle = bucket_of_rank(store, static_cast<std::uint64_t>(rank));
+    const std::size_t begin = std::max(free, middle - std::min(middle, size / 2));
+    const std::size_t end = std::min(store.buckets(), begin + size);
+    if (begin < end) runs.push_back({begin, end});
+    free = std::max(free, end);
+  }
+  return runs;
+}
+
+// Noise: samples against what their neighbours suggest.
+
+constexpr int kRuns = 4;  ///< from all over the cloud
+constexpr std::uint64_t kRunSamples =
+    1u << 15;                        ///< a run has at least this many samples and at most four times as many
+constexpr std::size_t kSeeds = 128;  ///< samples of a run whose surroundings are looked at
+/// Neighbours are looked for as far as this, in radii: four spacings, some fifty samples, eight times what a quadric of
+/// six coefficients needs; farther ones would take curvature for noise.
+constexpr double kNeighbourhood = 2;
+constexpr std::size_t kLeast = 16;  ///< neighbours that a quadric takes
+constexpr std::size_t kMost = 512;
+constexpr std::size_t kEnough = 32;  ///< residuals that make a median
+/// Ratio of the second moments along two axes from which on the neighbours are flat, or on a line.
+constexpr double kFlat = 4;
+/// Half of a normal distribution lies within so many of its deviations.
+constexpr double kMedianDeviation = 0.67;
+
+struct NoiseCell {
+  std::int64_t x, y, z;
+  bool operator==(const NoiseCell&) const = default;
+};
+
+struct CellHash {
+  std::size_t operator()(const NoiseCell& c) const { return cell_hash(c.x, c.y, c.z); }
+};
+
+/// Buckets about the sample with this rank, until they are tall enough for whole neighbourhoods or many enough.
+BucketRun noise_run(const SlabStore& store, std::uint64_t rank, double height) {
+  const std::size_t middle = bucket_of_rank(store, rank);
+  BucketRun run{middle, middle + 1};
+  for (;;) {
+    const std::uint64_t held = samples_in(store, run);
+    if (held >= kRunSamples && height_of(store, run) >= height) return run;
+    if (held >= 4 * kRunSamples || (run.begin == 0 && run.end == store.buckets())) return run;
+    if (run.begin > 0) --run.begin;
+    if (run.end < store.buckets()) ++run.end;
+  }
+}
+
+/// Distance (in units of the neighbourhood) of its origin from the quadric height field over the plane of least squares
+/// through its points; negative where there is none.
+double residual(const std::vector<Eigen::Vector3d>& points) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& p : points) mean += p;
+  mean /= static_cast<double>(points.size());
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& p : points) scatter += (p - mean) * (p - mean).transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(scatter);
+  // A line of samples has no plane. Nor has a ball, but that is what much noise looks like.
+  if (!(axes.eigenvalues()(1) > kFlat * axes.eigenvalues()(0))) {
+    if (axes.eigenvalues()(2) > kFlat * axes.eigenvalues()(1)) return -1;
+    return kMedianDeviation * std::sqrt(std::max(0.0, axes.eigenvalues()(0)) / static_cast<double>(points.size()));
+  }
+  using Row = Eigen::Matrix<double, 6, 1>;
+  Eigen::Matrix<double, 6, 6> a = Eigen::Matrix<double, 6, 6>::Zero();
+  Row b = Row::Zero();
+  for (const Eigen::Vector3d& p : points) {
+    const Eigen::Vector3d q = axes.eigenvectors().transpose() * p;
+    const Row row{1, q.y(), q.z(), q.y() * q.y(), q.y() * q.z(), q.z() * q.z()};
+    a += row * row.transpose();
+    b += row * q.x();
+  }
+  a.diagonal().array() += 1e-9 * a.trace();
+  return std::abs(a.ldlt().solve(b)(0));
+}
+
+/// Samples of a run in cells as wide as neighbours are looked for, those around the seeds only.
+class SeedNeighbourhoods {
+ public:
+  SeedNeighbourhoods(const LocalSamples& samples, double radius)
+      : samples_(samples), reach_(kNeighbourhood * radius), inverse_(1 / reach_) {
+    choose_seeds();
+    for (const std::size_t seed : seeds_) {
+      for (int k = 0; k < 27; ++k) cells_[beside(cell_of(seed), k)];
+    }
+    if (cells_.empty()) return;
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const auto at = cells_.find(cell_of(i));
+      if (at != cells_.end()) at->second.push_back(static_cast<std::uint32_t>(i));
+    }
+  }
+
+  [[nodiscard]] const std::vector<std::size_t>& seeds() const { return seeds_; }
+  /// The neighbours' places about the seed, in units of the neighbourhood.
+  void gather(std::size_t seed, std::vector<Eigen::Vector3d>& out) const {
+    out.clear();
+    const NoiseCell c = cell_of(seed);
+    for (int k = 0; k < 27; ++k) {
+      for (const std::uint32_t i : cells_.at(beside(c, k))) {
+        if (i == seed || out.size() >= kMost) continue;
+        const Eigen::Vector3d p = Eigen::Vector3d(static_cast<double>(samples_.x[i]) - samples_.x[seed],
+                                                  static_cast<double>(samples_.y[i]) - samples_.y[seed],
+                                                  static_cast<double>(samples_.z[i]) - samples_.z[seed]) *
+                                  inverse_;
+        if (p.squaredNorm() < 1) out.push_back(p);
+      }
+    }
+  }
+
+ private:
+  static NoiseCell beside(const NoiseCell& c, int k) { return {c.x + k % 3 - 1, c.y + k / 3 % 3 - 1, c.z + k / 9 - 1}; }
+  [[nodiscard]] NoiseCell cell_of(std::size_t i) const {
+    return {static_cast<std::int64_t>(std::floor(samples_.x[i] * inverse_)),
+            static_cast<std::int64_t>(std::floor(samples_.y[i] * inverse_)),
+            static_cast<std::int64_t>(std::floor(samples_.z[i] * inverse_))};
+  }
+  void choose_seeds() {
+    const auto [low, high] = std::minmax_element(samples_.z.begin(), samples_.z.end());
+    const std::size_t stride = samples_.size() / kSeeds + 1;
+    for (std::size_t i = 0; i < samples_.size(); i += stride) {
+      // Neighbours beyond the run's ends are not seen.
+      const double above = samples_.z[i] - static_cast<double>(*low);
+      const double below = static_cast<double>(*high) - samples_.z[i];
+      if (std::min(above, below) >= reach_ || static_cast<double>(*high) - *low < 3 * reach_) seeds_.push_back(i);
+    }
+  }
+
+  const LocalSamples& samples_;
+  double reach_, inverse_;
+  std::vector<std::size_t> seeds_;
+  std::unordered_map<NoiseCell, std::vector<std::uint32_t>, CellHash> cells_;
+};
+
+}  // namespace
+
+float survey_noise(const SlabStore& store, const ReadBucket& read, float radius) {
+  if (store.total() == 0 || !(radius > 0)) return 0;
+  std::vector<float> residuals;
+  std::vector<Eigen::Vector3d> neighbours;
+  const bool small = store.total() <= kRuns * kRunSamples;
+  for (int run = 0; run < (small ? 1 : kRuns); ++run) {
+    const std::uint64_t rank =
+        small ? store.total() / 2
+              : store.total() / kRuns * static_cast<std::uint64_t>(run) + store.total() / (2 * kRuns);
+    const double height = small ? std::numeric_limits<double>::infinity() : kRunHeight * static_cast<double>(radius);
+    const LocalSamples samples = read_positions(store, read, noise_run(store, rank, height));
+    const SeedNeighbourhoods around(samples, static_cast<double>(radius));
+    for (const std::size_t seed : around.seeds()) {
+      around.gather(seed, neighbours);
+      if (neighbours.size() < kLeast) continue;
+      const double d = residual(neighbours);
+      if (d >= 0) residuals.push_back(static_cast<float>(d * kNeighbourhood));
+    }
+  }
+  if (residuals.size() < kEnough) return 0;
+  const auto median = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
+  std::nth_element(residuals.begin(), median, residuals.end());
+  return *median;
+}
+
+RadiusSurvey survey_radii(const SlabStore& store, std::uint64_t sample_limit, std::uint32_t min_samples) {
+  const ReadBucket read = [&](std::size_t bucket, LocalSamples& out) { store.read(bucket, out); };
+  return survey_radii(store, read, sample_limit, min_samples);
+}
+
+RadiusSurvey survey_radii(const SlabStore& store, const ReadBucket& read, std::uint64_t sample_limit,
+                          std::uint32_t min_samples) {
+  RadiusSurvey survey;
+  if (store.total() == 0) return survey;
+  const bool given = store.layout().has_radius;
+  const bool whole = store.total() <= sample_limit;
+  const std::size_t size = given || whole ? 1 : buckets_in_run(store, read, sample_limit, min_samples);
+  std::vector<WeightedRadius> radii;
+  for (const BucketRun& run : choose_runs(store, sample_limit, size)) {
+    const auto found = given ? given_radii(read, run) : run_radii(store, read, run, min_samples);
+    radii.insert(radii.end(), found.begin(), found.end());
+    survey.samples += samples_in(store, run);
+  }
+  if (radii.empty()) return survey;
+  std::sort(radii.begin(), radii.end(), [](auto& a, auto& b) { return a.radius < b.radius; });
+  const std::uint64_t total = samples_of(radii);
+  survey.low = quantile(radii, total, kLow);
+  survey.median = quantile(radii, total, kMiddle);
+  survey.high = quantile(radii, total, kHigh);
+  survey.noise = survey_noise(store, read, survey.median);
+  return survey;
+}
+
+}  // namespace lamina
