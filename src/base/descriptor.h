@@ -60,4 +60,13 @@ int copy_all(int from, std::uint64_t bytes, int to);
 /// nothing of use afterwards. `to` is a regular file: a pipe may still refer to what is given back.
 int move_all(int from, std::uint64_t bytes, int to);
 
+#ifndef LAMINA_READ_BYTES
+#define LAMINA_READ_BYTES (128 << 10)
+#endif
+
+/// How much readers take from a file at once: what stays in the second-level cache until it is converted. The fuzzers
+/// read by fewer (tests/fuzz/CMakeLists.txt), so that lines, rows and headers cross the border of two pieces as often
+/// in their small files as in large ones.
+inline constexpr std::size_t kReadBytes = LAMINA_READ_BYTES;
+
 }  // namespace lamina

@@ -1,4 +1,4 @@
-// Values to little-endian bytes and back.
+// Values as bytes in files: little-endian, as they lie in this machine's memory; and the other order, as some read.
 #pragma once
 #include <algorithm>
 #include <array>
@@ -10,21 +10,39 @@
 
 namespace lamina {
 
-/// Appends the value in little-endian order.
+static_assert(std::endian::native == std::endian::little, "files' values are copied as they lie in memory");
+
+/// The T that stands at any address in little-endian order.
 template <class T>
-void put_little(std::string& bytes, T value) {
-  auto raw = std::bit_cast<std::array<char, sizeof(T)>>(value);
-  if constexpr (std::endian::native == std::endian::big) std::reverse(raw.begin(), raw.end());
-  bytes.append(raw.data(), raw.size());
+T load_little(const std::byte* from) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  T value;
+  std::memcpy(&value, from, sizeof value);
+  return value;
 }
 
-/// The T at `bytes`, which stands there in little-endian order.
+/// The same in big-endian order.
 template <class T>
-T load_little(const std::byte* bytes) {
-  static_assert(std::endian::native == std::endian::little && std::is_trivially_copyable_v<T>);
-  T value;
-  std::memcpy(&value, bytes, sizeof value);
-  return value;
+T load_big(const std::byte* from) {
+  std::array<std::byte, sizeof(T)> bytes;
+  std::memcpy(bytes.data(), from, sizeof(T));
+  std::reverse(bytes.begin(), bytes.end());  // compiles to one bswap
+  return std::bit_cast<T>(bytes);
+}
+
+/// Writes the value in little-endian order; returns where it ends.
+template <class T>
+std::byte* store_little(std::byte* to, T value) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  std::memcpy(to, &value, sizeof value);
+  return to + sizeof value;
+}
+
+/// Appends the value in little-endian order.
+template <class T>
+void append_little(std::string& bytes, T value) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
 }  // namespace lamina

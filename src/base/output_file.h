@@ -1,11 +1,41 @@
-// A file that appears under its name only when complete.
+// Files that appear under their name only when complete.
 #pragma once
+#include <cstdint>
+#include <cstdio>
+#include <memory>
 #include <string>
+#include <string_view>
 
 #include "base/descriptor.h"
-#include "base/staged_file.h"
 
 namespace lamina {
+
+/// A file on its way to its name. Has no name at all until it is published, so that nothing is left of it however the
+/// program ends; where the file system knows no unnamed files, a hidden one beside its final name (.NAME.partial-PID),
+/// which a later run to the same name removes once nobody holds its lock any more.
+class StagedFile {
+ public:
+  StagedFile() = default;
+  /// Holds nothing when the file cannot be made; errno says why. Removes what killed runs to the same name left behind.
+  explicit StagedFile(std::string path);
+  ~StagedFile();
+  StagedFile(StagedFile&& other) noexcept;
+  StagedFile& operator=(StagedFile&& other) noexcept;
+
+  [[nodiscard]] explicit operator bool() const { return static_cast<bool>(file_); }
+  [[nodiscard]] int fd() const { return file_.get(); }  ///< open for reading and writing
+  /// A name by which this program can open the file once more.
+  [[nodiscard]] std::string reopened() const;
+  /// Gives it a name in the folder of the one it was made for, replacing what was there, and closes it. 0 or an errno
+  /// value; then the name is untouched.
+  int publish(const std::string& path);
+  /// For other processes to open it by (reopened()), unless it has one. 0 or an errno value.
+  int give_hidden_name();
+
+ private:
+  std::string path_, hidden_;  ///< hidden_ is empty while the file has no name
+  Descriptor file_;
+};
 
 /// Stages an output: a regular one in its own folder, named at the end (StagedFile); standard output ("-"), pipes and
 /// devices in an unlinked file, streamed at the end.
@@ -25,6 +55,8 @@ class OutputFile {
   [[nodiscard]] const std::string& directory() const { return directory_; }  ///< where the staged file lies
 
   void publish();  ///< gives a file that does not stream its name; throws Error(budget) when that fails
+  /// publish(); of a file that streams, sends its first `bytes` on. Throws Error(budget).
+  void complete(std::uint64_t bytes);
   void publish_as(const std::string& path);      ///< the same under another name of the same folder
   [[nodiscard]] Descriptor destination() const;  ///< where a streaming one goes
 
@@ -37,5 +69,28 @@ class OutputFile {
 
 /// Throws Error(budget) "NAME: cannot be written: REASON" with a hint on a full disk.
 [[noreturn]] void report_write_error(const std::string& name, int error);
+
+/// An output written from its beginning to its end. Named by commit(); without commit() nothing is left. "-" is
+/// standard output, written to at once; other pipes and devices get everything at commit().
+class ResultFile {
+ public:
+  /// Throws Error(budget) when the file cannot be made.
+  explicit ResultFile(std::string path);
+  ~ResultFile();
+  ResultFile(const ResultFile&) = delete;
+  ResultFile& operator=(const ResultFile&) = delete;
+  void write(std::string_view bytes);
+  void commit();
+  /// The same under another name of the same folder.
+  void commit(const std::string& name);
+
+ private:
+  void close();
+  [[noreturn]] void fail(const char* what) const;
+
+  std::string path_;
+  std::unique_ptr<OutputFile> staged_;  ///< null for standard output
+  std::FILE* file_ = nullptr;
+};
 
 }  // namespace lamina

@@ -10,8 +10,7 @@
 #include "boundary/hole_closer.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
-#include "meshes/mesh_header.h"
-#include "meshes/records.h"
+#include "meshes/streamed_ply.h"
 
 namespace lamina {
 namespace {

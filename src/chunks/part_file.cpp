@@ -10,11 +10,11 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "base/ply_type.h"
+#include "base/scalar_type.h"
 #include "boundary/rim_bytes.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
-#include "meshes/records.h"
+#include "meshes/streamed_ply.h"
 
 namespace lamina {
 namespace {

@@ -10,7 +10,7 @@
 #include <limits>
 #include <optional>
 
-#include "base/with_threads.h"
+#include "base/run.h"
 #include "edit/batch_pipe.h"
 #include "edit/point_tree.h"
 #include "lamina/error.h"

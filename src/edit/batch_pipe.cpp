@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <memory>
 
-#include "base/with_threads.h"
+#include "base/run.h"
 #include "lamina/error.h"
 
 namespace lamina::edit {

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <unordered_map>
 
-#include "base/with_threads.h"
+#include "base/run.h"
 #include "lamina/edit_points.h"
 #include "lamina/error.h"
 #include "meshes/vec3.h"

@@ -6,7 +6,7 @@
 #include <limits>
 #include <optional>
 
-#include "base/ply_type.h"
+#include "base/scalar_type.h"
 #include "lamina/error.h"
 
 namespace lamina {

@@ -15,11 +15,11 @@
 #include <vector>
 
 #include "base/descriptor.h"
-#include "base/memory_limit.h"
+#include "base/run.h"
 #include "edit/batch_pipe.h"
 #include "edit/record_sorter.h"
 #include "lamina/error.h"
-#include "points/row_codec.h"
+#include "points/binary_rows.h"
 
 namespace lamina {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "base/result_file.h"
+#include "base/output_file.h"
 #include "isosurface/iso_mesh.h"
 #include "lamina/frame.h"
 #include "lamina/volume_points.h"

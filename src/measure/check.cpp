@@ -5,8 +5,8 @@
 #include <cmath>
 #include <vector>
 
+#include "base/run.h"
 #include "base/union_find.h"
-#include "base/with_threads.h"
 #include "lamina/error.h"
 #include "measure/edge_table.h"
 #include "meshes/vec3.h"

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <vector>
 
-#include "base/counter_rng.h"
-#include "base/with_threads.h"
+#include "base/hashing.h"
+#include "base/run.h"
 #include "lamina/error.h"
 #include "measure/triangle_bvh.h"
 #include "meshes/area_sampler.h"

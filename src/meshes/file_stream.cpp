@@ -6,7 +6,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "base/read_bytes.h"
+#include "base/descriptor.h"
 #include "lamina/error.h"
 
 namespace lamina::meshes {

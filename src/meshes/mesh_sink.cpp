@@ -10,10 +10,8 @@
 #include "base/background_writer.h"
 #include "base/descriptor.h"
 #include "base/output_file.h"
-#include "base/record_writer.h"
 #include "lamina/error.h"
-#include "meshes/mesh_header.h"
-#include "meshes/records.h"
+#include "meshes/streamed_ply.h"
 
 namespace lamina {
 namespace {

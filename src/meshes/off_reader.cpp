@@ -1,14 +1,41 @@
 // OFF with optional colours and normals of the vertices.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <string>
+#include <string_view>
 
+#include "base/number.h"
 #include "lamina/error.h"
-#include "meshes/line_reader.h"
+#include "meshes/file_stream.h"
 #include "meshes/readers.h"
 
 namespace lamina::meshes {
 namespace {
+
+/// Lines that hold something: blanks trimmed, comments (#) cut off, empty ones passed over.
+class OffLines {
+ public:
+  explicit OffLines(std::istream& in) : in_(in) {}
+  /// Empty at the end of the file; valid until the next call.
+  std::string_view next() {
+    while (std::getline(in_, line_)) {
+      ++number_;
+      line_.resize(std::min(line_.find('#'), line_.size()));
+      if (const auto text = trimmed(line_); !text.empty()) return text;
+    }
+    return {};
+  }
+  [[nodiscard]] std::uint64_t number() const { return number_; }
+
+ private:
+  std::istream& in_;
+  std::string line_;
+  std::uint64_t number_ = 0;
+};
 
 class OffReader {
  public:
@@ -37,7 +64,7 @@ class OffReader {
   }
 
   std::uint64_t count(std::string_view& text) const {
-    const auto value = next_number(text);
+    const auto value = take_decimal(text);
     if (!value || !(*value >= 0) || *value >= 4294967295.0 || *value != std::floor(*value))
       fail("an OFF header needs the counts of vertices and faces");
     return static_cast<std::uint64_t>(*value);
@@ -62,7 +89,7 @@ class OffReader {
   std::array<double, 3> triple(std::string_view& text, const char* what) const {
     std::array<double, 3> p{};
     for (double& c : p) {
-      const auto value = next_number(text);
+      const auto value = take_decimal(text);
       if (!value) fail(fmt::format("{} needs three numbers", what));
       c = *value;
     }
@@ -76,7 +103,7 @@ class OffReader {
       mesh_.normals.push_back({static_cast<float>(n[0]), static_cast<float>(n[1]), static_cast<float>(n[2])});
     }
     std::size_t channel = 0;
-    for (auto c = next_number(text); c && channel < 4; c = next_number(text), ++channel) {
+    for (auto c = take_decimal(text); c && channel < 4; c = take_decimal(text), ++channel) {
       if (colours_.size() == channel) colours_.emplace_back(mesh_.positions.size() - 1);
       colours_[channel].push_back(static_cast<float>(*c));
     }
@@ -84,7 +111,7 @@ class OffReader {
   }
 
   void face(std::string_view text) {
-    const auto corners = next_number(text);
+    const auto corners = take_decimal(text);
     if (!corners || !(*corners >= 3)) fail("a polygon needs three corners");
     const std::uint32_t first = index(text);
     std::uint32_t last = index(text);
@@ -96,26 +123,22 @@ class OffReader {
   }
 
   std::uint32_t index(std::string_view& text) const {
-    const auto v = next_number(text);
+    const auto v = take_decimal(text);
     if (!v || !(*v >= 0) || *v != std::floor(*v)) fail("a face needs its number of corners and as many vertex numbers");
     if (*v >= static_cast<double>(vertices_))
       fail(fmt::format("the face names vertex {} but there are {}", *v, vertices_));
     return static_cast<std::uint32_t>(*v);
   }
 
-  /// Bytes or fractions: the format does not say which, the largest value does.
   void settle_colours() {
     if (colours_.size() < 3) return;
-    bool bytes = false;
-    for (const auto& channel : colours_)
-      for (const float c : channel) bytes = bytes || c > 1;
     static constexpr const char* kNames[] = {"red", "green", "blue", "alpha"};
-    for (std::size_t k = 0; k < colours_.size(); ++k)
-      mesh_.layout.push_back({kNames[k], bytes ? ScalarType::uint8 : ScalarType::float32});
+    for (std::size_t k = 0; k < colours_.size(); ++k) mesh_.layout.push_back({kNames[k], ScalarType::float32});
     mesh_.attributes = std::move(colours_);
+    settle_colour_range(mesh_);
   }
 
-  LineReader lines_;
+  OffLines lines_;
   const std::string& path_;
   bool normals_ = false;
   std::uint64_t vertices_ = 0, faces_ = 0;

@@ -6,15 +6,38 @@
 #include <OpenMesh/Core/IO/importer/BaseImporter.hh>
 #include <OpenMesh/Core/IO/reader/OBJReader.hh>
 #include <OpenMesh/Core/IO/reader/STLReader.hh>
+#include <OpenMesh/Core/System/omstream.hh>
 #include <algorithm>
+#include <mutex>
 
 #include "lamina/error.h"
-#include "meshes/openmesh_quiet.h"
 #include "meshes/readers.h"
-#include "meshes/text_census.h"
 
 namespace lamina::meshes {
 namespace {
+
+/// Keeps OpenMesh's own messages off the terminal: what went wrong reaches the user as our one line instead. Its
+/// readers keep their state in singletons, so this also lets one thread in at a time.
+class QuietOpenMesh {
+ public:
+  QuietOpenMesh() : lock_(mutex()) {
+    omerr().disable();
+    omlog().disable();
+  }
+  ~QuietOpenMesh() {
+    omerr().enable();
+    omlog().enable();
+  }
+  QuietOpenMesh(const QuietOpenMesh&) = delete;
+  QuietOpenMesh& operator=(const QuietOpenMesh&) = delete;
+
+ private:
+  static std::mutex& mutex() {
+    static std::mutex one;
+    return one;
+  }
+  std::lock_guard<std::mutex> lock_;
+};
 
 namespace om = OpenMesh;
 
@@ -111,15 +134,6 @@ class ArrayImporter final : public om::IO::BaseImporter {
 
   const std::string& path_;
 };
-
-/// Text formats do not say whether their colours reach to 1 or to 255: the largest value does.
-void settle_colour_range(TriangleMesh& mesh) {
-  const bool bytes = std::any_of(mesh.attributes.begin(), mesh.attributes.end(), [](const auto& channel) {
-    return std::any_of(channel.begin(), channel.end(), [](float c) { return c > 1; });
-  });
-  if (bytes)
-    for (auto& a : mesh.layout) a.type = ScalarType::uint8;
-}
 
 bool run_reader(std::istream& in, om::IO::BaseImporter& importer, TextFormat format, bool binary) {
   om::IO::Options options = om::IO::Options::VertexNormal | om::IO::Options::VertexColor;

@@ -2,12 +2,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
-#include <charconv>
+#include <cstddef>
 #include <cstring>
 #include <limits>
 
-#include "base/read_bytes.h"
+#include "base/descriptor.h"
+#include "base/number.h"
+#include "base/scalar_type.h"
 #include "lamina/error.h"
 #include "meshes/readers.h"
 #include "points/ply_header.h"
@@ -57,39 +60,13 @@ struct NotANumber {
   std::string word;
 };
 
-template <class T>
-double decode(const char* p, bool swap) {
-  std::array<char, sizeof(T)> raw;
-  std::memcpy(raw.data(), p, sizeof(T));
-  if (swap) std::reverse(raw.begin(), raw.end());
-  return static_cast<double>(std::bit_cast<T>(raw));
-}
-
 class BinaryValues {
  public:
   BinaryValues(FileBuffer& file, bool swap) : bytes_(file), swap_(swap) {}
   double next(ScalarType type) {
     const char* p = bytes_.take(static_cast<std::size_t>(byte_size(type)));
     if (p == nullptr) throw EndOfFile{};
-    switch (type) {
-      case ScalarType::int8:
-        return decode<std::int8_t>(p, swap_);
-      case ScalarType::uint8:
-        return decode<std::uint8_t>(p, swap_);
-      case ScalarType::int16:
-        return decode<std::int16_t>(p, swap_);
-      case ScalarType::uint16:
-        return decode<std::uint16_t>(p, swap_);
-      case ScalarType::int32:
-        return decode<std::int32_t>(p, swap_);
-      case ScalarType::uint32:
-        return decode<std::uint32_t>(p, swap_);
-      case ScalarType::float32:
-        return decode<float>(p, swap_);
-      case ScalarType::float64:
-        return decode<double>(p, swap_);
-    }
-    return 0;
+    return load_scalar(type, swap_, reinterpret_cast<const std::byte*>(p));
   }
   /// Editors like to end a file with a line break: that is not data.
   bool at_end() {
@@ -114,10 +91,8 @@ class AsciiValues {
       bytes_.skip_one();
     }
     double value = 0;
-    const char* first = word_.data() + (word_[0] == '+' ? 1 : 0);
-    const auto parsed = std::from_chars(first, word_.data() + n, value);
-    if (parsed.ptr != word_.data() + n || parsed.ec == std::errc::invalid_argument)
-      throw NotANumber{std::string(word_.data(), n)};
+    const char* const end = word_.data() + n;
+    if (parse_decimal(word_.data(), end, value) != end) throw NotANumber{std::string(word_.data(), n)};
     return value;
   }
   bool at_end() {

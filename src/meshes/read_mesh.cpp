@@ -1,12 +1,14 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 
-#include "lamina/file_ending.h"
 #include "lamina/error.h"
+#include "lamina/file_ending.h"
 #include "lamina/mesh.h"
 #include "meshes/readers.h"
-#include "points/line_reader.h"
+#include "points/text_rows.h"
 
 namespace lamina {
 namespace {
@@ -42,6 +44,10 @@ TriangleMesh read_by_format(meshes::FileBuffer& file, const std::string& path) {
       fmt::format("{}: unknown mesh format \"{}\"; known are .ply, .obj, .off, .stl, each also as .gz", path, format));
 }
 
+bool is_finite(const std::array<double, 3>& p) {
+  return std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]);
+}
+
 }  // namespace
 
 TriangleMesh read_mesh(const std::string& path, NonFinite non_finite) {
@@ -61,4 +67,40 @@ TriangleMesh read_mesh(const std::string& path, NonFinite non_finite) {
   return mesh;
 }
 
+std::size_t drop_non_finite(TriangleMesh& mesh) {
+  constexpr std::uint32_t kGone = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> place(mesh.positions.size(), kGone);
+  std::uint32_t kept = 0;
+  for (std::size_t v = 0; v < place.size(); ++v) {
+    if (!is_finite(mesh.positions[v])) continue;
+    place[v] = kept;
+    mesh.positions[kept] = mesh.positions[v];
+    if (!mesh.normals.empty()) mesh.normals[kept] = mesh.normals[v];
+    for (auto& values : mesh.attributes) values[kept] = values[v];
+    ++kept;
+  }
+  const std::size_t dropped = place.size() - kept;
+  if (dropped == 0) return 0;
+  mesh.positions.resize(kept);
+  if (!mesh.normals.empty()) mesh.normals.resize(kept);
+  for (auto& values : mesh.attributes) values.resize(kept);
+  std::erase_if(mesh.triangles, [&](auto& triangle) {
+    for (std::uint32_t& v : triangle) v = place[v];
+    return triangle[0] == kGone || triangle[1] == kGone || triangle[2] == kGone;
+  });
+  return dropped;
+}
+
 }  // namespace lamina
+
+namespace lamina::meshes {
+
+void settle_colour_range(TriangleMesh& mesh) {
+  const bool bytes = std::any_of(mesh.attributes.begin(), mesh.attributes.end(), [](const auto& channel) {
+    return std::any_of(channel.begin(), channel.end(), [](float c) { return c > 1; });
+  });
+  if (bytes)
+    for (auto& a : mesh.layout) a.type = ScalarType::uint8;
+}
+
+}  // namespace lamina::meshes

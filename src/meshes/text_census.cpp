@@ -1,16 +1,15 @@
-#include "meshes/text_census.h"
-
 #include <fmt/format.h>
 
-#include <bit>
+#include <array>
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <cstring>
 #include <istream>
 
+#include "base/little_endian.h"
+#include "base/number.h"
 #include "lamina/error.h"
-#include "meshes/line_reader.h"
+#include "meshes/readers.h"
 
 namespace lamina::meshes {
 namespace {
@@ -33,7 +32,7 @@ bool keyword(std::string_view line, char letter) {
 std::array<double, 3> position(std::string_view text, const std::string& path, std::uint64_t line) {
   std::array<double, 3> p{};
   for (double& c : p) {
-    const auto value = next_number(text);
+    const auto value = take_decimal(text);
     if (!value || !std::isfinite(*value)) fail(path, fmt::format("line {}: a vertex needs three finite numbers", line));
     c = *value;
   }
@@ -96,9 +95,7 @@ TextCensus census_stl(std::istream& in, const std::string& path) {
   std::array<char, 84> head{};
   in.read(head.data(), head.size());
   const bool whole_head = in.gcount() == static_cast<std::streamsize>(head.size());
-  std::uint32_t count = 0;
-  std::memcpy(&count, head.data() + 80, sizeof(count));
-  if constexpr (std::endian::native == std::endian::big) count = __builtin_bswap32(count);
+  const auto count = load_little<std::uint32_t>(reinterpret_cast<const std::byte*>(head.data()) + 80);
   std::uint64_t rest = 0;
   std::array<char, 1 << 16> skipped;
   while (in) {

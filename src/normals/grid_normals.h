@@ -12,7 +12,7 @@
 #include "lamina/points.h"
 #include "lamina/run.h"
 #include "normals/viewpoints.h"
-#include "points/scan_grid.h"
+#include "points/scans.h"
 
 namespace lamina::normals {
 

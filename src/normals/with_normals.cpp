@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "base/descriptor.h"
-#include "base/with_threads.h"
+#include "base/run.h"
 #include "edit/record_sorter.h"
 #include "lamina/error.h"
 #include "lamina/normals.h"

@@ -1,13 +1,25 @@
-// Rows of fixed size, read a block at a time and taken apart column by column.
+// Rows of points as bytes of fixed size: read a block at a time and taken apart column by column, and written.
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
+#include "lamina/attributes.h"
+#include "lamina/points_writer.h"
 #include "points/input_file.h"
 #include "points/point_columns.h"
 
 namespace lamina {
+
+/// out[i] = the value of `type` at row + i * stride, for i < count. `swapped`: bytes stand in the other order than this
+/// machine's.
+template <class Out>
+void convert_column(ScalarType type, bool swapped, const std::byte* row, std::size_t stride, std::size_t count,
+                    Out* out);
+
+extern template void convert_column(ScalarType, bool, const std::byte*, std::size_t, std::size_t, float*);
+extern template void convert_column(ScalarType, bool, const std::byte*, std::size_t, std::size_t, double*);
 
 /// Where rows lie in a file.
 struct BinaryRows {
@@ -16,9 +28,30 @@ struct BinaryRows {
   bool swapped = false;    ///< the other byte order than this machine's
 };
 
-/// Fills the targets with rows [first, first + count). From any thread.
+/// Fills the targets with the rows of the range. From any thread.
 /// Throws Error(unreadable) when the file has become shorter since it was opened.
 void read_binary_rows(const InputFile& file, const BinaryRows& rows, const std::vector<PointColumn>& columns,
-                      std::uint64_t first, std::size_t count, const std::vector<ColumnTarget>& targets);
+                      RowRange range, const std::vector<ColumnTarget>& targets);
+
+/// Rows as bytes and back: x y z, nx ny nz, radius, quality, attributes, each in its own type, little-endian, without
+/// gaps.
+class RowCodec {
+ public:
+  explicit RowCodec(const PointColumns& columns);
+  [[nodiscard]] std::size_t row_bytes() const { return row_bytes_; }
+
+  /// Throws Error(internal) when an array the columns need is missing or shorter than the batch, or a number is not
+  /// finite in the type it is written as; `first` is the number of the batch's first row and `name` the file's, for the
+  /// message.
+  void require_writable(const SampleBatch& batch, std::uint64_t first, const std::string& name) const;
+  /// Writes rows [first, first + count) of a batch that is writable. Floats are rounded to integers and clamped.
+  void encode(const SampleBatch& batch, std::size_t first, std::size_t count, std::byte* out) const;
+  /// The batch of `count` rows that stand `stride` bytes apart.
+  void decode(const std::byte* rows, std::size_t stride, std::size_t count, SampleBatch& out) const;
+
+ private:
+  PointColumns columns_;
+  std::size_t row_bytes_ = 0;
+};
 
 }  // namespace lamina

@@ -9,14 +9,12 @@
 #include <optional>
 #include <system_error>
 
+#include "base/number.h"
 #include "lamina/error.h"
 #include "lamina/points.h"
 #include "points/input_file.h"
-#include "points/line_reader.h"
-#include "points/number.h"
-#include "points/row_parser.h"
 #include "points/sniff.h"
-#include "points/text_file.h"
+#include "points/text_rows.h"
 
 namespace lamina {
 namespace {
@@ -30,8 +28,7 @@ namespace fs = std::filesystem;
 bool parse_all(const std::vector<std::string_view>& words, std::size_t from, std::vector<double>& values) {
   for (std::size_t i = from; i < words.size(); ++i) {
     double value = 0;
-    if (parse_number(words[i].data(), words[i].data() + words[i].size(), value) != words[i].data() + words[i].size())
-      return false;
+    if (!is_number(words[i], value)) return false;
     values.push_back(value);
   }
   return true;

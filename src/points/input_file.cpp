@@ -9,8 +9,8 @@
 #include <memory>
 
 #include "lamina/error.h"
-#include "points/gunzip.h"
 #include "points/sniff.h"
+#include "points/unpack.h"
 
 namespace lamina {
 namespace {

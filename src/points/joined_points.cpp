@@ -2,13 +2,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 #include <utility>
 
 #include "lamina/error.h"
 #include "lamina/points.h"
-#include "points/scan_grid.h"
+#include "points/point_columns.h"
+#include "points/scans.h"
 
 namespace lamina {
 namespace {
@@ -53,24 +53,23 @@ class JoinedPoints final : public PointSource, public OrganisedPoints {
       if (info_.radius_name.empty()) info_.radius_name = from.radius_name;
       if (info_.quality_name.empty()) info_.quality_name = from.quality_name;
     }
-    settle("normals", info_.has_normals, &PointSourceInfo::has_normals);
-    settle("radii", info_.has_radius, &PointSourceInfo::has_radius);
+    keep_if_all_have("normals", info_.has_normals, &PointSourceInfo::has_normals);
+    keep_if_all_have("radii", info_.has_radius, &PointSourceInfo::has_radius);
     if (!info_.has_radius) info_.radius_name.clear();
     for (Part& part : parts_) map_attributes(part);
   }
 
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
-    first = std::min(first, info_.count);
-    count = static_cast<std::size_t>(std::min<std::uint64_t>(count, info_.count - first));
-    size_batch(first, count, out);
-    auto part = std::upper_bound(parts_.begin(), parts_.end(), first,
+    const RowRange rows = rows_there(info_, first, count);
+    size_batch(rows, out);
+    auto part = std::upper_bound(parts_.begin(), parts_.end(), rows.first,
                                  [](std::uint64_t row, const Part& p) { return row < p.first; });
     SampleBatch piece;
     std::size_t done = 0;
-    if (count > 0) --part;
-    for (; done < count; ++part) {
-      const std::uint64_t begin = first + done - part->first;
-      part->source->read(begin, count - done, piece);
+    if (rows.count > 0) --part;
+    for (; done < rows.count; ++part) {
+      const std::uint64_t begin = rows.first + done - part->first;
+      part->source->read(begin, rows.count - done, piece);
       copy(*part, piece, done, out);
       done += piece.size();
     }
@@ -126,7 +125,7 @@ class JoinedPoints final : public PointSource, public OrganisedPoints {
   }
 
   /// What only some sources have is dropped, and said so.
-  void settle(const char* what, bool& all, bool PointSourceInfo::*has) {
+  void keep_if_all_have(const char* what, bool& all, bool PointSourceInfo::*has) {
     const auto lacks = [&](const Part& p) { return !(p.source->info().*has) && p.source->info().count > 0; };
     const auto without = std::find_if(parts_.begin(), parts_.end(), lacks);
     const auto with = std::find_if(parts_.begin(), parts_.end(), [&](const Part& p) { return p.source->info().*has; });
@@ -146,8 +145,9 @@ class JoinedPoints final : public PointSource, public OrganisedPoints {
     }
   }
 
-  void size_batch(std::uint64_t first, std::size_t count, SampleBatch& out) const {
-    out.first = first;
+  void size_batch(RowRange rows, SampleBatch& out) const {
+    const std::size_t count = rows.count;
+    out.first = rows.first;
     for (auto* axis : {&out.x, &out.y, &out.z}) axis->resize(count);
     for (auto* normal : {&out.nx, &out.ny, &out.nz}) normal->resize(info_.has_normals ? count : 0);
     out.radius.resize(info_.has_radius ? count : 0);

@@ -2,6 +2,7 @@
 // length records say of coordinates and extra bytes.
 #pragma once
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>

@@ -1,12 +1,11 @@
-#include "points/las_points.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 
 #include "points/binary_rows.h"
 #include "points/las_header.h"
+#include "points/point_columns.h"
+#include "points/readers.h"
 
 namespace lamina {
 namespace {
@@ -54,7 +53,7 @@ void look_for_values(const InputFile& file, const BinaryRows& rows, std::uint64_
   };
   for (std::uint64_t first = 0; first < count && undecided(); first += kBlock) {
     const auto n = static_cast<std::size_t>(std::min<std::uint64_t>(kBlock, count - first));
-    read_binary_rows(file, rows, columns, first, n, targets);
+    read_binary_rows(file, rows, columns, {first, n}, targets);
     for (std::size_t k = 0; k < list.size(); ++k) {
       const float* v = values[k].data();
       list[k].highest = std::max(list[k].highest, *std::max_element(v, v + n));
@@ -83,10 +82,9 @@ class LasPoints final : public PointSource {
   }
 
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
-    first = std::min(first, info_.count);
-    count = static_cast<std::size_t>(std::min<std::uint64_t>(count, info_.count - first));
-    const std::vector<ColumnTarget> targets = prepare_batch(info_, columns_, first, count, out);
-    read_binary_rows(file_, layout_, columns_, first, count, targets);
+    const RowRange rows = rows_there(info_, first, count);
+    const std::vector<ColumnTarget> targets = prepare_batch(info_, columns_, rows, out);
+    read_binary_rows(file_, layout_, columns_, rows, targets);
     std::size_t axis = 0;
     for (std::vector<double>* v : {&out.x, &out.y, &out.z}) {
       for (double& value : *v) value = value * header_.scale[axis] + header_.offset[axis];
@@ -94,10 +92,10 @@ class LasPoints final : public PointSource {
     }
     for (const Scaled& s : scaled_) {
       const ColumnTarget& target = targets[s.column];
-      for (std::size_t i = 0; i < count && target.narrow != nullptr; ++i) {
+      for (std::size_t i = 0; i < rows.count && target.narrow != nullptr; ++i) {
         target.narrow[i] = static_cast<float>(double{target.narrow[i]} * s.scale + s.shift);
       }
-      for (std::size_t i = 0; i < count && target.wide != nullptr; ++i) {
+      for (std::size_t i = 0; i < rows.count && target.wide != nullptr; ++i) {
         target.wide[i] = target.wide[i] * s.scale + s.shift;
       }
     }

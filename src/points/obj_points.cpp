@@ -1,15 +1,14 @@
-#include "points/obj_points.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <optional>
 
+#include "base/number.h"
 #include "lamina/error.h"
-#include "points/number.h"
-#include "points/row_parser.h"
-#include "points/text_file.h"
+#include "points/point_columns.h"
+#include "points/readers.h"
+#include "points/text_rows.h"
 
 namespace lamina {
 namespace {
@@ -43,7 +42,7 @@ bool pairs_alike(std::string_view line) {
 }
 
 /// What is on the vertices' lines, going by some of them.
-class VertexLook {
+class VertexColumns {
  public:
   void take(const InputFile& file, std::string_view line, std::uint64_t number) {
     split_line(without_keyword(line), kBlanks, words_);
@@ -66,7 +65,7 @@ class VertexLook {
     for (const std::string_view word : words_) long_numbers_ = long_numbers_ || digits(word) > kFloatDigits;
   }
 
-  [[nodiscard]] std::vector<PointColumn> columns() const {
+  [[nodiscard]] std::vector<PointColumn> found() const {
     const ScalarType position = long_numbers_ ? ScalarType::float64 : ScalarType::float32;
     std::vector<PointColumn> columns{{"x", position}, {"y", position}, {"z", position}};
     if (columns_ == 4) {
@@ -107,21 +106,16 @@ class ObjPoints final : public PointSource {
   }
 
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
-    first = std::min(first, info_.count);
-    count = static_cast<std::size_t>(std::min<std::uint64_t>(count, info_.count - first));
-    read_lines(*vertex_parser_, vertices_, Line::vertex, first,
-               prepare_batch(info_, vertex_parser_->columns(), first, count, out), count);
-    if (with_normals_) {
-      read_lines(*normal_parser_, normals_, Line::normal, first,
-                 prepare_batch(info_, normal_parser_->columns(), first, count, out), count);
-    }
+    const RowRange rows = rows_there(info_, first, count);
+    read_lines(*vertex_parser_, vertices_, Line::vertex, rows, out);
+    if (with_normals_) read_lines(*normal_parser_, normals_, Line::normal, rows, out);
   }
 
  private:
-  void read_lines(const RowParser& parser, const RowIndex& index, Line kind, std::uint64_t first,
-                  const std::vector<ColumnTarget>& targets, std::size_t count) const {
+  void read_lines(const RowParser& parser, const RowIndex& index, Line kind, RowRange rows, SampleBatch& out) const {
+    const std::vector<ColumnTarget> targets = prepare_batch(info_, parser.columns(), rows, out);
     for_rows(
-        file_, line_end_, index, first, count, [&](std::string_view line) { return kind_of(line) == kind; },
+        file_, line_end_, index, rows, [&](std::string_view line) { return kind_of(line) == kind; },
         [&](std::string_view line, std::uint64_t number, std::size_t i) {
           parser.parse(file_, without_keyword(line), number, i, targets);
         });
@@ -130,14 +124,14 @@ class ObjPoints final : public PointSource {
   /// Counts and places the lines; the columns come from the first thousand vertices and then every thousandth.
   std::vector<PointColumn> index_lines() {
     constexpr std::uint64_t kSome = 1000;
-    VertexLook look;
+    VertexColumns columns;
     LineReader lines(file_, 0, 0, line_end_);
     std::string_view line;
     bool alike = true;
     while (lines.next(line)) {
       switch (kind_of(line)) {
         case Line::vertex:
-          if (vertices_.count() < kSome || vertices_.count() % kSome == 0) look.take(file_, line, lines.line());
+          if (vertices_.count() < kSome || vertices_.count() % kSome == 0) columns.take(file_, line, lines.line());
           vertices_.add(lines);
           break;
         case Line::normal:
@@ -159,7 +153,7 @@ class ObjPoints final : public PointSource {
                                           alike ? fmt::format("{} for {} vertices", normals_.count(), vertices_.count())
                                                 : "the faces give vertices the normals of others"));
     }
-    return look.columns();
+    return columns.found();
   }
 
   InputFile file_;

@@ -3,11 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
+#include <optional>
 
+#include "base/number.h"
 #include "lamina/error.h"
+#include "points/input_file.h"
 #include "points/point_columns.h"
-#include "points/row_parser.h"
+#include "points/text_rows.h"
 
 namespace lamina {
 namespace {
@@ -55,11 +57,9 @@ class PcdHeaderParser {
   }
 
   std::uint64_t number(std::string_view word) const {
-    std::uint64_t value = 0;
-    const char* end = word.data() + word.size();
-    const auto [stop, error] = std::from_chars(word.data(), end, value);
-    if (error != std::errc{} || stop != end) fail(fmt::format("{} is no whole number", quoted_word(word)));
-    return value;
+    const std::optional<std::uint64_t> value = parse_whole(word);
+    if (!value) fail(fmt::format("{} is no whole number", quoted_word(word)));
+    return *value;
   }
 
   std::uint64_t only_number() const {

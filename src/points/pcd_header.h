@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "lamina/attributes.h"
-#include "points/input_file.h"
 
 namespace lamina {
 

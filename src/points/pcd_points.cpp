@@ -1,20 +1,115 @@
-#include "points/pcd_points.h"
-
+// PCD of any encoding.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <optional>
 
+#include "base/little_endian.h"
 #include "lamina/error.h"
 #include "points/binary_rows.h"
-#include "base/little_endian.h"
-#include "points/lzf.h"
-#include "points/pcd_ascii.h"
 #include "points/pcd_header.h"
-#include "points/scan_grid.h"
+#include "points/point_columns.h"
+#include "points/readers.h"
+#include "points/scans.h"
+#include "points/text_rows.h"
+#include "points/unpack.h"
 
 namespace lamina {
 namespace {
+
+/// A packed colour as text: the number's bits, or the number itself where the header calls it an integer or it cannot
+/// be anything else.
+std::uint32_t unpack_colour(double value, const PcdField& field) {
+  const bool integer = field.type != ScalarType::float32 || (value >= 1 && value < 0x1p24);
+  if (integer && value < 0) return value >= -0x1p31 ? static_cast<std::uint32_t>(static_cast<std::int32_t>(value)) : 0;
+  if (integer) return value < 0x1p32 ? static_cast<std::uint32_t>(value) : 0;
+  return std::bit_cast<std::uint32_t>(static_cast<float>(value));
+}
+
+class AsciiPcd final : public PointSource {
+ public:
+  AsciiPcd(InputFile file, const PcdHeader& header, PointSourceInfo info) : file_(std::move(file)) {
+    info_ = std::move(info);
+    info_.random_access = true;
+    std::vector<PointColumn> columns;
+    std::vector<PointColumn> known;
+    for (const PcdField& field : header.fields) {
+      PointColumn column{field.name, field.type.value_or(ScalarType::float32)};
+      if (is_packed(field) && !packed_) {
+        packed_ = {columns.size(), field};
+        column = {"-", ScalarType::float64};
+      }
+      if (field.name == "_" || field.count != 1 || !field.type || is_packed(field)) column.role = Role::skipped;
+      columns.insert(columns.end(), field.count, column);
+      if (column.role != Role::skipped) known.push_back(column);
+    }
+    const std::size_t own = columns.size();
+    if (packed_) {
+      for (std::size_t k = 0; k < pcd_channels(packed_->field); ++k) {
+        const char* name = kPcdChannels[k < 3 ? 2 - k : k];
+        PointColumn channel{name, ScalarType::uint8};
+        if (has_column(known, name)) channel.role = Role::skipped;
+        columns.push_back(channel);
+      }
+    }
+    give_roles(columns, info_, file_.name, "field");
+    channels_.assign(columns.begin() + static_cast<std::ptrdiff_t>(own), columns.end());
+    columns.resize(own);
+    parser_.emplace(std::move(columns), kBlanks, "");
+    index_rows(header);
+  }
+
+  void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
+    const RowRange rows = rows_there(info_, first, count);
+    std::vector<PointColumn> columns = parser_->columns();
+    const std::size_t own = columns.size();
+    columns.insert(columns.end(), channels_.begin(), channels_.end());
+    std::vector<ColumnTarget> targets = prepare_batch(info_, columns, rows, out);
+    const std::vector<ColumnTarget> channels(targets.begin() + static_cast<std::ptrdiff_t>(own), targets.end());
+    targets.resize(own);
+    std::vector<double> colours(packed_ ? rows.count : 0);
+    if (packed_) targets[packed_->column] = {.wide = colours.data()};
+    for_rows(
+        file_, '\n', rows_, rows, [](std::string_view) { return true; },
+        [&](std::string_view line, std::uint64_t number, std::size_t i) {
+          parser_->parse(file_, line, number, i, targets);
+        });
+    round_exact_attributes(out);
+    for (std::size_t i = 0; i < colours.size(); ++i) {
+      const std::uint32_t colour = unpack_colour(colours[i], packed_->field);
+      for (std::size_t k = 0; k < channels.size(); ++k) {
+        const std::size_t byte = k < 3 ? 2 - k : k;
+        if (channels[k].narrow != nullptr) channels[k].narrow[i] = static_cast<float>((colour >> (8 * byte)) & 255U);
+      }
+    }
+  }
+
+ private:
+  struct Packed {
+    std::size_t column;
+    PcdField field;
+  };
+
+  void index_rows(const PcdHeader& header) {
+    LineReader lines(file_, header.bytes, header.lines, '\n');
+    std::string_view line;
+    while (lines.next(line)) rows_.add(lines);
+    if (rows_.count() != header.points) {
+      throw Error(ExitCode::unreadable,
+                  fmt::format("{}: the header promises {} points, the file holds {} lines of them (to line "
+                              "{}): it was cut short or the header's count is wrong",
+                              file_.name, header.points, rows_.count(), lines.line()));
+    }
+  }
+
+  InputFile file_;
+  std::optional<RowParser> parser_;
+  std::optional<Packed> packed_;
+  std::vector<PointColumn> channels_;  ///< what a packed colour comes apart into, red first
+  RowIndex rows_;
+};
 
 struct BinaryColumns {
   std::vector<PointColumn> columns;      ///< offsets from the beginning of a point
@@ -86,9 +181,8 @@ class BinaryPcd final : public PointSource {
   }
 
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
-    first = std::min(first, info_.count);
-    count = static_cast<std::size_t>(std::min<std::uint64_t>(count, info_.count - first));
-    read_binary_rows(file_, layout_, columns_, first, count, prepare_batch(info_, columns_, first, count, out));
+    const RowRange rows = rows_there(info_, first, count);
+    read_binary_rows(file_, layout_, columns_, rows, prepare_batch(info_, columns_, rows, out));
     round_exact_attributes(out);
   }
 
@@ -115,11 +209,10 @@ class CompressedPcd final : public PointSource {
   }
 
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
-    first = std::min(first, info_.count);
-    count = static_cast<std::size_t>(std::min<std::uint64_t>(count, info_.count - first));
-    const std::vector<ColumnTarget> targets = prepare_batch(info_, columns_, first, count, out);
+    const RowRange rows = rows_there(info_, first, count);
+    const std::vector<ColumnTarget> targets = prepare_batch(info_, columns_, rows, out);
     for (std::size_t c = 0; c < columns_.size(); ++c) {
-      read_binary_rows(file_, layouts_[c], {columns_[c]}, first, count, {targets[c]});
+      read_binary_rows(file_, layouts_[c], {columns_[c]}, rows, {targets[c]});
     }
     round_exact_attributes(out);
   }
@@ -161,7 +254,7 @@ std::unique_ptr<PointSource> open_encoded(InputFile file, const PcdHeader& heade
                                           const std::string& tmp_dir) {
   switch (header.data) {
     case PcdData::ascii:
-      return open_ascii_pcd(std::move(file), header, std::move(info));
+      return std::make_unique<AsciiPcd>(std::move(file), header, std::move(info));
     case PcdData::binary:
       return std::make_unique<BinaryPcd>(std::move(file), header, std::move(info));
     case PcdData::binary_compressed:

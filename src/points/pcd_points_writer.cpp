@@ -1,5 +1,3 @@
-#include "points/pcd_points_writer.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,10 +8,11 @@
 #include <set>
 #include <string_view>
 
-#include "base/record_writer.h"
+#include "base/background_writer.h"
+#include "base/descriptor.h"
 #include "lamina/error.h"
-#include "points/row_codec.h"
-#include "points/staged_rows.h"
+#include "points/binary_rows.h"
+#include "points/writers.h"
 
 namespace lamina {
 namespace {
@@ -122,14 +121,14 @@ class PcdPointsWriter final : public PointsWriter {
         header_bytes_(header_of(stored_, 0, colours_.has_value()).size()),
         given_(columns),
         codec_(stored_),
-        rows_out_(path, settings.tmp_dir, settings.count.has_value()),
+        rows_out_(path, settings, settings.count.has_value()),
         writer_(codec_.row_bytes()) {
     const std::string header = header_of(stored_, settings_.count.value_or(0), colours_.has_value());
     rows_out_.check(write_all(rows_out_.fd(), header.data(), header.size()));
   }
 
   void append(const SampleBatch& batch) override {
-    if (committed_) throw Error(ExitCode::internal, rows_out_.name() + ": is committed, nothing can be added");
+    rows_out_.require_open();
     given_.require_writable(batch, rows_, rows_out_.name());
     const SampleBatch& rows = colours_ ? packed(batch) : batch;
     rows_out_.check(writer_.append(rows_out_.fd(), rows.size(), [&](std::byte* to, std::size_t first, std::size_t n) {
@@ -139,10 +138,8 @@ class PcdPointsWriter final : public PointsWriter {
   }
 
   void commit() override {
-    if (committed_) throw Error(ExitCode::internal, rows_out_.name() + ": is committed already");
-    require_count(rows_out_.name(), settings_, rows_);
+    rows_out_.require_all(rows_);
     rows_out_.check(writer_.flush(rows_out_.fd()));
-    committed_ = true;
     rows_out_.publish(header_of(stored_, rows_, colours_.has_value()), header_bytes_ + writer_.written());
   }
 
@@ -179,7 +176,6 @@ class PcdPointsWriter final : public PointsWriter {
   StagedRows rows_out_;
   SoleRecordWriter writer_;
   SampleBatch packed_;
-  bool committed_ = false;
 };
 
 }  // namespace

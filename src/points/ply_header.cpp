@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
+#include <cctype>
+#include <optional>
+#include <set>
 
-#include "base/ply_type.h"
+#include "base/number.h"
+#include "base/scalar_type.h"
 #include "lamina/error.h"
 
 namespace lamina {
@@ -108,11 +111,12 @@ class PlyHeaderParser {
     PlyElement element;
     element.name = needed_word("an element's name");
     const std::string_view count = needed_word("a count");
-    const auto [end, error] = std::from_chars(count.data(), count.data() + count.size(), element.count);
-    if (error != std::errc{} || end != count.data() + count.size()) {
+    const std::optional<std::uint64_t> number = parse_whole(count);
+    if (!number) {
       fail(fmt::format("the count of element {} is {}; a whole number expected", quoted_word(element.name),
                        quoted_word(count)));
     }
+    element.count = *number;
     end_of_line();
     const auto is_same = [&](const PlyElement& other) { return other.name == element.name; };
     if (std::any_of(header_.elements.begin(), header_.elements.end(), is_same))
@@ -173,6 +177,24 @@ std::optional<std::size_t> PlyElement::find(std::string_view property) const {
 
 PlyHeader parse_ply_header(std::string_view text, const std::string& name) {
   return PlyHeaderParser(text, name).parse();
+}
+
+void require_ply_names(std::string_view noun, const std::vector<std::string_view>& names) {
+  std::set<std::string_view> taken{"x", "y", "z", "nx", "ny", "nz"};
+  for (const std::string_view name : names) {
+    const bool plain = !name.empty() && std::all_of(name.begin(), name.end(),
+                                                    [](unsigned char c) { return std::iscntrl(c) == 0 && c != ' '; });
+    if (plain && taken.insert(name).second) continue;
+    throw Error(ExitCode::internal, fmt::format("{} '{}' cannot be written to a PLY: its name is empty, has blanks, or "
+                                                "is there twice",
+                                                noun, one_line(std::string(name))));
+  }
+}
+
+std::string one_line(std::string text) {
+  std::replace_if(
+      text.begin(), text.end(), [](unsigned char c) { return std::iscntrl(c) != 0; }, ' ');
+  return text;
 }
 
 PlyHeader read_ply_header(const InputFile& file) {

@@ -48,4 +48,11 @@ PlyHeader read_ply_header(std::streambuf& stream, const std::string& name);
 /// The same from text that holds the whole header.
 PlyHeader parse_ply_header(std::string_view text, const std::string& name);
 
+/// For writers: throws Error(internal) when a name besides x y z nx ny nz is empty, has blanks, or is there twice.
+/// `noun`: what has the names.
+void require_ply_names(std::string_view noun, const std::vector<std::string_view>& names);
+
+/// A comment's text: line breaks and other control characters become blanks.
+std::string one_line(std::string text);
+
 }  // namespace lamina

@@ -1,49 +1,31 @@
-#include "points/ply_points_writer.h"
-
+// Points to binary little-endian PLY.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cctype>
 #include <limits>
-#include <optional>
-#include <set>
 #include <string_view>
+#include <vector>
 
+#include "base/background_writer.h"
 #include "base/descriptor.h"
-#include "base/output_file.h"
-#include "base/ply_type.h"
-#include "base/record_writer.h"
-#include "lamina/error.h"
+#include "base/scalar_type.h"
 #include "lamina/run.h"
-#include "points/row_codec.h"
+#include "points/binary_rows.h"
+#include "points/ply_header.h"
+#include "points/writers.h"
 
 namespace lamina {
 namespace {
 
-std::string one_line(std::string text) {
-  std::replace_if(
-      text.begin(), text.end(), [](unsigned char c) { return std::iscntrl(c) != 0; }, ' ');
-  return text;
-}
-
-void require_ply_names(const PointColumns& columns) {
-  std::set<std::string_view> taken{"x", "y", "z", "nx", "ny", "nz"};
-  const auto take = [&](const std::string& name) {
-    const bool plain = !name.empty() && std::all_of(name.begin(), name.end(),
-                                                    [](unsigned char c) { return std::iscntrl(c) == 0 && c != ' '; });
-    if (!plain || !taken.insert(name).second) {
-      throw Error(ExitCode::internal, fmt::format("column '{}' cannot be written to a PLY: its name is empty, has "
-                                                  "blanks, or is there twice",
-                                                  one_line(name)));
-    }
-  };
-  if (!columns.radius.empty()) take(columns.radius);
-  if (!columns.quality.empty()) take(columns.quality);
-  for (const AttributeSpec& spec : columns.attributes) take(spec.name);
+void require_names(const PointColumns& columns) {
+  std::vector<std::string_view> names;
+  if (!columns.radius.empty()) names.push_back(columns.radius);
+  if (!columns.quality.empty()) names.push_back(columns.quality);
+  for (const AttributeSpec& spec : columns.attributes) names.push_back(spec.name);
+  require_ply_names("column", names);
 }
 
 PointColumns checked(const PointColumns& columns) {
-  require_ply_names(columns);
+  require_names(columns);
   return columns;
 }
 
@@ -52,51 +34,34 @@ class PlyPointsWriter final : public PointsWriter {
   PlyPointsWriter(const std::string& path, const PointColumns& columns, const PointsWriterSettings& settings)
       : PointsWriter(checked(columns)),
         settings_(settings),
-        output_(path, settings.tmp_dir),
         codec_(columns),
+        rows_out_(path, settings, settings.count.has_value()),
         writer_(codec_.row_bytes()) {
-    if (output_.streams() && settings.count) pipe_.emplace(output_.destination());
     const std::string header = ply_points_header(columns_, settings_.comments, settings_.count.value_or(0));
-    check(write_all(target(), header.data(), header.size()));
+    rows_out_.check(write_all(rows_out_.fd(), header.data(), header.size()));
   }
 
   void append(const SampleBatch& batch) override {
-    if (committed_) throw Error(ExitCode::internal, output_.name() + ": is committed, nothing can be added");
-    codec_.require_writable(batch, rows_, output_.name());
-    check(writer_.append(target(), batch.size(),
-                         [&](std::byte* to, std::size_t first, std::size_t n) { codec_.encode(batch, first, n, to); }));
+    rows_out_.require_open();
+    codec_.require_writable(batch, rows_, rows_out_.name());
+    rows_out_.check(writer_.append(rows_out_.fd(), batch.size(), [&](std::byte* to, std::size_t first, std::size_t n) {
+      codec_.encode(batch, first, n, to);
+    }));
     rows_ += batch.size();
   }
 
   void commit() override {
-    if (committed_) throw Error(ExitCode::internal, output_.name() + ": is committed already");
-    if (settings_.count && *settings_.count != rows_) {
-      throw Error(ExitCode::internal,
-                  fmt::format("{}: {} rows came, {} were announced", output_.name(), rows_, *settings_.count));
-    }
-    check(writer_.flush(target()));
-    committed_ = true;
-    if (pipe_) return check(pipe_->close());
+    rows_out_.require_all(rows_);
+    rows_out_.check(writer_.flush(rows_out_.fd()));
     const std::string header = ply_points_header(columns_, settings_.comments, rows_);
-    check(pwrite_all(output_.fd(), header.data(), header.size(), 0));
-    if (!output_.streams()) return output_.publish();
-    Descriptor to = output_.destination();
-    check(copy_all(output_.fd(), header.size() + writer_.written(), to.get()));
-    check(to.close());
+    rows_out_.publish(header, header.size() + writer_.written());
   }
 
  private:
-  [[nodiscard]] int target() const { return pipe_ ? pipe_->get() : output_.fd(); }
-  void check(int error) const {
-    if (error != 0) report_write_error(output_.name(), error);
-  }
-
   PointsWriterSettings settings_;
-  OutputFile output_;
-  std::optional<Descriptor> pipe_;  ///< rows go there at once
   RowCodec codec_;
+  StagedRows rows_out_;
   SoleRecordWriter writer_;
-  bool committed_ = false;
 };
 
 }  // namespace

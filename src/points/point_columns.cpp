@@ -75,6 +75,21 @@ std::string renamed(const Names& names, std::string name) {
   return known == names.end() ? name : std::string(known->second);
 }
 
+void size_for_rows(const PointSourceInfo& info, RowRange rows, SampleBatch& batch) {
+  const std::size_t count = rows.count;
+  batch.first = rows.first;
+  for (auto* axis : {&batch.x, &batch.y, &batch.z}) axis->resize(count);
+  for (auto* normal : {&batch.nx, &batch.ny, &batch.nz}) normal->resize(info.has_normals ? count : 0);
+  batch.radius.resize(info.has_radius ? count : 0);
+  batch.quality.resize(info.has_quality ? count : 0);
+  batch.attributes.resize(info.attributes.size());
+  for (auto& attribute : batch.attributes) attribute.resize(count);
+  batch.exact.resize(info.attributes.size());
+  for (std::size_t a = 0; a < info.attributes.size(); ++a) {
+    batch.exact[a].resize(fits_float(info.attributes[a].type) ? 0 : count);
+  }
+}
+
 }  // namespace
 
 std::string usual_name(std::string_view name) {
@@ -168,20 +183,14 @@ void give_roles(std::vector<PointColumn>& columns, PointSourceInfo& info, const 
   }
 }
 
-std::vector<ColumnTarget> prepare_batch(const PointSourceInfo& info, const std::vector<PointColumn>& columns,
-                                        std::uint64_t first, std::size_t count, SampleBatch& batch) {
-  batch.first = first;
-  for (auto* axis : {&batch.x, &batch.y, &batch.z}) axis->resize(count);
-  for (auto* normal : {&batch.nx, &batch.ny, &batch.nz}) normal->resize(info.has_normals ? count : 0);
-  batch.radius.resize(info.has_radius ? count : 0);
-  batch.quality.resize(info.has_quality ? count : 0);
-  batch.attributes.resize(info.attributes.size());
-  for (auto& attribute : batch.attributes) attribute.resize(count);
-  batch.exact.resize(info.attributes.size());
-  for (std::size_t a = 0; a < info.attributes.size(); ++a) {
-    batch.exact[a].resize(fits_float(info.attributes[a].type) ? 0 : count);
-  }
+RowRange rows_there(const PointSourceInfo& info, std::uint64_t first, std::size_t count) {
+  first = std::min(first, info.count);
+  return {first, static_cast<std::size_t>(std::min<std::uint64_t>(count, info.count - first))};
+}
 
+std::vector<ColumnTarget> prepare_batch(const PointSourceInfo& info, const std::vector<PointColumn>& columns,
+                                        RowRange rows, SampleBatch& batch) {
+  size_for_rows(info, rows, batch);
   std::vector<ColumnTarget> targets;
   targets.reserve(columns.size());
   for (const PointColumn& column : columns) {

@@ -40,15 +40,23 @@ std::string usual_name(std::string_view name);
 /// z, `easting northing elevation`, `P.x P.y P.z` and `Points:0 Points:1 Points:2` are.
 std::vector<std::string> names_with_positions(const std::vector<std::string_view>& words);
 
+/// Rows [first, first + count).
+struct RowRange {
+  std::uint64_t first = 0;
+  std::size_t count = 0;
+};
+/// Those of the asked for that the source has.
+RowRange rows_there(const PointSourceInfo& info, std::uint64_t first, std::size_t count);
+
 /// The array a column is read into; at most one is set.
 struct ColumnTarget {
   double* wide = nullptr;
   float* narrow = nullptr;
 };
 
-/// Sizes the batch for rows [first, first + count) and gives each column its array, in the columns' order.
+/// Sizes the batch for the rows and gives each column its array, in the columns' order.
 std::vector<ColumnTarget> prepare_batch(const PointSourceInfo& info, const std::vector<PointColumn>& columns,
-                                        std::uint64_t first, std::size_t count, SampleBatch& batch);
+                                        RowRange rows, SampleBatch& batch);
 
 /// Once the rows are read: the floats of the attributes that were read as doubles.
 void round_exact_attributes(SampleBatch& batch);

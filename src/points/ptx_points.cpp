@@ -1,17 +1,15 @@
-#include "points/ptx_points.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
+#include "base/number.h"
 #include "lamina/error.h"
-#include "points/number.h"
-#include "points/pose_transform.h"
-#include "points/row_parser.h"
-#include "points/scan_grid.h"
-#include "points/text_file.h"
+#include "points/point_columns.h"
+#include "points/readers.h"
+#include "points/scans.h"
+#include "points/text_rows.h"
 
 namespace lamina {
 namespace {
@@ -56,22 +54,21 @@ class PtxPoints final : public PointSource, public OrganisedPoints {
   }
 
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
-    first = std::min(first, info_.count);
-    count = static_cast<std::size_t>(std::min<std::uint64_t>(count, info_.count - first));
-    const std::vector<ColumnTarget> targets = prepare_batch(info_, parser_->columns(), first, count, out);
-    auto scan = std::upper_bound(scans_.begin(), scans_.end(), first,
+    const RowRange rows = rows_there(info_, first, count);
+    const std::vector<ColumnTarget> targets = prepare_batch(info_, parser_->columns(), rows, out);
+    auto scan = std::upper_bound(scans_.begin(), scans_.end(), rows.first,
                                  [](std::uint64_t row, const Scan& s) { return row < s.first; });
     std::size_t done = 0;
-    if (count > 0) --scan;
-    for (; done < count; ++scan) {
-      const std::uint64_t begin = first + done - scan->first;
-      const auto rows = static_cast<std::size_t>(std::min<std::uint64_t>(count - done, scan->rows.count() - begin));
-      for_rows(file_, line_end_, scan->rows, begin, rows, is_return,
+    if (rows.count > 0) --scan;
+    for (; done < rows.count; ++scan) {
+      const std::uint64_t begin = rows.first + done - scan->first;
+      const auto n = static_cast<std::size_t>(std::min<std::uint64_t>(rows.count - done, scan->rows.count() - begin));
+      for_rows(file_, line_end_, scan->rows, {begin, n}, is_return,
                [&](std::string_view line, std::uint64_t number, std::size_t i) {
                  parser_->parse(file_, line, number, done + i, targets);
                });
-      scan->transform.apply(out, done, done + rows);
-      done += rows;
+      scan->transform.apply(out, done, done + n);
+      done += n;
     }
   }
 
@@ -95,8 +92,7 @@ class PtxPoints final : public PointSource, public OrganisedPoints {
     split_line(line, kBlanks, words);
     std::vector<double> values(words.size());
     for (std::size_t i = 0; i < words.size(); ++i) {
-      const char* end = words[i].data() + words[i].size();
-      if (words.size() != wanted || parse_number(words[i].data(), end, values[i]) != end) {
+      if (words.size() != wanted || !is_number(words[i], values[i])) {
         throw Error(
             ExitCode::unreadable,
             fmt::format("{}, line {}: a scan's header should have {} numbers here: an earlier scan's number of columns "

@@ -6,11 +6,11 @@
 #include <array>
 #include <vector>
 
-#include "lamina/file_ending.h"
+#include "base/number.h"
 #include "lamina/error.h"
-#include "points/line_reader.h"
-#include "points/number.h"
+#include "lamina/file_ending.h"
 #include "points/point_columns.h"
+#include "points/text_rows.h"
 
 namespace lamina {
 namespace {
@@ -99,13 +99,10 @@ class Lines {
   std::string_view text_;
 };
 
-bool is_number(std::string_view word) {
-  double value = 0;
-  return parse_number(word.data(), word.data() + word.size(), value) == word.data() + word.size();
-}
-
 std::size_t numbers_in_front(const std::vector<std::string_view>& words) {
-  return static_cast<std::size_t>(std::find_if_not(words.begin(), words.end(), is_number) - words.begin());
+  return static_cast<std::size_t>(
+      std::find_if_not(words.begin(), words.end(), [](std::string_view word) { return is_number(word); }) -
+      words.begin());
 }
 
 bool names_positions(std::vector<std::string_view> words) {

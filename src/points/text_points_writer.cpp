@@ -1,17 +1,17 @@
-#include "points/text_points_writer.h"
-
 #include <fmt/compile.h>
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <iterator>
 #include <set>
 #include <string_view>
 
+#include "base/descriptor.h"
+#include "base/scalar_type.h"
 #include "lamina/error.h"
-#include "points/row_codec.h"
-#include "points/staged_rows.h"
+#include "points/binary_rows.h"
+#include "points/writers.h"
 
 namespace lamina {
 namespace {
@@ -40,10 +40,9 @@ std::vector<std::string> names_of(const PointColumns& columns) {
 
 /// Integers print as such, rounded and clamped to their type.
 double in_type(double value, ScalarType type) {
-  if (type == ScalarType::float32 || type == ScalarType::float64) return value;
-  const bool is_signed = type == ScalarType::int8 || type == ScalarType::int16 || type == ScalarType::int32;
-  const double span = std::exp2(8 * byte_size(type));
-  return std::clamp(std::nearbyint(value), is_signed ? -span / 2 : 0, is_signed ? span / 2 - 1 : span - 1);
+  if (!is_integer_type(type)) return value;
+  const ScalarRange range = scalar_range(type);
+  return std::clamp(std::nearbyint(value), range.low, range.high);
 }
 
 class TextPointsWriter final : public PointsWriter {
@@ -55,13 +54,13 @@ class TextPointsWriter final : public PointsWriter {
         codec_(columns),
         separator_(separator),
         header_(header_line(names_of(columns))),
-        rows_out_(path, settings.tmp_dir, true) {
+        rows_out_(path, settings, true) {
     rows_out_.check(write_all(rows_out_.fd(), header_.data(), header_.size()));
     written_ = header_.size();
   }
 
   void append(const SampleBatch& batch) override {
-    if (committed_) throw Error(ExitCode::internal, rows_out_.name() + ": is committed, nothing can be added");
+    rows_out_.require_open();
     codec_.require_writable(batch, rows_, rows_out_.name());
     for (std::size_t i = 0; i < batch.size(); ++i) {
       put_row(batch, i);
@@ -71,10 +70,8 @@ class TextPointsWriter final : public PointsWriter {
   }
 
   void commit() override {
-    if (committed_) throw Error(ExitCode::internal, rows_out_.name() + ": is committed already");
-    require_count(rows_out_.name(), settings_, rows_);
+    rows_out_.require_all(rows_);
     flush();
-    committed_ = true;
     rows_out_.publish(header_, written_);
   }
 
@@ -121,7 +118,6 @@ class TextPointsWriter final : public PointsWriter {
   StagedRows rows_out_;
   fmt::memory_buffer text_;
   std::uint64_t written_ = 0;
-  bool committed_ = false;
 };
 
 }  // namespace

@@ -8,12 +8,10 @@
 #include <limits>
 #include <string_view>
 
+#include "base/number.h"
 #include "lamina/error.h"
-#include "points/line_reader.h"
-#include "points/number.h"
 #include "points/point_columns.h"
-#include "points/row_parser.h"
-#include "points/text_file.h"
+#include "points/text_rows.h"
 
 namespace lamina {
 namespace {
@@ -27,10 +25,6 @@ struct Row {
   std::string text;
   std::uint64_t line = 0;
 };
-
-[[noreturn]] void fail(const InputFile& file, std::uint64_t line, const std::string& what) {
-  throw Error(ExitCode::unreadable, fmt::format("{}, line {}: {}", file.name, line, what));
-}
 
 std::string_view without_mark(std::string_view line) {
   const std::size_t at = line.find_first_not_of("#/ \t");
@@ -48,16 +42,11 @@ std::vector<std::string> names_on(std::string_view line) {
   return {};
 }
 
-bool is_number(std::string_view word, double& value) {
-  return parse_number(word.data(), word.data() + word.size(), value) == word.data() + word.size();
-}
-
 bool begins_with_number(std::string_view line) {
   std::vector<std::string_view> words;
-  double ignored = 0;
   for (const char separator : {kBlanks, ',', ';'}) {
     split_line(line, separator, words);
-    if (!words.empty() && is_number(words[0], ignored)) return true;
+    if (!words.empty() && is_number(words[0])) return true;
   }
   return false;
 }
@@ -72,8 +61,7 @@ std::vector<std::string_view> words_of(std::string& line) {
 }
 
 bool has_position(const std::vector<std::string_view>& words) {
-  double ignored = 0;
-  return std::count_if(words.begin(), words.end(), [&](std::string_view w) { return is_number(w, ignored); }) >= 3;
+  return std::count_if(words.begin(), words.end(), [](std::string_view w) { return is_number(w); }) >= 3;
 }
 
 /// Rows from the beginning; finds the header line and the count on the way.
@@ -129,7 +117,7 @@ char separator_of(const InputFile& file, const std::vector<Row>& rows) {
       lone_blank = lone_blank || (is_space(line[i]) && is_digit(before) && (is_digit(after) || after == '-'));
     }
     if (comma_in_number && (semicolon || lone_blank)) {
-      fail(file, row.line, "the commas look like decimal commas; write numbers with a decimal point");
+      fail_at(file, row.line, "the commas look like decimal commas; write numbers with a decimal point");
     }
   }
   return semicolon ? ';' : comma ? ',' : kBlanks;
@@ -146,12 +134,12 @@ void require_numbers(const InputFile& file, const Row& row) {
     });
   };
   if (has({"lat", "latitude"}) && has({"lon", "long", "longitude"}))
-    fail(file, row.line,
-         "longitude and latitude are degrees; project them to metres first, for example with PDAL or QGIS");
-  fail(file, row.line,
-       fmt::format("{} is no row of numbers; points need x y z; where it names the columns, name them in its place: "
-                   "--columns x,y,z,...",
-                   quoted_word(row.text)));
+    fail_at(file, row.line,
+            "longitude and latitude are degrees; project them to metres first, for example with PDAL or QGIS");
+  fail_at(file, row.line,
+          fmt::format("{} is no row of numbers; points need x y z; where it names the columns, name them in its place: "
+                      "--columns x,y,z,...",
+                      quoted_word(row.text)));
 }
 
 bool has_many_digits(std::string_view word) {
@@ -212,7 +200,7 @@ TextSample sample_text(const InputFile& file, char line_end, bool named) {
   for (const Row& row : rows) {
     split_line(row.text, sample.separator, words);
     if (sample.columns == 0) {
-      if (words.size() > kMostColumns) fail(file, row.line, fmt::format("more than {} columns", kMostColumns));
+      if (words.size() > kMostColumns) fail_at(file, row.line, fmt::format("more than {} columns", kMostColumns));
       sample.columns = words.size();
       sample.is_word.assign(sample.columns, false);
       sample.is_whole.assign(sample.columns, true);
@@ -220,9 +208,9 @@ TextSample sample_text(const InputFile& file, char line_end, bool named) {
     } else if (words.size() == 1 && sample.counted) {
       continue;  // the next block's count
     } else if (words.size() != sample.columns) {
-      fail(file, row.line,
-           fmt::format("{} values, but {} on line {}; all rows need the same", words.size(), sample.columns,
-                       rows.front().line));
+      fail_at(file, row.line,
+              fmt::format("{} values, but {} on line {}; all rows need the same", words.size(), sample.columns,
+                          rows.front().line));
     }
     take_row(words, sample);
     sample.ends_open = sample.ends_open && words.back().empty();

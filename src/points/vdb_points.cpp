@@ -1,13 +1,12 @@
-#include "points/vdb_points.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 
 #include "lamina/error.h"
 #include "lamina/volume_points.h"
 #include "points/input_file.h"
+#include "points/point_columns.h"
+#include "points/readers.h"
 
 namespace lamina {
 namespace {
@@ -47,14 +46,13 @@ class VdbPoints final : public PointSource {
   }
 
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
-    first = std::min(first, info_.count);
-    count = static_cast<std::size_t>(std::min<std::uint64_t>(count, info_.count - first));
+    const RowRange rows = rows_there(info_, first, count);
     const auto cut = [&](const auto& from, auto& to) {
       if (from.empty()) return to.clear();
-      const auto begin = from.begin() + static_cast<std::ptrdiff_t>(first);
-      to.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
+      const auto begin = from.begin() + static_cast<std::ptrdiff_t>(rows.first);
+      to.assign(begin, begin + static_cast<std::ptrdiff_t>(rows.count));
     };
-    out.first = first;
+    out.first = rows.first;
     cut(rows_.x, out.x);
     cut(rows_.y, out.y);
     cut(rows_.z, out.z);

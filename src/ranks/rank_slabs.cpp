@@ -7,7 +7,7 @@
 
 #include "boundary/rim_bytes.h"
 #include "chunks/part_slabs.h"
-#include "meshes/records.h"
+#include "meshes/streamed_ply.h"
 
 namespace lamina::ranks {
 namespace {

@@ -12,8 +12,7 @@
 #include "boundary/rim_bytes.h"
 #include "chunks/merge_parts.h"
 #include "lamina/error.h"
-#include "meshes/mesh_header.h"
-#include "meshes/records.h"
+#include "meshes/streamed_ply.h"
 #include "reconstruct/job.h"
 
 namespace lamina::ranks {

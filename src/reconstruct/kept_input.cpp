@@ -8,7 +8,7 @@
 #include <sstream>
 
 #include "base/output_file.h"
-#include "base/ply_type.h"
+#include "base/scalar_type.h"
 #include "lamina/error.h"
 #include "reconstruct/stored_cloud.h"
 #include "samples/cleaning.h"

@@ -10,8 +10,7 @@
 #include <vector>
 
 #include "base/descriptor.h"
-#include "base/memory_limit.h"
-#include "base/with_threads.h"
+#include "base/run.h"
 #include "edit/record_sorter.h"
 #include "lamina/error.h"
 #include "reconstruct/plan.h"

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/result_file.h"
+#include "base/output_file.h"
 #include "lamina/error.h"
 #include "lamina/render.h"
 

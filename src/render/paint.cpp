@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/with_threads.h"
+#include "base/run.h"
 #include "lamina/error.h"
 #include "lamina/render.h"
 #include "measure/triangle_bvh.h"

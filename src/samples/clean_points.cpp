@@ -4,8 +4,7 @@
 #include <utility>
 
 #include "base/descriptor.h"
-#include "base/memory_limit.h"
-#include "base/with_threads.h"
+#include "base/run.h"
 #include "edit/batch_pipe.h"
 #include "lamina/error.h"
 #include "samples/cleaning.h"

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/cell_hash.h"
+#include "base/hashing.h"
 #include "samples/density_octree.h"
 
 namespace lamina {

@@ -7,7 +7,7 @@
 #include <bit>
 #include <cstddef>
 
-#include "base/cell_hash.h"
+#include "base/hashing.h"
 
 namespace lamina {
 namespace {

@@ -4,7 +4,7 @@
 #include <bit>
 #include <cmath>
 
-#include "base/cell_hash.h"
+#include "base/hashing.h"
 
 namespace lamina {
 namespace {

@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "base/counter_rng.h"
+#include "base/hashing.h"
 #include "lamina/error.h"
 #include "lamina/scatter.h"
 #include "measure/triangle_bvh.h"

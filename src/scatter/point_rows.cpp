@@ -26,15 +26,15 @@ void RowPacker::add(const std::array<double, 3>& position, const std::array<doub
                     const std::array<float, 3>& colour, float confidence) {
   for (const double c : position) {
     if (layout_.double_positions)
-      put_little(bytes_, c);
+      append_little(bytes_, c);
     else
-      put_little(bytes_, static_cast<float>(c));
+      append_little(bytes_, static_cast<float>(c));
   }
-  for (const double c : normal) put_little(bytes_, static_cast<float>(c));
+  for (const double c : normal) append_little(bytes_, static_cast<float>(c));
   if (layout_.colours)
     for (const float c : colour)
-      put_little(bytes_, static_cast<std::uint8_t>(std::lround(std::clamp(c, 0.0F, 255.0F))));
-  if (layout_.confidence) put_little(bytes_, confidence);
+      append_little(bytes_, static_cast<std::uint8_t>(std::lround(std::clamp(c, 0.0F, 255.0F))));
+  if (layout_.confidence) append_little(bytes_, confidence);
 }
 
 }  // namespace lamina::scatter_detail

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <utility>
 
-#include "base/counter_rng.h"
+#include "base/hashing.h"
 #include "meshes/vec3.h"
 #include "scatter/shapes.h"
 

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/counter_rng.h"
-#include "base/result_file.h"
-#include "base/with_threads.h"
+#include "base/hashing.h"
+#include "base/output_file.h"
+#include "base/run.h"
 #include "lamina/error.h"
 #include "measure/triangle_bvh.h"
 #include "meshes/vec3.h"

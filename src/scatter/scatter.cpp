@@ -8,9 +8,9 @@
 #include <cmath>
 #include <limits>
 
-#include "base/counter_rng.h"
-#include "base/result_file.h"
-#include "base/with_threads.h"
+#include "base/hashing.h"
+#include "base/output_file.h"
+#include "base/run.h"
 #include "lamina/error.h"
 #include "scatter/point_rows.h"
 #include "scatter/shapes.h"

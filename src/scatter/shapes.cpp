@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/counter_rng.h"
+#include "base/hashing.h"
 #include "lamina/error.h"
 #include "lamina/scatter.h"
 #include "meshes/vec3.h"

@@ -9,8 +9,8 @@
 #include <numeric>
 #include <set>
 
-#include "base/memory_limit.h"
-#include "base/ply_type.h"
+#include "base/run.h"
+#include "base/scalar_type.h"
 #include "lamina/error.h"
 #include "vdb/full_range.h"
 

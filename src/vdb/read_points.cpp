@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "base/ply_type.h"
+#include "base/scalar_type.h"
 #include "lamina/error.h"
 #include "vdb/full_range.h"
 #include "vdb/point_grids.h"

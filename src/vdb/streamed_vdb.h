@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/spill_file.h"
-#include "base/staged_file.h"
+#include "base/output_file.h"
 #include "vdb/grids.h"
 #include "vdb/tile_signs.h"
 

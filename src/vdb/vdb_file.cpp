@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "base/result_file.h"
+#include "base/output_file.h"
 #include "lamina/error.h"
 #include "lamina/run.h"
 #include "vdb/point_grids.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/with_threads.h"
+#include "base/run.h"
 #include "lamina/error.h"
 #include "vdb/points_grid.h"
 #include "vdb/vdb_file.h"

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "base/with_threads.h"
+#include "base/run.h"
 #include "lamina/error.h"
 #include "lamina/volume_points.h"
 #include "vdb/point_grids.h"

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/with_threads.h"
+#include "base/run.h"
 #include "lamina/error.h"
 #include "vdb/vdb_file.h"
 #include "volume/level_set_data.h"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "base/with_threads.h"
+#include "base/run.h"
 #include "lamina/error.h"
 #include "volume/level_set_data.h"
 

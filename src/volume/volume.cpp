@@ -5,9 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/memory_limit.h"
-#include "base/result_file.h"
-#include "base/with_threads.h"
+#include "base/run.h"
+#include "base/output_file.h"
 #include "lamina/error.h"
 #include "measure/edge_table.h"
 #include "meshes/vec3.h"

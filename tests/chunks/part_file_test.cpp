@@ -12,7 +12,7 @@
 #include "chunks/part_slabs.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
-#include "meshes/records.h"
+#include "meshes/streamed_ply.h"
 
 namespace lamina {
 namespace {

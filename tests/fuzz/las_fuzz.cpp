@@ -1,4 +1,4 @@
-#include "points/las_points.h"
+#include "points/readers.h"
 
 #include "harness.h"
 

@@ -1,6 +1,6 @@
 // OpenVDB reads its own files, and is not what is looked at here.
 #include "lamina/error.h"
-#include "points/vdb_points.h"
+#include "points/readers.h"
 
 namespace lamina {
 

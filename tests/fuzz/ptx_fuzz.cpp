@@ -1,4 +1,4 @@
-#include "points/ptx_points.h"
+#include "points/readers.h"
 
 #include "harness.h"
 

@@ -2,7 +2,7 @@
 #include <string_view>
 
 #include "harness.h"
-#include "points/text_points.h"
+#include "points/readers.h"
 
 FUZZED(text) {
   using namespace lamina;

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "base/counter_rng.h"
+#include "base/hashing.h"
 #include "meshes/mesh_files.h"
 
 namespace lamina::measure {

@@ -1,5 +1,5 @@
 // LAS of every version and point format, written field by field from the specification's tables, and files that lie.
-#include "points/las_points.h"
+#include "points/readers.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

@@ -1,12 +1,12 @@
 // LAS as written comes back: positions to the step, everything else exactly.
-#include "points/las_points_writer.h"
+#include "points/writers.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/temporary_folder.h"
-#include "points/las_writer_layout.h"
 #include "points/point_rows.h"
+#include "points/writers.h"
 
 namespace lamina {
 namespace {

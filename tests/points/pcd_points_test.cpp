@@ -1,5 +1,5 @@
 // PCD in its three encodings from one table of values, an independent LZF packer, and headers that lie.
-#include "points/pcd_points.h"
+#include "points/readers.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -11,8 +11,8 @@
 #include <random>
 
 #include "base/temporary_folder.h"
-#include "points/lzf.h"
 #include "points/point_rows.h"
+#include "points/unpack.h"
 
 namespace lamina {
 namespace {

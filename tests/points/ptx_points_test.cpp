@@ -1,5 +1,5 @@
 // PTX: poses, missing returns, several scans.
-#include "points/ptx_points.h"
+#include "points/readers.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
