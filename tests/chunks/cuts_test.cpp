@@ -80,13 +80,15 @@ TEST(Cuts, BucketsGiveTheirSamplesToTheSlabsTheyLieIn) {
   }
   writer.append(samples);
   const SlabStore store = writer.finish();
-  Lattice lattice;
-  lattice.cell = 25;
-  lattice.levels = 3;
-  const std::vector<double> counts = slab_samples(store, lattice, {-12, 12});
+  ReconstructionPlan plan;
+  plan.lattice = {25, 3};
+  plan.slabs = {-12, 12};
+  const std::vector<double> counts = slab_samples(plan, store);
   EXPECT_NEAR(std::accumulate(counts.begin(), counts.end(), 0.0), 2000, 1e-6);
   for (std::int32_t s = -12; s < 12; ++s)
     EXPECT_NEAR(counts[static_cast<std::size_t>(s + 12)], s >= -10 && s < 10 ? 100 : 0, 1e-6) << s;
+  EXPECT_EQ(samples_in(plan, store, {-3, 4}), 700u);
+  EXPECT_EQ(samples_in(plan, store, {4, 4}), 0u);
 }
 
 }  // namespace
