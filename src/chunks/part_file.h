@@ -10,6 +10,7 @@
 
 #include "base/output_file.h"
 #include "boundary/rim.h"
+#include "lamina/holes.h"
 #include "meshes/mesh_sink.h"
 #include "reconstruct/stages.h"
 
