@@ -121,7 +121,7 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
   add_cleaning(j, s, settings);
   j["replaced_attribute_values"] = s.replaced_attributes;
   j["corners"] = {
-      {"projected", s.corners}, {"seen", s.corners_seen}, {"trusted", s.corners_good}, {"sums", s.corner_sums}};
+      {"projected", s.corners}, {"seen", s.corners_seen}, {"trusted", s.corners_trusted}, {"sums", s.corner_sums}};
   j["contradicting_normals"] = {
       {"corners", s.corners_torn}, {"worst_slab", s.torn_slab}, {"worst_share", s.torn_share}};
   j["isosurface"] = {{"vertices", s.isovertices},
@@ -141,7 +141,7 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
                    {"collapsed", s.clusters.collapsed},
                    {"patches", s.clusters.patches},
                    {"kept_isovertices", s.clusters.kept_isovertices},
-                   {"hard", s.clusters.hard}};
+                   {"resolved", s.clusters.resolved}};
   j["holes"] = holes_json(s.holes);
   return j;
 }

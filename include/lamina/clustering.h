@@ -15,7 +15,7 @@ struct ClusterCounts {
   std::uint64_t collapsed = 0;         ///< collapsed to the projected point
   std::uint64_t patches = 0;           ///< components placed by quadric
   std::uint64_t kept_isovertices = 0;  ///< isovertices left as they were
-  std::uint64_t hard = 0;              ///< clusters that took the hard path
+  std::uint64_t resolved = 0;          ///< clusters that took the exact test
 };
 
 }  // namespace lamina

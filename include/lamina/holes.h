@@ -13,8 +13,8 @@ struct OpenLoop {
   double length = 0;                 ///< output units
   double radii = 0;                  ///< the same length in local influence radii
   std::uint64_t edges = 0;
-  /// Why it stays open: "long", "outer rim" (the surface lies inside it), "bent" (the surface around it does not tell
-  /// how to continue), "occupied" (another boundary runs through it).
+  /// Why it stays open: "long", "outer boundary" (the surface lies inside it), "bent" (the surface around it does not
+  /// tell how to continue), "occupied" (another boundary runs through it).
   std::string reason;
 };
 

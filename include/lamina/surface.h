@@ -125,7 +125,7 @@ struct SurfaceStats {
   std::vector<Rejected> rejected;         ///< samples left out, by reason
   std::uint64_t replaced_attributes = 0;  ///< attribute values that were NaN or out of range
   std::uint64_t vertices = 0, triangles = 0;
-  std::uint64_t corners = 0, corners_seen = 0, corners_good = 0;
+  std::uint64_t corners = 0, corners_seen = 0, corners_trusted = 0;
   std::uint64_t corner_sums = 0;  ///< how often samples were summed up at a corner: once for each of its steps
   /// Corners whose samples' normals contradict each other; the slab (counted from the first) with the largest share of
   /// them among the corners with samples, and that share.

@@ -9,7 +9,7 @@
 
 #include "boundary/triangulate_polygon.h"
 
-namespace lamina::holes {
+namespace lamina::boundary {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -17,15 +17,15 @@ using Vec3 = Eigen::Vector3d;
 
 /// Normals around a gap lie within 75 degrees of their mean.
 constexpr double kCone = 0.26;
-/// The rim lies within so many influence radii of one sphere.
+/// The boundary loop lies within so many influence radii of one sphere.
 constexpr double kOffSphere = 0.4;
 /// Facets fold by less than 100 degrees (one less the cosine), with each other and with those around.
 constexpr double kMostFold = 1.17;
-/// Rims no longer than this (R), hardly wider than one sample acts, need no sphere: ends of thin things. Facets there
-/// fold by less than 140 degrees, which still tells a gap from the outer rim of a flake.
+/// Boundary loops no longer than this (R), hardly wider than one sample acts, need no sphere: ends of thin things.
+/// Facets there fold by less than 140 degrees, which still tells a gap from the outer boundary of a flake.
 constexpr double kSmall = 5;
 constexpr double kMostSmallFold = 1.77;
-/// Rims so near to a filling (R) take its place.
+/// Boundary loops so near to a filling (R) take its place.
 constexpr double kOccupied = 0.5;
 
 Vec3 to_vec(const std::array<double, 3>& v) {
@@ -35,7 +35,7 @@ Vec3 to_vec(const std::array<float, 3>& v) {
   return {double{v[0]}, double{v[1]}, double{v[2]}};
 }
 
-/// A plane through the middle of the rim, across its mean normal.
+/// A plane through the middle of the boundary loop, across its mean normal.
 struct Base {
   Vec3 middle = Vec3::Zero();
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();  ///< rows; the last is the normal
@@ -56,7 +56,7 @@ Base base_of(const Loop& loop) {
   const std::size_t n = loop.vertices.size();
   Vec3 normal = Vec3::Zero();
   for (std::size_t i = 0; i < n; ++i) {
-    const RimVertex& v = loop.vertices[i];
+    const BoundaryVertex& v = loop.vertices[i];
     const Vec3 p = to_vec(v.position);
     const double edges = (to_vec(loop.vertices[(i + 1) % n].position) - p).norm() +
                          (p - to_vec(loop.vertices[(i + n - 1) % n].position)).norm();
@@ -68,7 +68,7 @@ Base base_of(const Loop& loop) {
   return base;
 }
 
-/// The plane in which the rim encloses most, on the side from which it runs anticlockwise.
+/// The plane in which the boundary loop encloses most, on the side from which it runs anticlockwise.
 Base widest_base(const Loop& loop) {
   Base base = base_of(loop);
   Vec3 area = Vec3::Zero();
@@ -85,7 +85,7 @@ double length_in_radii(const Loop& loop) {
   double sum = 0;
   const std::size_t n = loop.vertices.size();
   for (std::size_t i = 0; i < n; ++i) {
-    const RimVertex &a = loop.vertices[i], &b = loop.vertices[(i + 1) % n];
+    const BoundaryVertex &a = loop.vertices[i], &b = loop.vertices[(i + 1) % n];
     sum += 2 * (to_vec(b.position) - to_vec(a.position)).norm() /
            (static_cast<double>(a.radius) + static_cast<double>(b.radius));
   }
@@ -156,11 +156,11 @@ bool is_simple(const std::vector<Vec3>& polygon) {
   return true;
 }
 
-/// Weights of the rim's vertices at a point inside: one over the distance squared.
-std::vector<double> weights_at(const Vec2& at, const std::vector<Vec3>& rim) {
+/// Weights of the boundary loop's vertices at a point inside: one over the distance squared.
+std::vector<double> weights_at(const Vec2& at, const std::vector<Vec3>& outline) {
   std::vector<double> weights;
   double sum = 0;
-  for (const Vec3& p : rim) {
+  for (const Vec3& p : outline) {
     weights.push_back(1 / std::max((p.head<2>() - at).squaredNorm(), 1e-300));
     sum += weights.back();
   }
@@ -185,21 +185,21 @@ bool folds_too_far(const std::vector<Vec3>& points, const std::vector<Vec3>& fac
   return false;
 }
 
-/// New vertices on the sphere, bent so that it passes through the rim.
-bool place_inner(const Loop& loop, const Base& base, const Sphere& sphere, const std::vector<Vec3>& rim,
+/// New vertices on the sphere, bent so that it passes through the boundary loop.
+bool place_inner(const Loop& loop, const Base& base, const Sphere& sphere, const std::vector<Vec3>& outline,
                  const std::vector<Vec2>& plane, std::vector<Vec3>& points, Filling& out) {
-  const std::size_t n = rim.size();
+  const std::size_t n = outline.size();
   const std::size_t attributes = loop.attributes.size() / n;
   std::vector<double> above(n);
   for (std::size_t i = 0; i < n; ++i) {
-    const auto height = sphere.height(rim[i].head<2>());
+    const auto height = sphere.height(outline[i].head<2>());
     if (!height) return false;
-    above[i] = rim[i].z() - *height;
+    above[i] = outline[i].z() - *height;
   }
   for (std::size_t v = n; v < plane.size(); ++v) {
     const auto height = sphere.height(plane[v]);
     if (!height) return false;
-    const std::vector<double> weights = weights_at(plane[v], rim);
+    const std::vector<double> weights = weights_at(plane[v], outline);
     double z = *height;
     for (std::size_t i = 0; i < n; ++i) z += weights[i] * above[i];
     const Vec3 point(plane[v].x(), plane[v].y(), z);
@@ -226,8 +226,8 @@ Filling refused(Verdict verdict) {
 }
 
 /// The loop as its base sees it.
-struct Rim {
-  Rim(const Loop& loop, const Base& base) : taken(loop.taken.begin(), loop.taken.end()) {
+struct LocalLoop {
+  LocalLoop(const Loop& loop, const Base& base) : taken(loop.taken.begin(), loop.taken.end()) {
     for (std::size_t i = 0; i < loop.vertices.size(); ++i) {
       points.push_back(base.local(to_vec(loop.vertices[i].position)));
       normals.push_back(base.axes * to_vec(loop.vertices[i].normal));
@@ -244,33 +244,33 @@ struct Rim {
 /// Where one surface goes on all around.
 Filling fill_smooth(const Loop& loop) {
   const Base base = base_of(loop);
-  const Rim rim(loop, base);
-  const std::size_t n = rim.points.size();
-  if (signed_area(rim.points) <= 0) return refused(Verdict::outer_rim);
-  const Sphere sphere(rim.points, rim.normals);
+  const LocalLoop local(loop, base);
+  const std::size_t n = local.points.size();
+  if (signed_area(local.points) <= 0) return refused(Verdict::outer_boundary);
+  const Sphere sphere(local.points, local.normals);
   for (std::size_t i = 0; i < n; ++i) {
-    if (rim.normals[i].z() < kCone || std::abs(sphere.distance(rim.points[i])) > kOffSphere * base.radius ||
-        sphere.gradient(rim.points[i]).z() <= 0)
+    if (local.normals[i].z() < kCone || std::abs(sphere.distance(local.points[i])) > kOffSphere * base.radius ||
+        sphere.gradient(local.points[i]).z() <= 0)
       return refused(Verdict::bent);
   }
-  if (!is_simple(rim.points)) return refused(Verdict::bent);
-  const auto allowed = [&](std::uint32_t i, std::uint32_t j) { return rim.allows(i, j); };
-  // Triangles along a rim may be slivers that face anywhere: vertices' normals say more.
-  auto triangles = triangulate_polygon(rim.points, rim.normals, allowed);
+  if (!is_simple(local.points)) return refused(Verdict::bent);
+  const auto allowed = [&](std::uint32_t i, std::uint32_t j) { return local.allows(i, j); };
+  // Triangles along a boundary loop may be slivers that face anywhere: vertices' normals say more.
+  auto triangles = triangulate_polygon(local.points, local.normals, allowed);
   if (!triangles) return refused(Verdict::bent);
   Filling filling;
   filling.triangles = std::move(*triangles);
   std::vector<Vec2> plane;
   std::vector<double> scale;
   for (std::size_t i = 0; i < n; ++i) {
-    const Vec3& p = rim.points[i];
+    const Vec3& p = local.points[i];
     plane.push_back(p.head<2>());
-    scale.push_back(0.5 * ((p - rim.points[(i + 1) % n]).norm() + (p - rim.points[(i + n - 1) % n]).norm()));
+    scale.push_back(0.5 * ((p - local.points[(i + 1) % n]).norm() + (p - local.points[(i + n - 1) % n]).norm()));
   }
   refine_triangles(plane, scale, filling.triangles, allowed);
-  std::vector<Vec3> points = rim.points;
-  if (!place_inner(loop, base, sphere, rim.points, plane, points, filling) ||
-      folds_too_far(points, rim.normals, kMostFold, filling.triangles))
+  std::vector<Vec3> points = local.points;
+  if (!place_inner(loop, base, sphere, local.points, plane, points, filling) ||
+      folds_too_far(points, local.normals, kMostFold, filling.triangles))
     return refused(Verdict::bent);
   filling.verdict = Verdict::filled;
   return filling;
@@ -278,18 +278,19 @@ Filling fill_smooth(const Loop& loop) {
 
 /// A gap so small that its triangles hardly matter.
 Filling fill_small(const Loop& loop) {
-  const Rim rim(loop, widest_base(loop));
-  if (!is_simple(rim.points)) return refused(Verdict::bent);
-  auto triangles =
-      triangulate_polygon(rim.points, rim.facing, [&](std::uint32_t i, std::uint32_t j) { return rim.allows(i, j); });
-  if (!triangles || folds_too_far(rim.points, rim.facing, kMostSmallFold, *triangles)) return refused(Verdict::bent);
+  const LocalLoop local(loop, widest_base(loop));
+  if (!is_simple(local.points)) return refused(Verdict::bent);
+  auto triangles = triangulate_polygon(local.points, local.facing,
+                                       [&](std::uint32_t i, std::uint32_t j) { return local.allows(i, j); });
+  if (!triangles || folds_too_far(local.points, local.facing, kMostSmallFold, *triangles))
+    return refused(Verdict::bent);
   Filling filling;
   filling.triangles = std::move(*triangles);
   filling.verdict = Verdict::filled;
   return filling;
 }
 
-/// The rim of a lone triangle, whose filling would be its back.
+/// The boundary loop of a lone triangle, whose filling would be its back.
 bool is_triangle(const Loop& loop) {
   return loop.vertices.size() == 3 && loop.facing[0] == loop.facing[1] && loop.facing[1] == loop.facing[2] &&
          (to_vec(loop.vertices[1].position) - to_vec(loop.vertices[0].position))
@@ -305,8 +306,8 @@ const char* describe(Verdict verdict) {
       return "filled";
     case Verdict::too_long:
       return "long";
-    case Verdict::outer_rim:
-      return "outer rim";
+    case Verdict::outer_boundary:
+      return "outer boundary";
     case Verdict::bent:
       return "bent";
     case Verdict::occupied:
@@ -317,11 +318,11 @@ const char* describe(Verdict verdict) {
 
 Filling fill_loop(const Loop& loop, double longest) {
   if (loop.vertices.size() < 3) return refused(Verdict::bent);
-  if (is_triangle(loop)) return refused(Verdict::outer_rim);
+  if (is_triangle(loop)) return refused(Verdict::outer_boundary);
   const double length = length_in_radii(loop);
   Filling filling = fill_smooth(loop);
-  // What an outer rim is does not depend on its length.
-  if (filling.verdict != Verdict::outer_rim && !(length <= longest)) return refused(Verdict::too_long);
+  // What an outer boundary is does not depend on its length.
+  if (filling.verdict != Verdict::outer_boundary && !(length <= longest)) return refused(Verdict::too_long);
   if (filling.verdict == Verdict::filled || length > std::min(longest, kSmall)) return filling;
   Filling small = fill_small(loop);
   return small.verdict == Verdict::filled ? small : filling;
@@ -330,13 +331,13 @@ Filling fill_loop(const Loop& loop, double longest) {
 Filling fill_any(const Loop& loop) {
   const std::size_t n = loop.vertices.size();
   if (n < 3) return refused(Verdict::bent);
-  if (is_triangle(loop)) return refused(Verdict::outer_rim);
+  if (is_triangle(loop)) return refused(Verdict::outer_boundary);
   const Base base = widest_base(loop);
-  const Rim rim(loop, base);
+  const LocalLoop local(loop, base);
   Filling filling;
   filling.verdict = Verdict::filled;
   if (auto triangles =
-          triangulate_by_area(rim.points, [&](std::uint32_t i, std::uint32_t j) { return rim.allows(i, j); })) {
+          triangulate_by_area(local.points, [&](std::uint32_t i, std::uint32_t j) { return local.allows(i, j); })) {
     filling.triangles = std::move(*triangles);
     return filling;
   }
@@ -355,11 +356,11 @@ Filling fill_any(const Loop& loop) {
   return filling;
 }
 
-bool occupies(const RimVertex& other, const Loop& loop, const Filling& filling) {
+bool occupies(const BoundaryVertex& other, const Loop& loop, const Filling& filling) {
   const Base base = widest_base(loop);
   const Vec3 p = base.local(to_vec(other.position));
   std::vector<Vec3> points;
-  for (const RimVertex& v : loop.vertices) points.push_back(base.local(to_vec(v.position)));
+  for (const BoundaryVertex& v : loop.vertices) points.push_back(base.local(to_vec(v.position)));
   for (const auto& v : filling.positions) points.push_back(base.local(to_vec(v)));
   for (const auto& t : filling.triangles) {
     const Vec3 &a = points[t[0]], &b = points[t[1]], &c = points[t[2]];
@@ -373,4 +374,4 @@ bool occupies(const RimVertex& other, const Loop& loop, const Filling& filling) 
   return false;
 }
 
-}  // namespace lamina::holes
+}  // namespace lamina::boundary

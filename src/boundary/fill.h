@@ -1,19 +1,19 @@
-// A closed rim's filling: whether the samples around support one, and its triangles.
+// A closed boundary loop's filling: whether the samples around support one, and its triangles.
 #pragma once
 #include <array>
 #include <cstdint>
 #include <vector>
 
-#include "boundary/rim.h"
+#include "boundary/boundary.h"
 
-namespace lamina::holes {
+namespace lamina::boundary {
 
 enum class Verdict : std::uint8_t {
   filled,
-  too_long,   ///< longer than the bound, or of too many edges
-  outer_rim,  ///< the surface lies inside of it
-  bent,       ///< normals around it do not agree, or do not belong to one sphere: nothing says what lies between
-  occupied,   ///< other rims run through the gap
+  too_long,        ///< longer than the bound, or of too many edges
+  outer_boundary,  ///< the surface lies inside of it
+  bent,            ///< normals around it do not agree, or do not belong to one sphere: nothing says what lies between
+  occupied,        ///< other boundary loops run through the gap
 };
 
 /// For stats and messages.
@@ -32,12 +32,13 @@ struct Filling {
 /// the triangles around, and uses no edge that the mesh has already. Depends on the loop alone.
 Filling fill_loop(const Loop& loop, double longest);
 
-/// The filling of least area, whatever lies around: for rims of which is known that they are none of the thing itself.
-/// Around a new vertex in the middle where the mesh has too many of the edges that would be needed. A lone triangle's
-/// back is no filling.
+/// The filling of least area, whatever lies around: for boundary loops of which is known that they are none of the
+/// thing itself. Around a new vertex in the middle where the mesh has too many of the edges that would be needed. A
+/// lone triangle's back is no filling.
 Filling fill_any(const Loop& loop);
 
-/// Whether a vertex of another rim lies in the filling, or so near (in R) that the two would be one surface twice.
-bool occupies(const RimVertex& other, const Loop& loop, const Filling& filling);
+/// Whether a vertex of another boundary loop lies in the filling, or so near (in R) that the two would be one surface
+/// twice.
+bool occupies(const BoundaryVertex& other, const Loop& loop, const Filling& filling);
 
-}  // namespace lamina::holes
+}  // namespace lamina::boundary

@@ -22,17 +22,17 @@ std::string describe(const HoleStats& s) {
   return text.empty() ? "no holes" : text;
 }
 
-namespace holes {
+namespace boundary {
 
 HoleCloser::HoleCloser(const HoleSettings& settings, std::size_t attributes)
     : settings_(settings),
       attributes_(attributes),
       paths_(
           settings.longest * (settings.watertight ? HoleSettings::kWatertight : 1), attributes,
-          [this](Loop&& loop, const RimExtent& extent) { loops_.emplace_back(std::move(loop), extent); },
-          [this](const RimExtent& extent) { leave(extent, Verdict::too_long); }) {}
+          [this](Loop&& loop, const LoopExtent& extent) { loops_.emplace_back(std::move(loop), extent); },
+          [this](const LoopExtent& extent) { leave(extent, Verdict::too_long); }) {}
 
-void HoleCloser::leave(const RimExtent& extent, Verdict why) {
+void HoleCloser::leave(const LoopExtent& extent, Verdict why) {
   ++stats_.open;
   stats_.open_edges += extent.edges;
   stats_.open_length += extent.length;
@@ -45,19 +45,19 @@ void HoleCloser::leave(const RimExtent& extent, Verdict why) {
   if (list.size() > HoleStats::kListed) list.pop_back();
 }
 
-void HoleCloser::add(const RimPiece& piece, std::uint64_t first) {
-  paths_.add(piece, static_cast<Number>(first));
+void HoleCloser::add(const BoundaryBatch& batch, std::uint64_t first) {
+  paths_.add(batch, static_cast<Number>(first));
 }
 
-void HoleCloser::add_part(const RimPiece& piece, std::uint64_t first) {
+void HoleCloser::add_part(const BoundaryBatch& batch, std::uint64_t first) {
   const auto shift = static_cast<Number>(first);
-  paths_.add(piece, shift);
-  // What both parts lack a triangle for is a rim; where each has one it is an edge inside.
-  std::map<std::pair<Number, Number>, RimEdge> waiting;
-  for (const RimEdge& e : loose_) waiting[{e.from, e.to}] = e;
-  RimPiece met;
+  paths_.add(batch, shift);
+  // What both parts lack a triangle for is a boundary loop; where each has one it is an edge inside.
+  std::map<std::pair<Number, Number>, BoundaryEdge> waiting;
+  for (const BoundaryEdge& e : loose_) waiting[{e.from, e.to}] = e;
+  BoundaryBatch met;
   loose_.clear();
-  for (RimEdge e : piece.loose) {
+  for (BoundaryEdge e : batch.loose) {
     e.from += shift;
     e.to += shift;
     if (e.from >= shift || e.to >= shift) {
@@ -75,7 +75,7 @@ void HoleCloser::add_part(const RimPiece& piece, std::uint64_t first) {
   for (const auto& [ends, e] : waiting) met.edges.push_back(e);
   paths_.add(met, 0);
   Number needed = shift;
-  for (const RimEdge& e : loose_) needed = std::min({needed, e.from, e.to});
+  for (const BoundaryEdge& e : loose_) needed = std::min({needed, e.from, e.to});
   paths_.forget_below(needed);
 }
 
@@ -100,13 +100,13 @@ void HoleCloser::refuse_occupied(std::vector<Filling>& fillings) const {
     if (fillings[l].verdict != Verdict::filled) return;
     const auto& [loop, extent] = loops_[l];
     float radius = 0;
-    for (const RimVertex& v : loop.vertices) radius = std::max(radius, v.radius);
+    for (const BoundaryVertex& v : loop.vertices) radius = std::max(radius, v.radius);
     const double margin = static_cast<double>(radius);
     auto seat = std::lower_bound(seats.begin(), seats.end(), extent.low[0] - margin,
                                  [](const Seat& s, double x) { return s.x < x; });
     for (; seat != seats.end() && seat->x <= extent.high[0] + margin; ++seat) {
       if (seat->loop == l) continue;
-      const RimVertex& v = loops_[seat->loop].first.vertices[seat->vertex];
+      const BoundaryVertex& v = loops_[seat->loop].first.vertices[seat->vertex];
       bool inside = true;
       for (std::size_t k = 1; k < 3; ++k)
         inside = inside && v.position[k] >= extent.low[k] - margin && v.position[k] <= extent.high[k] + margin;
@@ -122,13 +122,14 @@ void HoleCloser::refuse_occupied(std::vector<Filling>& fillings) const {
 }
 
 /// Those of the dragon, whose whiskers leave many, are one in four hundred.
-constexpr std::uint64_t kRims = 100;
+constexpr std::uint64_t kLeastVerticesPerEdge = 100;
 
-/// An open surface has one long rim at least, unless it is so small that its rim is a good part of it.
+/// An open surface has one long boundary loop at least, unless it is so small that its boundary loop is a good part of
+/// it.
 bool HoleCloser::is_closed_thing(std::uint64_t vertices) const {
   std::uint64_t edges = 0;
   for (const auto& [loop, extent] : loops_) edges += extent.edges;
-  return settings_.watertight && stats_.open == 0 && edges * kRims <= vertices;
+  return settings_.watertight && stats_.open == 0 && edges * kLeastVerticesPerEdge <= vertices;
 }
 
 void HoleCloser::fill_rest(std::vector<Filling>& fillings) const {
@@ -168,7 +169,7 @@ void HoleCloser::append(const Loop& loop, const Filling& filling, std::uint64_t 
 }
 
 Addition HoleCloser::finish(std::uint64_t vertices) {
-  RimPiece last;
+  BoundaryBatch last;
   last.edges = std::move(loose_);
   loose_.clear();
   paths_.add(last, 0);
@@ -198,5 +199,5 @@ Addition HoleCloser::finish(std::uint64_t vertices) {
   return out;
 }
 
-}  // namespace holes
+}  // namespace boundary
 }  // namespace lamina

@@ -5,12 +5,12 @@
 #include <utility>
 #include <vector>
 
+#include "boundary/boundary_paths.h"
 #include "boundary/fill.h"
-#include "boundary/rim_paths.h"
 #include "lamina/holes.h"
 #include "meshes/mesh_sink.h"
 
-namespace lamina::holes {
+namespace lamina::boundary {
 
 /// What comes behind a mesh: its triangles name the mesh's vertices, and the new ones behind them.
 struct Addition {
@@ -18,8 +18,8 @@ struct Addition {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
-/// Takes the rims as they are found. Memory: rims that are not closed yet, and closed loops that may be filled.
-/// What comes out depends on the mesh alone, not on the order of the pieces.
+/// Takes the boundary loops as they are found. Memory: boundary loops that are not closed yet, and closed loops that
+/// may be filled. What comes out depends on the mesh alone, not on the order of the batches.
 class HoleCloser {
  public:
   /// `attributes`: of a vertex.
@@ -27,16 +27,16 @@ class HoleCloser {
   HoleCloser(const HoleCloser&) = delete;
   HoleCloser& operator=(const HoleCloser&) = delete;
 
-  /// `first`: the vertex that the piece's numbers count from.
-  void add(const RimPiece& piece, std::uint64_t first = 0);
+  /// `first`: the vertex that the batch's numbers count from.
+  void add(const BoundaryBatch& batch, std::uint64_t first = 0);
   /// The next part of a mesh, its first vertex `first`: its loose edges meet those of the part before.
-  void add_part(const RimPiece& piece, std::uint64_t first);
+  void add_part(const BoundaryBatch& batch, std::uint64_t first);
   /// The mesh, of so many vertices, is complete.
   Addition finish(std::uint64_t vertices);
   [[nodiscard]] const HoleStats& stats() const { return stats_; }
 
  private:
-  void leave(const RimExtent& extent, Verdict why);
+  void leave(const LoopExtent& extent, Verdict why);
   void fill_all(std::vector<Filling>& fillings) const;
   void refuse_occupied(std::vector<Filling>& fillings) const;
   [[nodiscard]] bool is_closed_thing(std::uint64_t vertices) const;
@@ -46,9 +46,9 @@ class HoleCloser {
   HoleSettings settings_;
   std::size_t attributes_;
   HoleStats stats_;
-  std::vector<std::pair<Loop, RimExtent>> loops_;
-  RimPaths paths_;
-  std::vector<RimEdge> loose_;  ///< of the last part, numbers of the mesh
+  std::vector<std::pair<Loop, LoopExtent>> loops_;
+  BoundaryPaths paths_;
+  std::vector<BoundaryEdge> loose_;  ///< of the last part, numbers of the mesh
 };
 
-}  // namespace lamina::holes
+}  // namespace lamina::boundary

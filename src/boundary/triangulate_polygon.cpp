@@ -7,7 +7,7 @@
 
 #include <Eigen/Geometry>
 
-namespace lamina::holes {
+namespace lamina::boundary {
 namespace {
 
 using Vec2 = Eigen::Vector2d;
@@ -224,4 +224,4 @@ void refine_triangles(std::vector<Vec2>& points, std::vector<double>& scale, std
     flip_all(points, triangles, allowed);
 }
 
-}  // namespace lamina::holes
+}  // namespace lamina::boundary

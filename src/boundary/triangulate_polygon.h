@@ -8,7 +8,7 @@
 
 #include <Eigen/Core>
 
-namespace lamina::holes {
+namespace lamina::boundary {
 
 using PlaneTriangle = std::array<std::uint32_t, 3>;
 
@@ -37,4 +37,4 @@ void refine_triangles(std::vector<Eigen::Vector2d>& points, std::vector<double>&
                       std::vector<PlaneTriangle>& triangles,
                       const std::function<bool(std::uint32_t, std::uint32_t)>& allowed);
 
-}  // namespace lamina::holes
+}  // namespace lamina::boundary

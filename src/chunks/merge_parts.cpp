@@ -44,15 +44,15 @@ void require_successive(const std::vector<PartReader>& parts) {
 }
 
 /// What closes the holes of the whole mesh; counts it.
-holes::Addition close_holes(const std::vector<PartReader>& parts, MergedParts& merged) {
+boundary::Addition close_holes(const std::vector<PartReader>& parts, MergedParts& merged) {
   const PartInfo& info = parts.front().info();
-  holes::HoleCloser closer(info.holes, info.attributes.size());
+  boundary::HoleCloser closer(info.holes, info.attributes.size());
   std::uint64_t first = 0;
   for (const PartReader& part : parts) {
-    if (!part.info().span.empty()) closer.add_part(part.read_rims(), first);
+    if (!part.info().span.empty()) closer.add_part(part.read_boundary(), first);
     first += part.info().vertices;
   }
-  holes::Addition addition = closer.finish(first);
+  boundary::Addition addition = closer.finish(first);
   merged.vertices += addition.vertices.size();
   merged.triangles += addition.triangles.size();
   merged.holes = closer.stats();
@@ -159,7 +159,7 @@ MergedParts merge_parts(const std::vector<std::string>& paths, const std::string
   }
   OutputFile file(output, run.tmp_dir);
   const std::uint64_t own_vertices = merged.vertices;
-  const holes::Addition addition = close_holes(parts, merged);
+  const boundary::Addition addition = close_holes(parts, merged);
   const MeshSinkSettings layout = parts.front().info().layout();
   const std::string header = mesh_header(layout, merged.vertices, merged.triangles);
   std::uint64_t bytes = header.size();

@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/scalar_type.h"
-#include "boundary/rim_bytes.h"
+#include "boundary/boundary.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "meshes/streamed_ply.h"
@@ -156,10 +156,10 @@ void PartWriter::begin_block(std::uint64_t kind, std::uint64_t count) {
   put(&count, sizeof count);
 }
 
-void PartWriter::add(const holes::RimPiece& rims) {
+void PartWriter::add(const boundary::BoundaryBatch& rims) {
   if (rims.empty()) return;
   packed_.clear();
-  holes::pack(rims, packed_);
+  boundary::pack(rims, packed_);
   begin_block(kRims, packed_.size());
   put(packed_.data(), packed_.size());
   const std::uint32_t sum = checksum(0, packed_.data(), packed_.size());
@@ -279,10 +279,10 @@ void PartReader::read_triangles(const std::function<void(std::span<const PartTri
   });
 }
 
-holes::RimPiece PartReader::read_rims() const {
+boundary::BoundaryBatch PartReader::read_boundary() const {
   std::vector<std::byte> all;
   read_blocks(kRims, 1, [&](std::span<const std::byte> bytes) { all.insert(all.end(), bytes.begin(), bytes.end()); });
-  return holes::unpack(all);
+  return boundary::unpack(all);
 }
 
 }  // namespace lamina

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/output_file.h"
-#include "boundary/rim.h"
+#include "boundary/boundary.h"
 #include "lamina/holes.h"
 #include "meshes/mesh_sink.h"
 #include "reconstruct/stages.h"
@@ -43,17 +43,17 @@ using PartTriangle = std::array<std::int32_t, 3>;
 /// Writes slab after slab; keeps a megabyte. The file appears with commit().
 ///
 /// Layout, little-endian: 16 bytes that name the format and its version; blocks of a slab's vertices (records of the
-/// final PLY), triangles (PartTriangle) or rims (rim_bytes.h, records of a byte), each as kind and count (8 bytes
-/// both), records, and their CRC-32; at the end the PartInfo as JSON, its length, its CRC-32, and 8 bytes that say that
-/// the file is complete.
+/// final PLY), triangles (PartTriangle) or boundary batches (boundary/boundary.h, records of a byte), each as kind and
+/// count (8 bytes both), records, and their CRC-32; at the end the PartInfo as JSON, its length, its CRC-32, and 8
+/// bytes that say that the file is complete.
 class PartWriter {
  public:
   /// Throws as OutputFile.
   PartWriter(const std::string& path, const MeshSinkSettings& layout);
   /// Throws Error(internal) for numbers that are not finite, Error(budget) when the disk is full.
   void add(const VertexBatch& vertices, std::span<const PartTriangle> triangles);
-  /// What is known of the part's rims (RimFinder of a part).
-  void add(const holes::RimPiece& rims);
+  /// What is known of the boundary of the part (BoundaryFinder of a part).
+  void add(const boundary::BoundaryBatch& rims);
   [[nodiscard]] std::uint64_t vertices() const { return vertices_; }
   [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
   [[nodiscard]] const SlabMark& last() const { return last_; }
@@ -86,8 +86,8 @@ class PartReader {
   /// the end: what was handed over before must not be used then.
   void read_vertices(const std::function<void(std::span<const std::byte>)>& take) const;
   void read_triangles(const std::function<void(std::span<const PartTriangle>)>& take) const;
-  /// All of them at once; in memory goes with the length of the rims.
-  [[nodiscard]] holes::RimPiece read_rims() const;
+  /// All of them at once; in memory goes with the length of the boundary.
+  [[nodiscard]] boundary::BoundaryBatch read_boundary() const;
 
  private:
   void read_blocks(std::uint64_t kind, std::size_t record,

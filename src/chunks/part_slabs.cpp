@@ -48,14 +48,14 @@ void PartSlabs::open() {
   info_.holes = holes_;
   info_.below = previous_;
   first_ = numbered_;
-  finder_ = holes::RimFinder(first_, below_);
+  finder_ = boundary::BoundaryFinder(first_, below_);
 }
 
 void PartSlabs::close() {
   if (!writer_) open();  // no slab of it had surface
-  piece_.clear();
-  finder_.finish(/*more=*/true, piece_);
-  writer_->add(piece_);
+  boundary_.clear();
+  finder_.finish(/*more=*/true, boundary_);
+  writer_->add(boundary_);
   writer_->commit(info_);
   vertices_ += writer_->vertices();
   triangles_ += writer_->triangles();
@@ -75,9 +75,9 @@ void PartSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {
     make_relative(slab.triangles, first_, info_.below.vertices, relative_);
     writer_->add(vertices, relative_);
     previous_ = writer_->last();
-    piece_.clear();
-    finder_.add(vertices, slab.triangles, piece_);
-    writer_->add(piece_);
+    boundary_.clear();
+    finder_.add(vertices, slab.triangles, boundary_);
+    writer_->add(boundary_);
   } else {
     previous_ = mark_of(vertices, layout_);
   }

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "boundary/rim_finder.h"
+#include "boundary/boundary_finder.h"
 #include "chunks/part_file.h"
 #include "reconstruct/mesh_output.h"
 
@@ -42,10 +42,10 @@ class PartSlabs : public SlabSink {
   std::size_t at_ = 0;  ///< part that the next slab may belong to
   std::optional<PartWriter> writer_;
   PartInfo info_;
-  SlabMark previous_;        ///< the slab written last
-  VertexBatch below_;        ///< its vertices
-  holes::RimFinder finder_;  ///< of the part
-  holes::RimPiece piece_;
+  SlabMark previous_;                ///< the slab written last
+  VertexBatch below_;                ///< its vertices
+  boundary::BoundaryFinder finder_;  ///< of the part
+  boundary::BoundaryBatch boundary_;
   std::uint64_t numbered_ = 0;  ///< vertices so far, as the clusterer counts
   std::uint64_t first_ = 0;     ///< number of the part's first vertex
   std::uint64_t vertices_ = 0, triangles_ = 0;

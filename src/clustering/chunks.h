@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstddef>
 
-namespace lamina::cluster {
+namespace lamina::clustering {
 
 /// As many chunks as threads can use, each of at least `least` items.
 inline std::size_t chunk_count(std::size_t items, std::size_t least) {
@@ -27,4 +27,4 @@ void for_chunks(std::size_t items, std::size_t chunks, const Fn& fn) {
                     [&](std::size_t chunk) { fn(chunk, begin_of(chunk), begin_of(chunk + 1)); });
 }
 
-}  // namespace lamina::cluster
+}  // namespace lamina::clustering

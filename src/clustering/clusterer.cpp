@@ -1,19 +1,20 @@
-// The sliding window: each pushed slab moves every stage on by one slab. After push of slab n, slab n - 1 is tallied
-// and sifted, n - 2 decided, n - 3 numbered and finished; of n - 4 only the notes of border triangles are still read.
+// The sliding window: each pushed slab moves every stage on by one slab. After push of slab n, slab n - 1 is counted
+// and classified, n - 2 decided, n - 3 numbered and finished; of n - 4 only the notes of border triangles are still
+// read.
 #include <deque>
 #include <utility>
 
-#include "clustering/cluster.h"
+#include "clustering/classify.h"
+#include "clustering/clusterer.h"
+#include "clustering/count.h"
 #include "clustering/number.h"
 #include "clustering/record.h"
-#include "clustering/sift.h"
-#include "clustering/tally.h"
 
 namespace lamina {
 
-using cluster::SlabRecord;
-using cluster::Verdict;
-using cluster::Window;
+using clustering::SlabRecord;
+using clustering::Verdict;
+using clustering::Window;
 
 struct Clusterer::Impl {
   ClusterSettings settings;
@@ -41,7 +42,7 @@ void Clusterer::Impl::decide(std::int64_t slab) {
       return;
     }
     case ClusterMode::preserving:
-      return cluster::decide(window, slab);
+      return clustering::decide(window, slab);
   }
 }
 
@@ -49,15 +50,15 @@ void Clusterer::Impl::advance(std::shared_ptr<const IsoSlab> iso) {
   const std::int64_t slab = iso->slab;
   // Five records are read: the one before them gives the new one its storage.
   if (slab - 5 >= first) std::swap(window.at(slab), window.at(slab - 5));
-  cluster::lay_out(window.at(slab), std::move(iso));
+  clustering::lay_out(window.at(slab), std::move(iso));
   if (slab - 1 < first) return;
-  cluster::tally(window, slab - 1, settings.mode);
-  if (settings.mode == ClusterMode::preserving) cluster::sift(window, slab - 1);
+  clustering::count_triangles(window, slab - 1, settings.mode);
+  if (settings.mode == ClusterMode::preserving) clustering::classify(window, slab - 1);
   if (slab - 2 < first) return;
   decide(slab - 2);
   if (slab - 3 < first) return;
   FinalSlab out = std::move(spare);
-  cluster::number(window, slab - 3, next_number, out, counts);
+  clustering::number(window, slab - 3, next_number, out, counts);
   finished.push_back(std::move(out));
   window.at(slab - 3).iso.reset();
 }
@@ -70,9 +71,9 @@ Clusterer::~Clusterer() = default;
 void Clusterer::push(std::shared_ptr<const IsoSlab> slab) {
   Impl& impl = *impl_;
   if (!slab) throw Error(ExitCode::internal, "clustering: no surface slab given");
-  if (impl.ended) cluster::bad_slab(slab->slab, "pushed after the end");
+  if (impl.ended) clustering::bad_slab(slab->slab, "pushed after the end");
   if (impl.begun && slab->slab != impl.last + 1) {
-    cluster::bad_slab(slab->slab, "pushed out of order, slab " + std::to_string(impl.last + 1) + " is next");
+    clustering::bad_slab(slab->slab, "pushed out of order, slab " + std::to_string(impl.last + 1) + " is next");
   }
   if (!impl.begun) impl.first = slab->slab;
   impl.begun = true;

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace lamina::cluster {
+namespace lamina::clustering {
 namespace {
 
 template <class T>
@@ -30,7 +30,7 @@ std::size_t used_once(const std::vector<std::uint64_t>& edges) {
 
 }  // namespace
 
-bool collapses(std::span<const StarTriangle> star, std::uint64_t own, PieceScratch& scratch) {
+bool collapses(std::span<const StarTriangle> star, std::uint64_t own, ComponentScratch& scratch) {
   auto& [inner, outer, labels, members, outside] = scratch;
   inner.clear(), outer.clear(), labels.clear(), members.clear(), outside.clear();
   std::size_t full = 0;            // triangles inside K
@@ -66,4 +66,4 @@ bool collapses(std::span<const StarTriangle> star, std::uint64_t own, PieceScrat
   return distinct(members) + full == distinct(inner) + 1;
 }
 
-}  // namespace lamina::cluster
+}  // namespace lamina::clustering

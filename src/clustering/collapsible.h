@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-namespace lamina::cluster {
+namespace lamina::clustering {
 
 /// A triangle that touches the component. A label names a component of any cluster; equal labels, same component.
 struct StarTriangle {
@@ -14,7 +14,7 @@ struct StarTriangle {
 };
 
 /// Storage reused between calls.
-struct PieceScratch {
+struct ComponentScratch {
   std::vector<std::uint64_t> inner_edges, outer_edges, labels;
   std::vector<std::uint32_t> members, outside;
 };
@@ -28,6 +28,6 @@ struct PieceScratch {
 /// - Q: no vertex is met twice around K.
 /// Any set of such components may collapse at once: the preimage of every point is then contractible, so the result is
 /// homeomorphic to the input.
-bool collapses(std::span<const StarTriangle> star, std::uint64_t own, PieceScratch& scratch);
+bool collapses(std::span<const StarTriangle> star, std::uint64_t own, ComponentScratch& scratch);
 
-}  // namespace lamina::cluster
+}  // namespace lamina::clustering

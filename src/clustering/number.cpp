@@ -5,7 +5,7 @@
 #include "base/resize_anew.h"
 #include "clustering/chunks.h"
 
-namespace lamina::cluster {
+namespace lamina::clustering {
 namespace {
 
 constexpr std::size_t kLeastTriangles = 1 << 15;
@@ -66,12 +66,12 @@ void number_corners(SlabRecord& here, Numberer& numberer, ClusterCounts& counts)
       here.seats[c] = collapses ? number : here.seats[c];
       continue;
     }
-    for (Piece& piece : here.hard[here.seats[c]].pieces) {
-      if (!piece.collapses) continue;
+    for (Component& component : here.unresolved[here.seats[c]].components) {
+      if (!component.collapses) continue;
       FinalVertex vertex = at_corner(c);
       vertex.kind = FinalVertex::Kind::patch;
-      vertex.position = piece.position;
-      piece.number = numberer.add(vertex);
+      vertex.position = component.position;
+      component.number = numberer.add(vertex);
       ++patches;
     }
   }
@@ -80,24 +80,24 @@ void number_corners(SlabRecord& here, Numberer& numberer, ClusterCounts& counts)
 }
 
 /// The number of the vertex its cluster collapsed to.
-std::uint32_t collapsed_number(const SlabRecord& owner, std::uint32_t corner, std::uint16_t piece) {
+std::uint32_t collapsed_number(const SlabRecord& owner, std::uint32_t corner, std::uint16_t component) {
   switch (owner.verdicts[corner]) {
     case Verdict::corner:
       return owner.seats[corner];
     case Verdict::split:
-      return owner.hard[owner.seats[corner]].pieces[piece].number;
+      return owner.unresolved[owner.seats[corner]].components[component].number;
     default:
       return kNone;
   }
 }
 
 /// Whether an isovertex of a cluster of `owner` stays a vertex of its own.
-bool stays(const SlabRecord& owner, std::uint32_t corner, std::uint16_t piece) {
+bool stays(const SlabRecord& owner, std::uint32_t corner, std::uint16_t component) {
   switch (owner.verdicts[corner]) {
     case Verdict::kept:
       return true;
     case Verdict::split:
-      return !owner.hard[owner.seats[corner]].pieces[piece].collapses;
+      return !owner.unresolved[owner.seats[corner]].components[component].collapses;
     default:
       return false;
   }
@@ -110,14 +110,14 @@ void number_isovertices(Window& window, std::int64_t slab, Numberer& numberer, C
   for (const std::uint32_t v : below.crossing) {
     VertexNote& note = below.vertices[v];
     const std::uint32_t corner = note.corner & ~SlabIndex::kNextSlab;
-    if (note.number == kNone) note.number = collapsed_number(here, corner, note.piece);
+    if (note.number == kNone) note.number = collapsed_number(here, corner, note.component);
   }
   for (std::size_t v = 0; v < here.vertices.size(); ++v) {
     VertexNote& note = here.vertices[v];
     if (!note.used()) continue;
     const std::uint32_t corner = note.corner & ~SlabIndex::kNextSlab;
     const SlabRecord& owner = note.crossing() ? above : here;
-    if (stays(owner, corner, note.piece)) {
+    if (stays(owner, corner, note.component)) {
       const IsoVertex& iso = here.iso->vertices[v];
       FinalVertex vertex;
       vertex.corner = iso.low;
@@ -126,7 +126,7 @@ void number_isovertices(Window& window, std::int64_t slab, Numberer& numberer, C
       note.number = numberer.append(vertex);
       ++counts.kept_isovertices;
     } else if (!note.crossing()) {
-      note.number = collapsed_number(here, corner, note.piece);
+      note.number = collapsed_number(here, corner, note.component);
     }
   }
 }
@@ -187,9 +187,9 @@ void number(Window& window, std::int64_t slab, std::uint64_t& next_number, Final
   SlabRecord& here = window.at(slab);
   out.slab = slab;
   out.triangles.clear();
-  std::size_t pieces = 0;
-  for (const HardCluster& hard : here.hard) pieces += hard.pieces.size();
-  Numberer numberer(next_number, here.corners.size() + pieces + 1, out);
+  std::size_t components = 0;
+  for (const UnresolvedCluster& cluster : here.unresolved) components += cluster.components.size();
+  Numberer numberer(next_number, here.corners.size() + components + 1, out);
   number_corners(here, numberer, counts);
   number_isovertices(window, slab, numberer, counts);
   next_number = numberer.close();
@@ -197,7 +197,7 @@ void number(Window& window, std::int64_t slab, std::uint64_t& next_number, Final
   emit_inner(here, out);
   counts.corners += static_cast<std::uint64_t>(
       std::count_if(here.verdicts.begin(), here.verdicts.end(), [](Verdict v) { return v != Verdict::absent; }));
-  counts.hard += here.hard.size();
+  counts.resolved += here.unresolved.size();
 }
 
-}  // namespace lamina::cluster
+}  // namespace lamina::clustering

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <map>
 
-namespace lamina::cluster {
+namespace lamina::clustering {
 namespace {
 
 struct PatchTraits : OpenMesh::DefaultTraits {
@@ -80,4 +80,4 @@ Eigen::Vector3d place_patch(std::span<const PatchTriangle> triangles) {
   return mean + shift.cwiseMax(0.5 * low).cwiseMin(0.5 * high);
 }
 
-}  // namespace lamina::cluster
+}  // namespace lamina::clustering

@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-namespace lamina::cluster {
+namespace lamina::clustering {
 
 /// A triangle that touches the component, points relative to the component's corner in steps.
 struct PatchTriangle {
@@ -20,4 +20,4 @@ struct PatchTriangle {
 /// The mean itself where the patch has no area. Depends on the order of `triangles` by rounding only.
 Eigen::Vector3d place_patch(std::span<const PatchTriangle> triangles);
 
-}  // namespace lamina::cluster
+}  // namespace lamina::clustering

@@ -7,11 +7,11 @@
 #include <string>
 #include <vector>
 
-#include "clustering/cluster.h"
+#include "clustering/clusterer.h"
 #include "isosurface/iso_mesh.h"
 #include "lamina/error.h"
 
-namespace lamina::cluster {
+namespace lamina::clustering {
 
 /// Name of an isovertex or a corner inside the window: its slab modulo 8 in the top bits, its index below.
 using Ref = std::uint32_t;
@@ -25,14 +25,14 @@ inline Ref slab_tag(std::int64_t slab) {
 }
 
 struct VertexNote {
-  static constexpr std::uint8_t kUsed = 1;   ///< a triangle names it
-  static constexpr std::uint8_t kThree = 2;  ///< one of its triangles lies in three clusters
-  static constexpr std::uint8_t kHard = 4;   ///< its cluster is hard
-  std::uint32_t corner = 0;                  ///< the cluster's corner, SlabIndex bits relative to the vertex's slab
-  Ref balance = 0;  ///< every neighbour once as successor, once as predecessor, by XOR: 0 unless on a boundary
+  static constexpr std::uint8_t kUsed = 1;        ///< a triangle names it
+  static constexpr std::uint8_t kThree = 2;       ///< one of its triangles lies in three clusters
+  static constexpr std::uint8_t kUnresolved = 4;  ///< its cluster is not resolved yet
+  std::uint32_t corner = 0;  ///< the cluster's corner, SlabIndex bits relative to the vertex's slab
+  Ref balance = 0;           ///< every neighbour once as successor, once as predecessor, by XOR: 0 unless on a boundary
   std::uint8_t marks = 0;
   std::uint8_t direction = 0;    ///< from the corner to the vertex: 2 * axis + (0 up, 1 down)
-  std::uint16_t piece = 0;       ///< which connected component of a hard cluster
+  std::uint16_t component = 0;   ///< which connected component of an unresolved cluster
   std::uint32_t number = kNone;  ///< in the final mesh
 
   [[nodiscard]] bool used() const { return (marks & kUsed) != 0; }
@@ -53,43 +53,44 @@ struct CornerNote {
 };
 
 enum class Verdict : std::uint8_t {
-  absent,  ///< no vertex in the final mesh
-  corner,  ///< collapses to one vertex
-  kept,    ///< its isovertices stay
-  split,   ///< several components, at least one collapses: see HardCluster::pieces
-  hard,    ///< not decided yet
+  absent,      ///< no vertex in the final mesh
+  corner,      ///< collapses to one vertex
+  kept,        ///< its isovertices stay
+  split,       ///< several components, at least one collapses: see UnresolvedCluster::components
+  unresolved,  ///< not decided yet
 };
 
-struct HardTriangle {
+struct ClusterTriangle {
   std::array<Ref, 3> vertex;
 };
 
-/// One connected component of a hard cluster.
-struct Piece {
+/// One connected component of an unresolved cluster.
+struct Component {
   bool collapses = false;
   std::array<float, 3> position{};
   std::uint32_t number = kNone;
 };
 
 /// A cluster the fast test does not accept, with the triangles that touch it.
-struct HardCluster {
+struct UnresolvedCluster {
   std::uint32_t corner = 0;
-  std::uint32_t first = 0, count = 0;  ///< range of SlabRecord::hard_triangles
-  std::vector<Piece> pieces;           ///< in order of their smallest isovertex
+  std::uint32_t first = 0, count = 0;  ///< range of SlabRecord::unresolved_triangles
+  std::vector<Component> components;   ///< in order of their smallest isovertex
 };
 
 struct SlabRecord {
   std::int64_t slab = 0;
   std::shared_ptr<const IsoSlab> iso;
-  std::vector<VertexNote> vertices;     ///< parallel to iso->vertices
-  std::vector<CornerNote> corners;      ///< parallel to iso->corners
-  std::vector<Verdict> verdicts;        ///< parallel to iso->corners
-  std::vector<std::uint8_t> vetoes;     ///< parallel to iso->corners: condition Q fails beside a hard cluster
-  std::vector<std::uint32_t> seats;     ///< parallel: index into `hard` while hard or split, else the final number
+  std::vector<VertexNote> vertices;  ///< parallel to iso->vertices
+  std::vector<CornerNote> corners;   ///< parallel to iso->corners
+  std::vector<Verdict> verdicts;     ///< parallel to iso->corners
+  std::vector<std::uint8_t> vetoes;  ///< parallel to iso->corners: condition Q fails beside an unresolved cluster
+  std::vector<std::uint32_t>
+      seats;  ///< parallel: index into `unresolved` while unresolved or split, else the final number
   std::vector<std::uint32_t> crossing;  ///< vertices that belong to a corner of the next slab
   std::vector<IsoTriangle> border;      ///< triangles that touch the next slab, by a vertex or by its cluster
-  std::vector<HardCluster> hard;
-  std::vector<HardTriangle> hard_triangles;
+  std::vector<UnresolvedCluster> unresolved;
+  std::vector<ClusterTriangle> unresolved_triangles;
 };
 
 /// A ring of slab records; those of the last eight slabs are valid.
@@ -116,4 +117,4 @@ struct Window {
                                       "; this is a defect of the program, please report it with the command line");
 }
 
-}  // namespace lamina::cluster
+}  // namespace lamina::clustering

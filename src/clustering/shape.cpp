@@ -2,7 +2,7 @@
 
 #include <bit>
 
-namespace lamina::cluster {
+namespace lamina::clustering {
 namespace {
 
 constexpr std::size_t kDirections = 6;
@@ -58,4 +58,4 @@ bool plain_shape(const CornerNote& note) {
   return true;
 }
 
-}  // namespace lamina::cluster
+}  // namespace lamina::clustering

@@ -2,7 +2,7 @@
 #pragma once
 #include "clustering/record.h"
 
-namespace lamina::cluster {
+namespace lamina::clustering {
 
 /// For a cluster away from boundaries: true when
 /// - its induced complex is contractible (condition C), and
@@ -13,4 +13,4 @@ namespace lamina::cluster {
 ///   true.
 bool plain_shape(const CornerNote& note);
 
-}  // namespace lamina::cluster
+}  // namespace lamina::clustering

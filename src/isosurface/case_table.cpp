@@ -28,7 +28,7 @@ int edge_index(int axis, const std::array<int, 3>& low) {
   return axis * 4 + low[(axis + 1) % 3] + 2 * low[(axis + 2) % 3];
 }
 
-void walk_face(int positive, int axis, int end, LoopTracer& tracer) {
+void walk_face(int outside, int axis, int end, LoopTracer& tracer) {
   std::vector<FaceCrossing> cycle;
   for (const FaceSide& side : kFaceSides[end]) {
     const int along = (axis + 1 + side.along) % 3;
@@ -36,17 +36,17 @@ void walk_face(int positive, int axis, int end, LoopTracer& tracer) {
     low[axis] = end;
     low[(axis + 2 - side.along) % 3] = side.at;
     const int corner = low[0] + 2 * low[1] + 4 * low[2];
-    const bool at_low = ((positive >> corner) & 1) != 0;
-    const bool at_high = ((positive >> (corner + (1 << along))) & 1) != 0;
+    const bool at_low = ((outside >> corner) & 1) != 0;
+    const bool at_high = ((outside >> (corner + (1 << along))) & 1) != 0;
     if (at_low != at_high) cycle.push_back({edge_key(edge_index(along, low)), side.forward ? at_high : at_low});
   }
   tracer.add_face(cycle);
 }
 
-CaseTriangles make_case(int positive) {
+CaseTriangles make_case(int outside) {
   LoopTracer tracer;
   for (int axis = 0; axis < 3; ++axis) {
-    for (int end = 0; end < 2; ++end) walk_face(positive, axis, end, tracer);
+    for (int end = 0; end < 2; ++end) walk_face(outside, axis, end, tracer);
   }
   tracer.trace();
   CaseTriangles out;

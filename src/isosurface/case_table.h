@@ -10,7 +10,7 @@ namespace lamina {
 struct CaseTriangles {
   static constexpr int kMost = 5;
   std::uint8_t count = 0;                       ///< triangles
-  std::array<std::uint8_t, 3 * kMost> edges{};  ///< three a triangle, counter-clockwise seen from the positive side
+  std::array<std::uint8_t, 3 * kMost> edges{};  ///< three a triangle, counter-clockwise seen from outside
 };
 
 constexpr std::array<int, 3> edge_low_corner(int edge) {
@@ -21,7 +21,7 @@ constexpr std::array<int, 3> edge_low_corner(int edge) {
   return low;
 }
 
-/// Indexed by the mask of positive corners; made from the same face rule as every other cell (LoopTracer).
+/// Indexed by the mask of outside corners; made from the same face rule as every other cell (LoopTracer).
 const std::array<CaseTriangles, 256>& case_table();
 
 }  // namespace lamina

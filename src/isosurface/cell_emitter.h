@@ -1,4 +1,4 @@
-// Triangles of cells that need more than the case table: general cells, and plain ones at the surface's rim.
+// Triangles of cells that need more than the case table: general cells, and plain ones at the surface's boundary.
 #pragma once
 #include <vector>
 

@@ -84,10 +84,10 @@ void find_crossing(const TileView& tile) {
     std::array<std::uint64_t, 3> accepted{};
     const std::uint64_t corners = leaf.corners.words[z];
     if (corners != 0) {
-      const std::array<std::uint64_t, 3> positive = ends(&CornerBlock::positive);
+      const std::array<std::uint64_t, 3> outside = ends(&CornerBlock::outside);
       const std::array<std::uint64_t, 3> held = ends(&CornerBlock::corners);
       for (int axis = 0; axis < 3; ++axis) {
-        change[axis] = (leaf.positive.words[z] ^ positive[axis]) & corners & held[axis];
+        change[axis] = (leaf.outside.words[z] ^ outside[axis]) & corners & held[axis];
       }
     }
     if ((change[0] | change[1] | change[2]) != 0) {
@@ -101,10 +101,11 @@ void find_crossing(const TileView& tile) {
           for (int axis = 0; axis < 3; ++axis) change[axis] &= ~around_edges(axis, split_below, split).any();
         }
       }
-      const std::array<std::uint64_t, 3> valued = ends(&CornerBlock::valued);
-      const std::array<std::uint64_t, 3> carried = ends(&CornerBlock::carried);
+      const std::array<std::uint64_t, 3> defined = ends(&CornerBlock::defined);
+      const std::array<std::uint64_t, 3> supported = ends(&CornerBlock::supported);
       for (int axis = 0; axis < 3; ++axis) {
-        accepted[axis] = change[axis] & leaf.valued.words[z] & valued[axis] & (leaf.carried.words[z] | carried[axis]);
+        accepted[axis] =
+            change[axis] & leaf.defined.words[z] & defined[axis] & (leaf.supported.words[z] | supported[axis]);
       }
     }
     const bool has_edges = (change[0] | change[1] | change[2]) != 0;

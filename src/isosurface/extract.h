@@ -1,5 +1,5 @@
-// Isosurface extraction from the window, slab by slab: crack-free on the unconstrained octree (METHOD 3.5; the rule of
-// docs/method.md "Extraction across levels").
+// Isosurface extraction from the window, slab by slab: crack-free on the unconstrained octree (Cuccuru et al. 2009,
+// section 3.5; the rule of docs/method.md "Extraction across levels").
 #pragma once
 #include <cstdint>
 
@@ -11,7 +11,7 @@ namespace lamina {
 struct ExtractCounts {
   std::uint64_t crossing_cells = 0;      ///< leaf cells the surface passes through
   std::uint64_t general_cells = 0;       ///< of these, beside a subdivided one
-  std::uint64_t rejected_loops = 0;      ///< loops with an invalid isovertex, in cells with valid ones: rims
+  std::uint64_t rejected_loops = 0;      ///< loops with an invalid isovertex, in cells with valid ones: at a boundary
   std::uint64_t separated_vertices = 0;  ///< isovertices duplicated so that each is a single fan
 };
 
@@ -21,7 +21,7 @@ struct ExtractCounts {
 /// for any number of threads; the surface is the same for any height of slabs.
 
 /// Step 1, numbers: finds the minimal edges with a sign change whose lower end lies in the slab, numbers those that are
-/// valid (both ends have a value, at least one is carried by samples around it) and the corners at their ends, and
+/// valid (both ends have a value, at least one is supported by samples around it) and the corners at their ends, and
 /// fills out.corners, out.corner_attributes and out.vertices (what `out` held before is gone, its storage used again).
 /// The octree up to this slab, the signs of its corners and
 /// of the next one's first plane, and the values of its corners must be final. `previous` (null before the first slab)

@@ -79,8 +79,8 @@ void GeneralCell::walk_edge(int level, int axis, const Cell& low, bool forward) 
     known_ = false;  // beside cells that take no part
     return;
   }
-  const bool at_low = cache_->test(level, low, &CornerBlock::positive);
-  const bool at_high = cache_->test(level, high, &CornerBlock::positive);
+  const bool at_low = cache_->test(level, low, &CornerBlock::outside);
+  const bool at_high = cache_->test(level, high, &CornerBlock::outside);
   if (at_low == at_high) return;
   const CornerBlock* block = cache_->block(level, low);
   if (!block->crossing[axis].test(offset_in_block(low))) {

@@ -17,8 +17,8 @@ struct SlabIndex {
   auto operator<=>(const SlabIndex&) const = default;
 };
 
-/// A lattice corner at an end of a minimal edge with a sign change (METHOD 3.5: the cluster's seat). Lengths are in
-/// fixed-point steps of the frame (`Frame::step`), offsets relative to the corner.
+/// A lattice corner at an end of a minimal edge with a sign change (Cuccuru et al. 2009, section 3.5: the cluster's
+/// seat). Lengths are in fixed-point steps of the frame (`Frame::step`), offsets relative to the corner.
 struct SurfaceCorner {
   std::array<std::int32_t, 3> position{};  ///< fixed-point position (x, y, z; z is the sweep axis)
   std::array<float, 3> offset{};           ///< projected point minus corner, in steps
@@ -28,11 +28,11 @@ struct SurfaceCorner {
   float cell = 0;                          ///< edge length of the finest incident cell, in steps
   /// |projected point - weighted average of the samples| / local support radius; negative where that is not trusted and
   /// the value is extended from neighbours, or uncertain. A corner without any value has a zero normal.
-  float reach = -1;
+  float offset_from_mean = -1;
 };
 
 /// An isovertex: a minimal edge whose ends have different signs. Owned by the slab that holds the edge's lower end.
-/// Only valid ones are listed: both ends have a value, at least one is carried by the samples around it. A loop that
+/// Only valid ones are listed: both ends have a value, at least one is supported by the samples around it. A loop that
 /// cannot be triangulated by chords gets a centre vertex: its two corners are any two of the loop's, chosen so that the
 /// point at `t` between them comes close to the loop's mean.
 struct IsoVertex {
@@ -48,7 +48,7 @@ struct IsoVertex {
   std::uint8_t open = 0;
 };
 
-using IsoTriangle = std::array<SlabIndex, 3>;  ///< counter-clockwise seen from outside (positive side)
+using IsoTriangle = std::array<SlabIndex, 3>;  ///< counter-clockwise seen from outside
 
 struct IsoSlab {
   std::int64_t slab = 0;

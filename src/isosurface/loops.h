@@ -29,7 +29,7 @@ constexpr std::uint64_t loop_key(int x, int y, int z) {
 /// A sign change met on the way around a face.
 struct FaceCrossing {
   std::uint64_t key = 0;
-  bool rising = false;  ///< from negative to positive in walking direction
+  bool rising = false;  ///< from inside to outside in walking direction
 };
 
 /// Links the crossings of a cell's faces and reads off the cycles. Reused from cell to cell.
@@ -42,7 +42,7 @@ class LoopTracer {
 
   void clear();
   /// The crossings of one undivided (part of a) face, in walking order: every rising one is linked with the next, so an
-  /// ambiguous face cuts off its positive runs.
+  /// ambiguous face cuts off its outside runs.
   void add_face(std::span<const FaceCrossing> cycle);
   /// Crossings of a face whose signs are not all known: no links.
   void add_unresolved(std::span<const FaceCrossing> cycle);

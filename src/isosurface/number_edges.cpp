@@ -50,10 +50,10 @@ void assign_numbers(const Window& window, const std::vector<TileView>& views, Is
   for (std::vector<float>& a : out.corner_attributes) resize_anew(a, corners);
 }
 
-/// Beyond a rim, and around things thinner than a cell, neighbours' planes lead far away from all samples: the
+/// beyond a boundary, and around things thinner than a cell, neighbours' planes lead far away from all samples: the
 /// projected point of a corner that is not trusted stays near the average of its own samples, where its record leads
 /// (at `cell`).
-void tether(const float* record, float cell, std::array<float, 3>& offset) {
+void clamp_to_samples(const float* record, float cell, std::array<float, 3>& offset) {
   constexpr float kLongest = 0.3F;  // cells
   std::array<float, 3> away{};
   float d2 = 0;
@@ -72,16 +72,16 @@ void tether(const float* record, float cell, std::array<float, 3>& offset) {
 void fill_corners(const Window& window, const TileView& tile, IsoSlab& out) {
   const CornerBlock& leaf = tile.leaf();
   const int attributes = window.attributes();
-  const int brick_layers = window.brick_layers(tile.level);
+  const int slab_layers = window.slab_layers(tile.level);
   const auto size = static_cast<float>(window.lattice().cell_size(tile.level));
   std::vector<float> extra(static_cast<std::size_t>(attributes));
-  std::uint32_t rank = 0;  // in its brick, of the layer's first corner with a value
+  std::uint32_t rank = 0;  // among its slab's values, of the layer's first corner with a value
   for (int z = tile.begin; z < tile.end; ++z) {
-    if (z % brick_layers == 0) rank = 0;
-    const std::uint64_t near = leaf.near.words[z];
-    const std::uint64_t trusted = near & leaf.good.words[z];
+    if (z % slab_layers == 0) rank = 0;
+    const std::uint64_t active = leaf.active.words[z];
+    const std::uint64_t trusted = active & leaf.trusted.words[z];
     const std::uint64_t seen = leaf.seen.words[z];
-    const CornerValues& values = leaf.values[z / brick_layers];
+    const CornerValues& values = leaf.values[z / slab_layers];
     std::uint32_t id = leaf.numbers[z].corner_base;
     for_bits(leaf.surface.words[z], [&](int bit) {
       const Cell cell = tile.cell(z * 64 + bit);
@@ -90,45 +90,46 @@ void fill_corners(const Window& window, const TileView& tile, IsoSlab& out) {
       c.position = window.lattice().position(tile.level, cell);
       c.cell = size;
       CornerValue value;
-      bool valued = true;
+      bool defined = true;
       if ((trusted & one) != 0) {
-        const float* v = values.of(rank + static_cast<std::uint32_t>(std::popcount(near & (one - 1))));
-        value = {v[kDistance], {v[kNormalX], v[kNormalY], v[kNormalZ]}, v[kCurvature], v[kReach]};
+        const float* v = values.of(rank + static_cast<std::uint32_t>(std::popcount(active & (one - 1))));
+        value = {v[kDistance], {v[kNormalX], v[kNormalY], v[kNormalZ]}, v[kCurvature], v[kOffsetFromMean]};
         for (int a = 0; a < attributes; ++a) extra[a] = v[kFirstAttribute + a];
       } else {
-        valued = corner_value(window, tile.level, cell, value, extra.data());
+        defined = corner_value(window, tile.level, cell, value, extra.data());
       }
-      if (valued) {
+      if (defined) {
         for (int i = 0; i < 3; ++i) c.offset[i] = -value.distance * value.normal[i];
-        if ((trusted & one) == 0 && (near & seen & one) != 0) {
-          tether(values.of(rank + static_cast<std::uint32_t>(std::popcount(near & (one - 1)))), size, c.offset);
+        if ((trusted & one) == 0 && (active & seen & one) != 0) {
+          clamp_to_samples(values.of(rank + static_cast<std::uint32_t>(std::popcount(active & (one - 1)))), size,
+                           c.offset);
         }
         c.normal = value.normal;
         c.distance = value.distance;
         c.curvature = value.curvature;
-        c.reach = (trusted & one) != 0 ? value.reach : -1.0F;
+        c.offset_from_mean = (trusted & one) != 0 ? value.offset_from_mean : -1.0F;
       }
-      for (int a = 0; a < attributes; ++a) out.corner_attributes[a][id] = valued ? extra[a] : 0.0F;
+      for (int a = 0; a < attributes; ++a) out.corner_attributes[a][id] = defined ? extra[a] : 0.0F;
       out.corners[id++] = c;
     });
-    rank += static_cast<std::uint32_t>(std::popcount(near));
+    rank += static_cast<std::uint32_t>(std::popcount(active));
   }
 }
 
 /// Where the surface meets an edge. Signs are settled; distances that contradict them (or are missing) only say that
 /// it is somewhere between.
-float edge_fraction(const SurfaceCorner& low, const SurfaceCorner& high, bool low_positive) {
+float edge_fraction(const SurfaceCorner& low, const SurfaceCorner& high, bool low_outside) {
   constexpr std::array<float, 3> kNone{};
   constexpr float kMargin = 0.01F;  // isovertices stay distinct points
   const auto unknown = [&](const SurfaceCorner& c) { return c.distance == 0 && c.normal == kNone; };
   if (unknown(low) || unknown(high)) return 0.5F;
-  if ((low.distance >= 0) != low_positive || (high.distance >= 0) == low_positive) return 0.5F;
+  if ((low.distance >= 0) != low_outside || (high.distance >= 0) == low_outside) return 0.5F;
   return std::clamp(low.distance / (low.distance - high.distance), kMargin, 1.0F - kMargin);
 }
 
 /// Completes a vertex whose ends are both known.
-void place(IsoVertex& v, const SurfaceCorner& low, const SurfaceCorner& high, bool low_positive) {
-  v.t = edge_fraction(low, high, low_positive);
+void place(IsoVertex& v, const SurfaceCorner& low, const SurfaceCorner& high, bool low_outside) {
+  v.t = edge_fraction(low, high, low_outside);
   v.near_high = v.t > 0.5F;
 }
 
@@ -162,7 +163,7 @@ class Numbering {
       IsoVertex& v = previous.vertices[id++];
       const std::uint32_t high = corner_number(tile, &tile.leaf(), tile.begin * 64 + bit, {0, 0, 0});
       v.high.bits = high | SlabIndex::kNextSlab;
-      place(v, previous.corners[v.low.index()], slab_.corners[high], below->positive.test(z * 64 + bit));
+      place(v, previous.corners[v.low.index()], slab_.corners[high], below->outside.test(z * 64 + bit));
     });
   }
 
@@ -197,7 +198,7 @@ class Numbering {
         const bool leaves = (offset & kLast) == kLast;
         v.high.bits = leaves ? corner_number(tile, next, offset - kLast, kBeyond)
                              : corner_number(tile, &leaf, offset + kStep, {0, 0, 0});
-        place(v, slab_.corners[v.low.index()], slab_.corners[v.high.index()], leaf.positive.test(offset));
+        place(v, slab_.corners[v.low.index()], slab_.corners[v.high.index()], leaf.outside.test(offset));
       }
       slab_.vertices[id++] = v;
     });

@@ -123,12 +123,12 @@ std::uint64_t invalid_edges(const CornerBlock& b, int axis, int z) {
 
 /// Signs of one plane of corners as a layer's cells need them: at (x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1).
 struct Plane {
-  std::array<std::uint64_t, 4> positive{};
+  std::array<std::uint64_t, 4> outside{};
 
   Plane() = default;
   Plane(const TileView& tile, int z) {
-    const Corner4 c(tile, z, [](const CornerBlock& b, int layer) { return b.positive.words[layer]; });
-    positive = {c.here, c.next_column(), c.next_row(), c.next_both()};
+    const Corner4 c(tile, z, [](const CornerBlock& b, int layer) { return b.outside.words[layer]; });
+    outside = {c.here, c.next_column(), c.next_row(), c.next_both()};
   }
 };
 
@@ -178,31 +178,31 @@ class TilePass {
     for (int z = tile.begin; z < tile.end; ++z) {
       const Plane above(tile, z + 1);
       const std::uint64_t cells = leaf.cells.words[z];
-      const std::uint64_t all = below.positive[0] & below.positive[1] & below.positive[2] & below.positive[3] &
-                                above.positive[0] & above.positive[1] & above.positive[2] & above.positive[3];
-      const std::uint64_t any = below.positive[0] | below.positive[1] | below.positive[2] | below.positive[3] |
-                                above.positive[0] | above.positive[1] | above.positive[2] | above.positive[3];
+      const std::uint64_t all = below.outside[0] & below.outside[1] & below.outside[2] & below.outside[3] &
+                                above.outside[0] & above.outside[1] & above.outside[2] & above.outside[3];
+      const std::uint64_t any = below.outside[0] | below.outside[1] | below.outside[2] | below.outside[3] |
+                                above.outside[0] | above.outside[1] | above.outside[2] | above.outside[3];
       const std::uint64_t hanging = tile.level == 0 || cells == 0 ? 0 : cells & beside_split(tile, z);
       const std::uint64_t general = hanging == 0 ? 0 : hanging & beside_busy(tile, z);
       std::uint64_t mixed = cells & any & ~all & ~hanging;
-      std::uint64_t rim = 0;
+      std::uint64_t partial = 0;
       if (mixed != 0 && (doubtful & (3U << z)) != 0) {
         // Most cells with an invalid isovertex have nothing else: the far ends of what samples reach.
-        rim = mixed & cells_with(tile, z, invalid_edges);
-        mixed &= ~rim | cells_with(tile, z, valid_edges);
-        rim &= mixed;
+        partial = mixed & cells_with(tile, z, invalid_edges);
+        mixed &= ~partial | cells_with(tile, z, valid_edges);
+        partial &= mixed;
       }
-      if ((mixed & ~rim) != 0) {
+      if ((mixed & ~partial) != 0) {
         for (loaded = std::max(loaded, z); loaded <= z + 1; ++loaded) load_edges(tile, loaded);
       }
-      emit_layer(tile, z, below, above, {general, mixed, rim}, out);
+      emit_layer(tile, z, below, above, {general, mixed, partial}, out);
       below = above;
     }
   }
 
  private:
   struct Kinds {
-    std::uint64_t general, mixed, rim;
+    std::uint64_t general, mixed, partial;
   };
 
   void load_edges(const TileView& tile, int z) {
@@ -212,7 +212,7 @@ class TilePass {
 
   void emit_layer(const TileView& tile, int z, const Plane& below, const Plane& above, const Kinds& kinds,
                   TriangleRun& out) {
-    const std::uint64_t special = kinds.general | kinds.rim;
+    const std::uint64_t special = kinds.general | kinds.partial;
     IsoTriangle* end = layer_.data();  // of the plain triangles since the last special cell
     const auto flush = [&] {
       out.triangles.insert(out.triangles.end(), layer_.data(), end);
@@ -228,8 +228,8 @@ class TilePass {
       }
       unsigned signs = 0;
       for (int i = 0; i < 4; ++i) {
-        signs |= static_cast<unsigned>((below.positive[i] >> bit) & 1U) << i;
-        signs |= static_cast<unsigned>((above.positive[i] >> bit) & 1U) << (i + 4);
+        signs |= static_cast<unsigned>((below.outside[i] >> bit) & 1U) << i;
+        signs |= static_cast<unsigned>((above.outside[i] >> bit) & 1U) << (i + 4);
       }
       const PlainCase& c = (*cases_)[signs];
       const int base = EdgeNumbers::offset(0, bit & 7, bit >> 3, z);

@@ -18,7 +18,7 @@ constexpr float kBeyond = 1;  ///< voxels outside of the band that tell the side
 
 /// What a corner's value says in a channel of the window; attributes lie behind.
 float channel_of(const CornerValue& v, const std::vector<float>& attributes, int channel) {
-  if (channel == kReach) return v.reach;
+  if (channel == kOffsetFromMean) return v.offset_from_mean;
   if (channel == kCurvature) return v.curvature;
   return attributes[static_cast<std::size_t>(channel - kFirstAttribute)];
 }
@@ -69,7 +69,7 @@ void Band::collect_level(const Window& window, std::int32_t slab) {
   for (const Tile& t : window.tiles(level, slab)) {
     const int begin = std::max(0, first - t.block.z * 8), end = std::min(8, begin + lattice_.layers(level));
     std::uint64_t any = 0;
-    for (int z = begin; z < end; ++z) any |= t.leaf->valued.words[z];
+    for (int z = begin; z < end; ++z) any |= t.leaf->defined.words[z];
     if (any != 0) jobs.push_back({t.leaf, &bricks_.touch(t.block), begin, end});
   }
   const float per_voxel = 1.0F / static_cast<float>(lattice_.cell_size(level));
@@ -77,16 +77,16 @@ void Band::collect_level(const Window& window, std::int32_t slab) {
   tbb::parallel_for(std::size_t{0}, jobs.size(), [&](std::size_t j) {
     const auto [leaf, brick, begin, end] = jobs[j];
     for (int z = begin; z < end; ++z) {
-      brick->repaired.words[z] = leaf->valued.words[z] & ~leaf->good.words[z];
-      const CornerValues& values = leaf->values[window.brick_of(level, z)];
+      brick->repaired.words[z] = leaf->defined.words[z] & ~leaf->trusted.words[z];
+      const CornerValues& values = leaf->values[window.slab_in_leaf(level, z)];
       if (values.count == 0) continue;
-      const std::uint32_t base = leaf->value_index(z * 64, window.brick_layers(level));
-      const std::uint64_t near = leaf->near.words[z];
+      const std::uint32_t base = leaf->value_index(z * 64, window.slab_layers(level));
+      const std::uint64_t active = leaf->active.words[z];
       LayerMasks masks(0, growth);
-      for (std::uint64_t w = leaf->good.words[z] & leaf->valued.words[z]; w != 0; w &= w - 1) {
+      for (std::uint64_t w = leaf->trusted.words[z] & leaf->defined.words[z]; w != 0; w &= w - 1) {
         const int bit = std::countr_zero(w), at = z * 64 + bit;
         const std::uint32_t i =
-            base + static_cast<std::uint32_t>(std::popcount(near & ((std::uint64_t{1} << bit) - 1)));
+            base + static_cast<std::uint32_t>(std::popcount(active & ((std::uint64_t{1} << bit) - 1)));
         const Plane plane{values.channel(kNormalX)[i], values.channel(kNormalX + 1)[i], values.channel(kNormalX + 2)[i],
                           values.channel(kDistance)[i] * per_voxel};
         brick->plane[at] = plane;
@@ -124,7 +124,7 @@ void Band::collect_finer(const Window& window, std::int32_t slab, int level) {
     std::vector<float> attributes(static_cast<std::size_t>(window.attributes()));
     for (int z = std::max(first, 0); z < std::min(8, first + lattice_.layers(level)); ++z) {
       if (((t.block.z * 8 + z) & mask) != 0) continue;
-      for (std::uint64_t w = t.leaf->valued.words[z]; w != 0; w &= w - 1) {
+      for (std::uint64_t w = t.leaf->defined.words[z]; w != 0; w &= w - 1) {
         const int bit = std::countr_zero(w);
         const Cell corner{t.block.x * 8 + (bit & 7), t.block.y * 8 + (bit >> 3), t.block.z * 8 + z};
         if (((corner.x | corner.y) & mask) != 0) continue;
@@ -161,10 +161,10 @@ void Band::collect_coarser(const Window& window, std::int32_t slab, int level) {
       for (std::uint64_t w = t.leaf->cells.words[z]; w != 0; w &= w - 1) {
         const int bit = std::countr_zero(w);
         const Cell cell{t.block.x * 8 + (bit & 7), t.block.y * 8 + (bit >> 3), t.block.z * 8 + z};
-        // The surface crosses a cell only between valued corners; far from it none is trusted.
-        int trusted = 0, valued = 0;
+        // The surface crosses a cell only between defined corners; far from it none is trusted.
+        int trusted = 0, defined = 0;
         for (int k = 0; k < 8; ++k)
-          trusted += cache.test(level, cell + Cell{k & 1, k >> 1 & 1, k >> 2}, &CornerBlock::good);
+          trusted += cache.test(level, cell + Cell{k & 1, k >> 1 & 1, k >> 2}, &CornerBlock::trusted);
         if (trusted == 0) continue;
         std::array<bool, 8> has{};
         float nearest = farthest;
@@ -174,11 +174,11 @@ void Band::collect_coarser(const Window& window, std::int32_t slab, int level) {
           if (!has[k]) continue;
           nearest = std::min(nearest, std::abs(corners[k].distance) * per_voxel);
           if (nearest >= farthest) break;
-          ++valued;
+          ++defined;
           extras[k].clear();
           for (const int c : settings_.channels) extras[k].push_back(channel_of(corners[k], attributes, c));
         }
-        if (valued < 4 || nearest >= farthest) continue;
+        if (defined < 4 || nearest >= farthest) continue;
         for (int v = 0; v < side * side * side; ++v) {
           const std::array<int, 3> in{v & (side - 1), v >> shift & (side - 1), v >> (2 * shift)};
           Found f{{(cell.x << shift) + in[0], (cell.y << shift) + in[1], (cell.z << shift) + in[2]}, 0, {}, {}};
@@ -202,7 +202,7 @@ void Band::collect_coarser(const Window& window, std::int32_t slab, int level) {
           if (!(total > 0)) continue;
           // Values between corners lie outside of a curved surface's distance by as much as the corners' planes lie
           // inside; corners without a value have no say in either, which only the planes can bear.
-          f.distance = (valued == 8 ? 0.5F * (values + planes) : planes) / total;
+          f.distance = (defined == 8 ? 0.5F * (values + planes) : planes) / total;
           for (float& e : f.extra) e /= total;
           const float length = std::hypot(f.normal[0], f.normal[1], f.normal[2]);
           if (!(length > 1e-3F) || !(std::abs(f.distance) < limit)) continue;

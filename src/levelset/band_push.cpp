@@ -24,11 +24,11 @@ template <class Reached>
 void push(std::span<const Pusher> pushers, std::size_t channels, Sums& sums) {
   for (const Pusher& p : pushers) {
     const Plane plane = p.from->plane[p.at];
-    add(p, plane, Reach(plane), channels, sums);
+    add(p, plane, QueryLayers(plane), channels, sums);
   }
 }
 
-/// Pairs as Reach has them, 16 floats for each axis.
+/// Pairs as QueryLayers has them, 16 floats for each axis.
 struct WidePairs {
   alignas(64) std::array<float, 16> x{}, y{}, z{}, room{};
 };
@@ -61,8 +61,8 @@ struct Said {
   std::array<float, kMost> up, weight;
 };
 
-/// Reach with all pairs at once: the same operations in the same order. First what is said, then the sums: how many
-/// there are to each pusher cannot be foretold.
+/// QueryLayers with all pairs at once: the same operations in the same order. First what is said, then the sums: how
+/// many there are to each pusher cannot be foretold.
 [[gnu::target("avx512f,popcnt")]] void push_few(std::span<const Pusher> pushers, std::size_t channels, Sums& sums) {
   Said said;
   std::array<Plane, kFew> planes;

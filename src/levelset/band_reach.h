@@ -74,14 +74,14 @@ inline float weight_of(float near) {
 }
 
 /// What a voxel says to those around it.
-struct Reach {
+struct QueryLayers {
   /// The pairs of which one is reached, and whether it is the one behind.
   std::uint32_t pairs = 0, behind = 0;
   /// By pair: the way to the one behind along the normal, and what kSideways leaves.
   alignas(16) std::array<float, std::size_t{4} * kFours> up, near;
 
   /// Away from the surface only: what lies towards it is a hole in the data, not a part of the band.
-  explicit Reach(const Plane& plane) {
+  explicit QueryLayers(const Plane& plane) {
     const auto signs = [](const Plane& four) {
       return static_cast<std::uint32_t>(_mm_movemask_ps(std::bit_cast<__m128>(four)));
     };

@@ -41,7 +41,7 @@ std::vector<ExtraGrid> resolve_grids(const std::vector<std::string>& names, cons
                      {attribute(*red), attribute(*green), attribute(*blue)},
                      1 / full_range(layout[*red].type)});
     } else if (name == "weight") {
-      out.push_back({name, ExtraGrid::Kind::weight, {channel(kReach)}, 1});
+      out.push_back({name, ExtraGrid::Kind::weight, {channel(kOffsetFromMean)}, 1});
     } else if (name == "curvature") {
       out.push_back({name, ExtraGrid::Kind::scalar, {channel(kCurvature)}, static_cast<float>(1 / step)});
     } else if (const auto i = find_attribute(layout, name)) {

@@ -25,18 +25,18 @@ Place beside(const Place& p, int dx, int dy, int dz) {
   return {p.block->around[CornerBlock::towards(x >> 3, y >> 3, z >> 3)], BlockMask::offset(x & 7, y & 7, z & 7)};
 }
 
-/// Own value; the corner must be near and its slab projected.
+/// Own value; the corner must be active and its slab projected.
 void own_value(const Window& window, int level, const Place& p, CornerValue& out, float* attributes, float weight) {
-  const CornerValues& values = p.block->values[window.brick_of(level, p.offset >> 6)];
-  const std::uint32_t i = p.block->value_index(p.offset, window.brick_layers(level));
+  const CornerValues& values = p.block->values[window.slab_in_leaf(level, p.offset >> 6)];
+  const std::uint32_t i = p.block->value_index(p.offset, window.slab_layers(level));
   const float* const v = values.of(i);
-  out = {v[kDistance], {v[kNormalX], v[kNormalY], v[kNormalZ]}, v[kCurvature], v[kReach]};
+  out = {v[kDistance], {v[kNormalX], v[kNormalY], v[kNormalZ]}, v[kCurvature], v[kOffsetFromMean]};
   if (attributes == nullptr) return;
   for (int c = 0; c < window.attributes(); ++c) attributes[c] += weight * v[kFirstAttribute + c];
 }
 
 bool has_values(const Window& window, int level, const Place& p) {
-  return p.block->values[window.brick_of(level, p.offset >> 6)].count != 0;
+  return p.block->values[window.slab_in_leaf(level, p.offset >> 6)].count != 0;
 }
 
 }  // namespace
@@ -48,7 +48,7 @@ bool corner_value(const Window& window, int level, const Cell& corner, CornerVal
     return corner_value(window, finer.level, finer.corner, out, attributes);
   }
   for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] = 0;
-  if (here.block->good.test(here.offset) && has_values(window, level, here)) {
+  if (here.block->trusted.test(here.offset) && has_values(window, level, here)) {
     own_value(window, level, here, out, attributes, 1);
     return true;
   }
@@ -61,7 +61,7 @@ bool corner_value(const Window& window, int level, const Cell& corner, CornerVal
         const int m = (dx != 0) + (dy != 0) + (dz != 0);
         if (m == 0) continue;
         const Place p = beside(here, dx, dy, dz);
-        if (p.block == nullptr || !p.block->good.test(p.offset) || !has_values(window, level, p)) continue;
+        if (p.block == nullptr || !p.block->trusted.test(p.offset) || !has_values(window, level, p)) continue;
         const float w = 1.0F / static_cast<float>(m * m);
         CornerValue v;
         own_value(window, level, p, v, attributes, w);
@@ -75,7 +75,7 @@ bool corner_value(const Window& window, int level, const Cell& corner, CornerVal
     }
   }
   if (total <= 0) {
-    if (!here.block->valued.test(here.offset) || !here.block->seen.test(here.offset)) return false;
+    if (!here.block->defined.test(here.offset) || !here.block->seen.test(here.offset)) return false;
     own_value(window, level, here, out, attributes, 1);
     return true;
   }
@@ -86,7 +86,7 @@ bool corner_value(const Window& window, int level, const Cell& corner, CornerVal
   out.distance = sum.distance * inv;
   for (int k = 0; k < 3; ++k) out.normal[k] = sum.normal[k] / length;
   out.curvature = sum.curvature * inv;
-  out.reach = 0;
+  out.offset_from_mean = 0;
   for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] *= inv;
   return true;
 }

@@ -48,7 +48,7 @@ Leaf leaf_in_octant(BlockCache& cache, int level, const Cell& corner, int octant
 /// One mean of centres' values at a corner.
 struct Mean {
   float weight = 0;
-  float distance = 0, curvature = 0, reach = 0;
+  float distance = 0, curvature = 0, offset_from_mean = 0;
   std::array<float, 3> normal{};
 };
 
@@ -67,7 +67,7 @@ void add(const Window& window, const Leaf& leaf, const float* v, int corner_leve
   mean.weight += w;
   mean.distance += w * (v[kDistance] + along + 0.5F * v[kCurvature] * across);
   mean.curvature += w * v[kCurvature];
-  mean.reach += w * v[kReach];
+  mean.offset_from_mean += w * v[kOffsetFromMean];
   for (int k = 0; k < 3; ++k) mean.normal[k] += w * n[k];
   for (int c = 0; c < window.attributes(); ++c) attributes[c] += w * v[kFirstAttribute + c];
 }
@@ -84,7 +84,7 @@ void diffuse_corner(BlockCache& cache, int level, const Cell& corner, CornerBloc
     if (l.level < 0 || std::find(leaves.begin(), leaves.begin() + count, l) != leaves.begin() + count) continue;
     const CornerBlock* block = cache.block(l.level, l.cell);
     if (block->centres == nullptr || !block->centres->seen.test(offset_in_block(l.cell))) continue;
-    trusted = trusted || block->centres->good.test(offset_in_block(l.cell));
+    trusted = trusted || block->centres->trusted.test(offset_in_block(l.cell));
     centres[count] = block->centres.get();
     leaves[count++] = l;
   }
@@ -93,9 +93,9 @@ void diffuse_corner(BlockCache& cache, int level, const Cell& corner, CornerBloc
   for (int k = 0; k < count; ++k) {
     const Projected& from = *centres[k];
     const int o = offset_in_block(leaves[k].cell);
-    if (trusted && !from.good.test(o)) continue;
-    const CornerValues& values = from.values[window.brick_of(leaves[k].level, o >> 6)];
-    add(window, leaves[k], values.of(from.value_index(o, window.brick_layers(leaves[k].level))), level, corner, mean,
+    if (trusted && !from.trusted.test(o)) continue;
+    const CornerValues& values = from.values[window.slab_in_leaf(leaves[k].level, o >> 6)];
+    add(window, leaves[k], values.of(from.value_index(o, window.slab_layers(leaves[k].level))), level, corner, mean,
         attributes.data());
   }
   const float length =
@@ -108,11 +108,11 @@ void diffuse_corner(BlockCache& cache, int level, const Cell& corner, CornerBloc
   v[kNormalY] = mean.normal[1] / length;
   v[kNormalZ] = mean.normal[2] / length;
   v[kCurvature] = mean.curvature * inv;
-  v[kReach] = mean.reach * inv;
+  v[kOffsetFromMean] = mean.offset_from_mean * inv;
   for (int c = 0; c < window.attributes(); ++c) v[kFirstAttribute + c] = attributes[static_cast<std::size_t>(c)] * inv;
   leaf.seen.set(offset);
-  leaf.positive.assign(offset, mean.distance >= 0);
-  if (trusted) leaf.good.set(offset);
+  leaf.outside.assign(offset, mean.distance >= 0);
+  if (trusted) leaf.trusted.set(offset);
 }
 
 }  // namespace
@@ -126,12 +126,12 @@ void diffuse_slab(Window& window, std::int32_t slab) {
       const int begin = std::max(first, 0);
       const int end = std::min(8, first + window.lattice().layers(level));
       if (!allocate_values(window, level, *t.leaf, begin, end)) return;
-      CornerValues& values = t.leaf->values[window.brick_of(level, begin)];
+      CornerValues& values = t.leaf->values[window.slab_in_leaf(level, begin)];
       BlockCache cache(window);
       std::vector<float> attributes;
       std::uint32_t at = 0;
       for (int z = begin; z < end; ++z) {
-        for (std::uint64_t w = t.leaf->near.words[z]; w != 0; w &= w - 1, ++at) {
+        for (std::uint64_t w = t.leaf->active.words[z]; w != 0; w &= w - 1, ++at) {
           const int bit = std::countr_zero(w);
           if (((t.leaf->shared.words[z] >> bit) & 1U) != 0) continue;
           const Cell corner{t.block.x * 8 + (bit & 7), t.block.y * 8 + (bit >> 3), t.block.z * 8 + z};

@@ -11,8 +11,8 @@ namespace lamina {
 
 inline constexpr int kLanes = 8;
 
-/// Running sums at a query point x (METHOD 3.2), positions relative to x, lengths in cells of the level.
-/// With w = weight * max(0, 1 - |p - x|^2 / R^2)^4:
+/// Running sums at a query point x (Cuccuru et al. 2009, section 3.2), positions relative to x, lengths in cells of the
+/// level. With w = weight * max(0, 1 - |p - x|^2 / R^2)^4:
 enum Sum : int {
   kW = 0,  ///< sum w
   kPx,     ///< sum w p
@@ -63,10 +63,10 @@ struct FitInput {
 
 /// The fit at eight corners, lengths in cells.
 struct FitOutput {
-  Lanes distance;    ///< signed distance of the corner
-  Lanes nx, ny, nz;  ///< unit normal at the projected point; zero where there is none
-  Lanes curvature;   ///< signed, 1 / cell
-  Lanes reach;       ///< |projected point - weighted average| / local support
+  Lanes distance;          ///< signed distance of the corner
+  Lanes nx, ny, nz;        ///< unit normal at the projected point; zero where there is none
+  Lanes curvature;         ///< signed, 1 / cell
+  Lanes offset_from_mean;  ///< |projected point - weighted average| / local support
 };
 
 /// Trusted corners of a tile and one corner around it, dense: [z + 1][y + 1][x + 1] with rows of kRow floats; zero
@@ -83,8 +83,8 @@ struct CornerField {
 /// What the trusted ones among 26 neighbours say about eight corners, a bit each. Weights are 1 / m^2, m = L1 offset in
 /// cells.
 struct Extension {
-  std::uint8_t positive;    ///< the weighted sum of the neighbours' planes' distances is not negative
-  std::uint8_t valued;      ///< there are trusted neighbours
+  std::uint8_t outside;     ///< the weighted sum of the neighbours' planes' distances is not negative
+  std::uint8_t defined;     ///< there are trusted neighbours
   std::uint8_t surrounded;  ///< and their weighted mean lies near the corner, measured along the surface
 };
 
@@ -96,9 +96,9 @@ struct Kernel {
   void (*accumulate_facing)(const TileSamples&, const SampleRange* ranges, int count, const Queries&,
                             const Queries& facing, Lanes* sums);
   void (*fit)(const Lanes* sums, const FitInput&, FitOutput&);
-  /// Extends trusted neighbours' planes to the eight corners of row (y, z) of a tile. `cell` in steps; `near`: squared
-  /// distance in cells up to which a corner is surrounded.
-  Extension (*extend)(const CornerField&, int y, int z, float cell, float near);
+  /// Extends trusted neighbours' planes to the eight corners of row (y, z) of a tile. `cell` in steps; `active`:
+  /// squared distance in cells up to which a corner is surrounded.
+  Extension (*extend)(const CornerField&, int y, int z, float cell, float surrounded2);
 };
 
 /// Kernels this processor can run, best last.

@@ -256,14 +256,14 @@ inline void fit(const Lanes* sums, const FitInput& in, FitOutput& out) {
   const Vec rx = yx - d * nx - ax;
   const Vec ry = yy - d * ny - ay;
   const Vec rz = yz - d * nz - az;
-  const Vec reach = root(rx * rx + ry * ry + rz * rz) / (w > zero ? support : one);
+  const Vec offset = root(rx * rx + ry * ry + rz * rz) / (w > zero ? support : one);
   const auto ok = (w > zero) & (g2 > tiny);
   vec(out.distance) = ok ? d : zero;
   vec(out.nx) = ok ? nx : zero;
   vec(out.ny) = ok ? ny : zero;
   vec(out.nz) = ok ? nz : zero;
   vec(out.curvature) = ok ? two * u4 / scale : zero;
-  vec(out.reach) = ok ? reach : zero;
+  vec(out.offset_from_mean) = ok ? offset : zero;
 }
 
 /// A bit for every lane where a comparison holds.
@@ -285,7 +285,7 @@ inline Triple triple(const float* p) {
   return {load(p), low + high, high - low};
 }
 
-inline Extension extend(const CornerField& f, int y, int z, float cell, float near) {
+inline Extension extend(const CornerField& f, int y, int z, float cell, float surrounded2) {
   const Vec zero = splat(0.0F);
   Vec s = zero;
   Vec w = zero;
@@ -328,5 +328,5 @@ inline Extension extend(const CornerField& f, int y, int z, float cell, float ne
   const Vec along = ox * nx + oy * ny + oz * nz;
   const Vec n2_or_one = n2 > zero ? n2 : splat(1.0F);
   const Vec aside = (ox * ox + oy * oy + oz * oz - along * along / n2_or_one) / (any * any);
-  return {lanes(s >= zero), lanes(w > zero), lanes((w > zero) & (aside <= splat(near)))};
+  return {lanes(s >= zero), lanes(w > zero), lanes((w > zero) & (aside <= splat(surrounded2)))};
 }

@@ -24,21 +24,22 @@ struct Projector::Scratch {
     TileFit fit;
   };
   tbb::enumerable_thread_specific<Local> local;
-  std::map<std::size_t, std::shared_ptr<const ClumpedBucket>> clumped;  ///< by number of the bucket
+  std::map<std::size_t, std::shared_ptr<const ClusteredBucket>> clustered;  ///< by number of the bucket
 
-  /// The buckets of a batch in clumps; kept for the next levels, steps and slabs while they are few.
-  ClumpedBatch load(const std::vector<std::size_t>& batch, SampleFeed& feed, const Lattice& lattice);
+  /// The buckets of a batch in clusters; kept for the next levels, steps and slabs while they are few.
+  ClusteredBatch load(const std::vector<std::size_t>& batch, SampleFeed& feed, const Lattice& lattice);
 };
 
-ClumpedBatch Projector::Scratch::load(const std::vector<std::size_t>& batch, SampleFeed& feed, const Lattice& lattice) {
+ClusteredBatch Projector::Scratch::load(const std::vector<std::size_t>& batch, SampleFeed& feed,
+                                        const Lattice& lattice) {
   constexpr std::size_t kKeep = std::size_t{1} << 19;  // samples
-  ClumpedBatch out(batch.size());
+  ClusteredBatch out(batch.size());
   std::vector<std::size_t> missing;
   std::size_t kept = 0;
-  for (const auto& [number, bucket] : clumped) kept += bucket->x.size();
+  for (const auto& [number, bucket] : clustered) kept += bucket->x.size();
   for (std::size_t b = 0; b < batch.size(); ++b) {
-    const auto known = clumped.find(batch[b]);
-    if (known == clumped.end()) {
+    const auto known = clustered.find(batch[b]);
+    if (known == clustered.end()) {
       missing.push_back(b);
     } else {
       out[b] = known->second;
@@ -49,11 +50,11 @@ ClumpedBatch Projector::Scratch::load(const std::vector<std::size_t>& batch, Sam
   for (const std::size_t b : missing) numbers.push_back(batch[b]);
   const Batch loaded = feed.load(numbers);
   tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t m) {
-    out[missing[m]] = std::make_shared<const ClumpedBucket>(clump(*loaded[m], lattice));
+    out[missing[m]] = std::make_shared<const ClusteredBucket>(cluster_samples(*loaded[m], lattice));
   });
   for (const std::size_t b : missing) {
     kept += out[b]->x.size();
-    if (kept <= kKeep) clumped.emplace(batch[b], out[b]);
+    if (kept <= kKeep) clustered.emplace(batch[b], out[b]);
   }
   return out;
 }
@@ -74,11 +75,11 @@ std::vector<Work> list_work(Window& window, int level, std::int32_t slab, bool c
       if (any == 0) continue;
       if (t.leaf->centres == nullptr) t.leaf->centres = std::make_shared<Projected>();
       w.points = t.leaf->centres.get();
-      for (int z = w.begin; z < w.end; ++z) w.points->near.words[z] = t.leaf->cells.words[z] & close[z];
+      for (int z = w.begin; z < w.end; ++z) w.points->active.words[z] = t.leaf->cells.words[z] & close[z];
     }
-    std::uint64_t near = 0;
-    for (int z = w.begin; z < w.end; ++z) near |= w.points->near.words[z];
-    if (near != 0) work.push_back(w);
+    std::uint64_t active = 0;
+    for (int z = w.begin; z < w.end; ++z) active |= w.points->active.words[z];
+    if (active != 0) work.push_back(w);
   }
   return work;
 }
@@ -101,19 +102,19 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
   const auto batches = feed.batches(slab * height, (slab + 1) * height, margin(lattice));
   std::atomic<std::uint64_t> corners = 0;
   std::atomic<std::uint64_t> seen = 0;
-  std::atomic<std::uint64_t> good = 0;
+  std::atomic<std::uint64_t> trusted = 0;
   std::atomic<std::uint64_t> torn = 0;
   std::atomic<std::uint64_t> sums = 0;
   // The sweep goes up: what no batch of this slab wants, none of the next ones will.
   std::size_t lowest = std::numeric_limits<std::size_t>::max();
   for (const auto& batch : batches) lowest = std::min(lowest, batch.front());
-  scratch_->clumped.erase(scratch_->clumped.begin(), scratch_->clumped.lower_bound(lowest));
+  scratch_->clustered.erase(scratch_->clustered.begin(), scratch_->clustered.lower_bound(lowest));
   for (int level = 0; level < window.levels(); ++level) {
     const std::vector<Work> work = list_work(window, level, slab, settings_.centres);
     if (work.empty()) continue;
     if (batches.empty()) {
       // Nothing is seen here.
-      for (const Work& w : work) std::fill_n(&w.points->near.words[w.begin], w.end - w.begin, 0);
+      for (const Work& w : work) std::fill_n(&w.points->active.words[w.begin], w.end - w.begin, 0);
       continue;
     }
     std::vector<Block> blocks;
@@ -124,25 +125,25 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
     const float level_margin = settings_.steps > 1 ? kStepLimit * static_cast<float>(lattice.cell_size(level)) : 0.0F;
     const auto finish = [&](std::size_t t, Scratch::Local& local, TileState& state) {
       settle(kernel_, settings_, state, local.queries, channels);
-      const Tally tally = fit_tile(kernel_, settings_, channels, state, local.queries, local.fit);
+      const FitCounts counts = fit_tile(kernel_, settings_, channels, state, local.queries, local.fit);
       store_values(window, level, work[t], local.queries, state, local.fit);
-      seen.fetch_add(tally.seen, std::memory_order_relaxed);
-      good.fetch_add(tally.good, std::memory_order_relaxed);
+      seen.fetch_add(counts.seen, std::memory_order_relaxed);
+      trusted.fetch_add(counts.trusted, std::memory_order_relaxed);
       sums.fetch_add(state.sums, std::memory_order_relaxed);
-      torn.fetch_add(tally.torn, std::memory_order_relaxed);
+      torn.fetch_add(counts.torn, std::memory_order_relaxed);
       corners.fetch_add(local.queries.size(), std::memory_order_relaxed);
     };
     const int passes = passes_of(settings_);
     if (batches.size() == 1) {
-      const ClumpedBatch batch = scratch_->load(batches[0], feed, lattice);
-      const Reach reach{level, first, end, level_margin, shift_of(settings_)};
-      const TileRuns bins = bin_clumps(lattice, reach, batch, blocks);
+      const ClusteredBatch batch = scratch_->load(batches[0], feed, lattice);
+      const QueryLayers layers{level, first, end, level_margin, shift_of(settings_)};
+      const TileRuns bins = bin_clusters(lattice, layers, batch, blocks);
       tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t t) {
         Scratch::Local& local = scratch_->local.local();
         TileState& state = local.state;
         list_queries(work[t], local.queries);
         start(state, local.queries, channels, shift_of(settings_));
-        local.rows.gather(lattice, reach, work[t].tile.block, bins.of(t), settings_.band);
+        local.rows.gather(lattice, layers, work[t].tile.block, bins.of(t), settings_.band);
         accumulate(kernel_, local.rows, state, channels);
         for (int pass = 1; pass < passes; ++pass) {
           if (!advance(kernel_, settings_, state, local.queries, channels, pass)) break;
@@ -174,13 +175,13 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
       }
       active = std::move(going);
       if (active.empty()) break;
-      const Reach reach{level, first, end, pass > 0 ? level_margin : 0.0F, shift_of(settings_)};
+      const QueryLayers layers{level, first, end, pass > 0 ? level_margin : 0.0F, shift_of(settings_)};
       for (const std::vector<std::size_t>& numbers : batches) {
-        const ClumpedBatch batch = scratch_->load(numbers, feed, lattice);
-        const TileRuns bins = bin_clumps(lattice, reach, batch, blocks);
+        const ClusteredBatch batch = scratch_->load(numbers, feed, lattice);
+        const TileRuns bins = bin_clusters(lattice, layers, batch, blocks);
         tbb::parallel_for(std::size_t{0}, active.size(), [&](std::size_t a) {
           Scratch::Local& local = scratch_->local.local();
-          local.rows.gather(lattice, reach, blocks[a], bins.of(a), settings_.band);
+          local.rows.gather(lattice, layers, blocks[a], bins.of(a), settings_.band);
           accumulate(kernel_, local.rows, kept[active[a]], channels);
         });
       }
@@ -193,7 +194,7 @@ void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
   }
   counts_.corners += corners;
   counts_.seen += seen;
-  counts_.good += good;
+  counts_.trusted += trusted;
   counts_.torn += torn;
   counts_.sums += sums;
   constexpr std::uint64_t kEnough = 256;

@@ -1,5 +1,5 @@
 // Projection: every corner worth it gets its point, normal, signed distance and attributes from the samples around
-// (METHOD 3.2), on the window's layers of one slab.
+// (Cuccuru et al. 2009, section 3.2), on the window's layers of one slab.
 #pragma once
 #include <cstdint>
 #include <memory>
@@ -13,23 +13,23 @@ namespace lamina {
 enum class Fit { plane, sphere };
 
 struct ProjectSettings {
-  Fit fit = Fit::sphere;  ///< sphere: algebraic sphere (Guennebaud & Gross 2007); plane: METHOD 3.2
-  bool centres = false;   ///< project the centres of leaf cells instead of corners (METHOD 3.3; see diffuse.h)
+  Fit fit = Fit::sphere;  ///< sphere: algebraic sphere (Guennebaud & Gross 2007); plane: Cuccuru et al. 2009, 3.2
+  bool centres = false;   ///< project the centres of leaf cells instead of corners (section 3.3; see diffuse.h)
   int steps = 1;          ///< N >= 1: almost orthogonal projection steps (Alexa & Adamson 2004)
   float tolerance = 0;    ///< a point is done when a step moves it no more than so many supports; 0: next to nothing
   float band = 2.25F;     ///< a corner keeps a value only if a sample lies this near, in cells of the sample's level
   /// A point whose samples' mean normal is shorter than this sees two sheets, or one bent sharply, and counts only the
   /// samples on its own side, that face where the mean does; 0: all count always.
   float sheets = 0.8F;
-  float apart = 0.7F;       ///< provided that the two lie this far apart (cells): the lattice can tell them
-  float good_reach = 0.4F;  ///< trusted while |projected point - weighted average| <= this, in support radii
-  int good_samples = 3;     ///< and at least this many samples contributed
+  float apart = 0.7F;           ///< provided that the two lie this far apart (cells): the lattice can tell them
+  float trusted_offset = 0.4F;  ///< trusted while |projected point - weighted average| <= this, in support radii
+  int trusted_samples = 3;      ///< and at least this many samples contributed
 };
 
 struct ProjectCounts {
   std::uint64_t corners = 0;  ///< corners projected
   std::uint64_t seen = 0;     ///< of these, with samples in reach
-  std::uint64_t good = 0;     ///< of these, trusted
+  std::uint64_t trusted = 0;  ///< of these, trusted
   std::uint64_t sums = 0;     ///< how often samples were summed up at one: once for each of its steps
   std::uint64_t torn =
       0;  ///< of those with samples, whose normals contradict each other: their mean is under half long
@@ -45,8 +45,8 @@ class Projector {
   ~Projector();
   Projector(const Projector&) = delete;
   Projector& operator=(const Projector&) = delete;
-  /// Fills the values, `seen` and `good` of the slab's near corners. Its corners must be placed and the feed be ready
-  /// to slab end + largest support (twice that for steps > 1).
+  /// Fills the values, `seen` and `trusted` of the slab's active corners. Its corners must be placed and the feed be
+  /// ready to slab end + largest support (twice that for steps > 1).
   void project(Window& window, std::int32_t slab, SampleFeed& feed);
   [[nodiscard]] const ProjectCounts& counts() const { return counts_; }
   /// Samples may act this much (steps) beyond their support when steps > 1.

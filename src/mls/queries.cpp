@@ -17,39 +17,39 @@ Point point_of(const Query& q, float shift) {
 
 /// Puts points into groups and clears their sums.
 template <typename At>
-void fill(Lot& lot, std::size_t count, std::size_t channels, const At& at) {
+void fill(QueryBatch& batch, std::size_t count, std::size_t channels, const At& at) {
   const std::size_t groups = (count + kLanes - 1) / kLanes;
-  lot.points.resize(groups);
-  lot.facing.clear();
+  batch.points.resize(groups);
+  batch.facing.clear();
   for (std::size_t g = 0; g < groups; ++g) {
     for (int l = 0; l < kLanes; ++l) {
       const Point p = at(std::min(g * kLanes + static_cast<std::size_t>(l), count - 1));
-      lot.points[g].x[l] = p.x;
-      lot.points[g].y[l] = p.y;
-      lot.points[g].z[l] = p.z;
+      batch.points[g].x[l] = p.x;
+      batch.points[g].y[l] = p.y;
+      batch.points[g].z[l] = p.z;
     }
   }
-  lot.sums.assign(groups * channels, Lanes{});
-  for (std::size_t g = 0; g < groups; ++g) lot.sums[g * channels + kNearest].v.fill(1e30F);
+  batch.sums.assign(groups * channels, Lanes{});
+  for (std::size_t g = 0; g < groups; ++g) batch.sums[g * channels + kNearest].v.fill(1e30F);
 }
 
-/// From the points of a group to their corners; `number` tells the query of the lot's i-th point.
+/// From the points of a group to their corners; `number` tells the query of the batch's i-th point.
 template <typename Number>
-FitInput offsets(const Lot& lot, const std::vector<Query>& queries, std::size_t g, std::size_t count, Fit fit,
+FitInput offsets(const QueryBatch& batch, const std::vector<Query>& queries, std::size_t g, std::size_t count, Fit fit,
                  float shift, const Number& number) {
   FitInput in;
   in.sphere = fit == Fit::sphere;
   for (int l = 0; l < kLanes; ++l) {
     const std::size_t i = std::min(g * kLanes + static_cast<std::size_t>(l), count - 1);
     const Point corner = point_of(queries[number(i)], shift);
-    in.offset.x[l] = corner.x - lot.points[g].x[l];
-    in.offset.y[l] = corner.y - lot.points[g].y[l];
-    in.offset.z[l] = corner.z - lot.points[g].z[l];
+    in.offset.x[l] = corner.x - batch.points[g].x[l];
+    in.offset.y[l] = corner.y - batch.points[g].y[l];
+    in.offset.z[l] = corner.z - batch.points[g].z[l];
   }
   return in;
 }
 
-/// Whether the samples a point sees lie on two sheets, facing opposite ways, that the lattice can tell apart: `near`
+/// Whether the samples a point sees lie on two sheets, facing opposite ways, that the lattice can tell apart: `active`
 /// has the sums of those on the point's own side.
 bool is_apart(const ProjectSettings& settings, const Lanes* all, int lane, const Lanes* near, int l) {
   const float w_near = near[kW][l];
@@ -78,7 +78,7 @@ void list_queries(const Work& work, std::vector<Query>& out) {
   const bool corners = work.points == work.tile.leaf;
   const auto wanted = [&](int z) {
     if (z < work.begin || z >= work.end) return std::uint64_t{0};
-    return work.points->near.words[z] & ~(corners ? work.tile.leaf->shared.words[z] : 0);
+    return work.points->active.words[z] & ~(corners ? work.tile.leaf->shared.words[z] : 0);
   };
   for (int z = work.begin & ~1; z < work.end; z += 2) {
     const std::array<std::uint64_t, 2> layers{wanted(z), wanted(z + 1)};
@@ -87,9 +87,9 @@ void list_queries(const Work& work, std::vector<Query>& out) {
       for (int i = 0; i < 8; i += 2) {
         // To and fro: what follows lies beside.
         const int x = (y & 2) == 0 ? i : 6 - i;
-        const std::uint64_t brick = std::uint64_t{0x0303} << (x + 8 * y);
+        const std::uint64_t group = std::uint64_t{0x0303} << (x + 8 * y);
         for (int k = 0; k < 2; ++k) {
-          for (std::uint64_t w = layers[static_cast<std::size_t>(k)] & brick; w != 0; w &= w - 1) {
+          for (std::uint64_t w = layers[static_cast<std::size_t>(k)] & group; w != 0; w &= w - 1) {
             const int bit = std::countr_zero(w);
             out.push_back({static_cast<std::uint8_t>(bit & 7), static_cast<std::uint8_t>(bit >> 3),
                            static_cast<std::uint8_t>(z + k)});
@@ -107,17 +107,17 @@ void start(TileState& state, const std::vector<Query>& queries, std::size_t chan
 }
 
 void accumulate(const Kernel& kernel, const RowSamples& rows, TileState& state, std::size_t channels) {
-  Lot& lot = state.stepped ? state.moved : state.all;
+  QueryBatch& batch = state.stepped ? state.moved : state.all;
   std::array<SampleRange, RowSamples::kRows> ranges{};
-  for (std::size_t g = 0; g < lot.points.size(); ++g) {
-    const Queries& q = lot.points[g];
+  for (std::size_t g = 0; g < batch.points.size(); ++g) {
+    const Queries& q = batch.points[g];
     const auto [y_lo, y_hi] = std::minmax_element(q.y.v.begin(), q.y.v.end());
     const auto [z_lo, z_hi] = std::minmax_element(q.z.v.begin(), q.z.v.end());
     const int n = rows.ranges(*y_lo, *y_hi, *z_lo, *z_hi, ranges.data());
-    if (lot.facing.empty()) {
-      kernel.accumulate(rows.samples(), ranges.data(), n, q, &lot.sums[g * channels]);
+    if (batch.facing.empty()) {
+      kernel.accumulate(rows.samples(), ranges.data(), n, q, &batch.sums[g * channels]);
     } else {
-      kernel.accumulate_facing(rows.samples(), ranges.data(), n, q, lot.facing[g], &lot.sums[g * channels]);
+      kernel.accumulate_facing(rows.samples(), ranges.data(), n, q, batch.facing[g], &batch.sums[g * channels]);
     }
   }
 }
@@ -129,7 +129,7 @@ FitInput fit_input(const TileState& state, const std::vector<Query>& queries, st
 bool advance(const Kernel& kernel, const ProjectSettings& settings, TileState& state, const std::vector<Query>& queries,
              std::size_t channels, int pass) {
   const float shift = shift_of(settings);
-  const Lot& from = state.stepped ? state.moved : state.all;
+  const QueryBatch& from = state.stepped ? state.moved : state.all;
   const std::size_t count = state.stepped ? state.moving.size() : queries.size();
   const auto number = [&](std::size_t i) { return state.stepped ? state.moving[i] : static_cast<std::uint32_t>(i); };
   std::vector<std::uint32_t> moving;
@@ -214,7 +214,9 @@ void settle(const Kernel& kernel, const ProjectSettings& settings, TileState& st
       const Queries& f = state.moved.facing[from];
       if (f.x[l] != 0 || f.y[l] != 0 || f.z[l] != 0) {
         if (!is_apart(settings, all, lane, moved, l)) continue;
-        if (out.reach[l] > settings.good_reach || moved[kSeen][l] < static_cast<float>(settings.good_samples)) continue;
+        if (out.offset_from_mean[l] > settings.trusted_offset ||
+            moved[kSeen][l] < static_cast<float>(settings.trusted_samples))
+          continue;
       }
     }
     state.all.points[to].x[lane] = state.moved.points[from].x[l];

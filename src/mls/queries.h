@@ -23,7 +23,7 @@ struct Query {
 
 /// Query points and their running sums, in lane groups of eight; the last group is filled up with copies of its last
 /// point.
-struct Lot {
+struct QueryBatch {
   std::vector<Queries> points;  ///< cells relative to the tile
   std::vector<Queries> facing;  ///< samples whose normals point away from these do not count; zero: all do
   std::vector<Lanes> sums;      ///< per group kSums + attributes lanes
@@ -31,9 +31,9 @@ struct Lot {
 
 /// What a tile keeps between batches and steps.
 struct TileState {
-  Lot all;                            ///< every query's
+  QueryBatch all;                     ///< every query's
   std::vector<std::uint32_t> moving;  ///< queries that go on, after the first pass
-  Lot moved;                          ///< of those
+  QueryBatch moved;                   ///< of those
   std::uint64_t sums = 0;             ///< points summed up so far, those of every pass
   bool stepped = false;               ///< `moved` is the one to add samples to
 };
@@ -48,7 +48,7 @@ inline constexpr float kStepLimit = 1.5F;
 /// Query points that a step moves by no more than this (cells) stay where they are, with the sums they have.
 inline constexpr float kStill = 1e-3F;
 
-/// The near points of the slab that this level projects itself: not those that a finer level holds too. By bricks of
+/// the active points of the slab that this level projects itself: not those that a finer level holds too. By groups of
 /// 2^3, so that the eight of a group lie close together and few samples act on any of them.
 void list_queries(const Work& work, std::vector<Query>& out);
 /// Puts the query points on the corners (or centres) and clears the sums.

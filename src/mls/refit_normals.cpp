@@ -16,7 +16,7 @@ namespace lamina {
 /// A bucket with the normals it came with.
 struct RefitNormals::Added {
   ActiveBucket bucket;  // no attributes
-  std::shared_ptr<const ClumpedBucket> clumped;
+  std::shared_ptr<const ClusteredBucket> clustered;
   std::int32_t low = 0, high = 0;  // z
 };
 
@@ -99,8 +99,10 @@ RefitNormals::RefitNormals(const RefitSettings& settings, const Lattice& lattice
 
 RefitNormals::~RefitNormals() = default;
 
-double RefitNormals::reach() const {
-  return std::ceil(static_cast<double>(static_cast<float>(settings_.support)) * static_cast<double>(settings_.max_radius)) + 1;
+double RefitNormals::halo() const {
+  return std::ceil(static_cast<double>(static_cast<float>(settings_.support)) *
+                   static_cast<double>(settings_.max_radius)) +
+         1;
 }
 
 void RefitNormals::add(std::size_t bucket, const LocalSamples& samples, const std::vector<float>& radii) {
@@ -125,17 +127,17 @@ void RefitNormals::add(std::size_t bucket, const LocalSamples& samples, const st
   const auto [low, high] = std::minmax_element(s.z.begin(), s.z.end());
   added->low = *low;
   added->high = *high;
-  added->clumped = std::make_shared<const ClumpedBucket>(clump(added->bucket, lattice_));
+  added->clustered = std::make_shared<const ClusteredBucket>(cluster_samples(added->bucket, lattice_));
   added_[bucket] = std::move(added);
 }
 
 UnitNormals RefitNormals::find(std::size_t bucket) {
   const Added& own = *added_.at(bucket);
   const LocalSamples& s = own.bucket.samples;
-  ClumpedBatch around;
+  ClusteredBatch around;
   for (const auto& [number, other] : added_) {
-    if (static_cast<double>(other->high) + reach() >= own.low && static_cast<double>(other->low) - reach() <= own.high)
-      around.push_back(other->clumped);
+    if (static_cast<double>(other->high) + halo() >= own.low && static_cast<double>(other->low) - halo() <= own.high)
+      around.push_back(other->clustered);
   }
   const std::int32_t cell = lattice_.cell_size(settings_.level);
   const std::vector<Placed> placed = place(s, cell);
@@ -149,16 +151,16 @@ UnitNormals RefitNormals::find(std::size_t bucket) {
     }
   }
   // Samples lie up to a cell beside the points that tiles are made for.
-  const Reach reach{settings_.level, floor_div(own.low, cell), floor_div(own.high, cell) + 1, static_cast<float>(cell),
-                    0};
-  const TileRuns bins = bin_clumps(lattice_, reach, around, blocks);
+  const QueryLayers layers{settings_.level, floor_div(own.low, cell), floor_div(own.high, cell) + 1,
+                           static_cast<float>(cell), 0};
+  const TileRuns bins = bin_clusters(lattice_, layers, around, blocks);
   UnitNormals out;
   for (auto* v : {&out.x, &out.y, &out.z}) v->resize(s.size());
   tbb::enumerable_thread_specific<Scratch> scratch;
   tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t t) {
     Scratch& local = scratch.local();
     constexpr float kNoBand = 1e4F;
-    local.rows.gather(lattice_, reach, blocks[t], bins.of(t), kNoBand);
+    local.rows.gather(lattice_, layers, blocks[t], bins.of(t), kNoBand);
     const std::uint32_t edge = 8U * static_cast<std::uint32_t>(cell);
     const std::array<std::uint32_t, 3> origin{static_cast<std::uint32_t>(blocks[t].x) * edge,
                                               static_cast<std::uint32_t>(blocks[t].y) * edge,

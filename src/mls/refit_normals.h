@@ -5,8 +5,8 @@
 #include <memory>
 
 #include "lattice/lattice.h"
-#include "mls/clumps.h"
 #include "mls/kernel.h"
+#include "mls/sample_clusters.h"
 #include "samples/sample_feed.h"
 
 namespace lamina {
@@ -18,12 +18,12 @@ struct RefitSettings {
 };
 
 /// The fit is the projection's (kernel.h) at the sample's own place, with the weights of projection, without the
-/// samples whose normals point away from its own. A function of the samples within reach() alone.
+/// samples whose normals point away from its own. A function of the samples within halo() alone.
 class RefitNormals final : public NormalFilter {
  public:
   RefitNormals(const RefitSettings& settings, const Lattice& lattice, const Kernel& kernel);
   ~RefitNormals() override;
-  [[nodiscard]] double reach() const override;
+  [[nodiscard]] double halo() const override;
   void add(std::size_t bucket, const LocalSamples& samples, const std::vector<float>& radii) override;
   UnitNormals find(std::size_t bucket) override;
   void forget_below(std::int64_t z) override;

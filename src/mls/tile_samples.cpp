@@ -11,7 +11,7 @@ namespace {
 
 struct Entry {
   std::uint32_t tile;
-  std::uint32_t clump;
+  std::uint32_t cluster;
 };
 
 std::int32_t ceil_cell(double x) {
@@ -60,28 +60,28 @@ class TileTable {
   std::vector<std::uint32_t> numbers_;
 };
 
-/// Lattice points of an axis that a clump reaches.
+/// Lattice points of an axis that a cluster reaches.
 struct Points {
   std::int32_t first, last;
 };
 
-Points points_of(const Clump& c, int axis, const Reach& reach, double inv) {
-  const double low = (double{static_cast<double>(c.low[axis])} - static_cast<double>(reach.margin)) * inv;
-  const double high = (double{static_cast<double>(c.high[axis])} + static_cast<double>(reach.margin)) * inv;
-  return {ceil_cell(low - static_cast<double>(reach.shift)), floor_cell(high - static_cast<double>(reach.shift))};
+Points points_of(const SampleCluster& c, int axis, const QueryLayers& layers, double inv) {
+  const double low = (double{static_cast<double>(c.low[axis])} - static_cast<double>(layers.margin)) * inv;
+  const double high = (double{static_cast<double>(c.high[axis])} + static_cast<double>(layers.margin)) * inv;
+  return {ceil_cell(low - static_cast<double>(layers.shift)), floor_cell(high - static_cast<double>(layers.shift))};
 }
 
-void bin_bucket(const Lattice& lattice, const Reach& reach, const ClumpedBucket& bucket, std::span<const Block> tiles,
-                const TileTable& table, std::vector<Entry>& out) {
-  const double inv = 1.0 / lattice.cell_size(reach.level);
-  for (std::uint32_t i = 0; i < bucket.clumps.size(); ++i) {
-    const Clump& c = bucket.clumps[i];
-    const Points z = points_of(c, 2, reach, inv);
-    const std::int32_t z0 = std::max(z.first, reach.first);
-    const std::int32_t z1 = std::min(z.last, reach.end - 1);
+void bin_bucket(const Lattice& lattice, const QueryLayers& layers, const ClusteredBucket& bucket,
+                std::span<const Block> tiles, const TileTable& table, std::vector<Entry>& out) {
+  const double inv = 1.0 / lattice.cell_size(layers.level);
+  for (std::uint32_t i = 0; i < bucket.clusters.size(); ++i) {
+    const SampleCluster& c = bucket.clusters[i];
+    const Points z = points_of(c, 2, layers, inv);
+    const std::int32_t z0 = std::max(z.first, layers.first);
+    const std::int32_t z1 = std::min(z.last, layers.end - 1);
     if (z0 > z1) continue;
-    const Points x = points_of(c, 0, reach, inv);
-    const Points y = points_of(c, 1, reach, inv);
+    const Points x = points_of(c, 0, layers, inv);
+    const Points y = points_of(c, 1, layers, inv);
     const Block low{x.first >> 3, y.first >> 3, z0 >> 3};
     const Block high{x.last >> 3, y.last >> 3, z1 >> 3};
     // A support far larger than a tile reaches more places than there are tiles.
@@ -106,12 +106,12 @@ void bin_bucket(const Lattice& lattice, const Reach& reach, const ClumpedBucket&
 
 }  // namespace
 
-TileRuns bin_clumps(const Lattice& lattice, const Reach& reach, const ClumpedBatch& batch,
-                    std::span<const Block> tiles) {
+TileRuns bin_clusters(const Lattice& lattice, const QueryLayers& layers, const ClusteredBatch& batch,
+                      std::span<const Block> tiles) {
   const TileTable table(tiles);
   std::vector<std::vector<Entry>> entries(batch.size());
   tbb::parallel_for(std::size_t{0}, batch.size(),
-                    [&](std::size_t b) { bin_bucket(lattice, reach, *batch[b], tiles, table, entries[b]); });
+                    [&](std::size_t b) { bin_bucket(lattice, layers, *batch[b], tiles, table, entries[b]); });
   TileRuns bins;
   bins.begin.assign(tiles.size() + 1, 0);
   for (const auto& bucket : entries) {
@@ -122,22 +122,23 @@ TileRuns bin_clumps(const Lattice& lattice, const Reach& reach, const ClumpedBat
   std::vector<std::uint32_t> cursor(bins.begin.begin(), bins.begin.end() - 1);
   for (std::size_t b = 0; b < batch.size(); ++b) {
     for (const Entry& e : entries[b]) {
-      const Clump& c = batch[b]->clumps[e.clump];
+      const SampleCluster& c = batch[b]->clusters[e.cluster];
       bins.runs[cursor[e.tile]++] = {batch[b].get(), c.begin, c.end};
     }
   }
   return bins;
 }
 
-void RowSamples::gather(const Lattice& lattice, const Reach& reach, const Block& block, std::span<const Run> runs,
-                        float band) {
-  select(lattice, reach, block, runs);
-  place(lattice, reach.level, runs, band);
+void RowSamples::gather(const Lattice& lattice, const QueryLayers& layers, const Block& block,
+                        std::span<const Run> runs, float band) {
+  select(lattice, layers, block, runs);
+  place(lattice, layers.level, runs, band);
 }
 
-void RowSamples::select(const Lattice& lattice, const Reach& reach, const Block& block, std::span<const Run> runs) {
+void RowSamples::select(const Lattice& lattice, const QueryLayers& layers, const Block& block,
+                        std::span<const Run> runs) {
   constexpr std::size_t kPiece = 64;
-  const std::int32_t a = lattice.cell_size(reach.level);
+  const std::int32_t a = lattice.cell_size(layers.level);
   const float inv = 1.0F / static_cast<float>(a);
   // Differences are taken in integers: exact however far the tile lies from the origin.
   const auto origin = [a](std::int32_t b) {
@@ -147,10 +148,10 @@ void RowSamples::select(const Lattice& lattice, const Reach& reach, const Block&
   const std::uint32_t oy = origin(block.y);
   const std::uint32_t oz = origin(block.z);
   // Points of the block: their middle, and how far they lie from it at most, rounding included.
-  const float margin = reach.margin * inv + 1e-4F;
-  const auto z_first = static_cast<float>(std::max(reach.first - block.z * 8, 0)) + reach.shift;
-  const auto z_last = static_cast<float>(std::min(reach.end - 1 - block.z * 8, 7)) + reach.shift;
-  const float middle = 3.5F + reach.shift;
+  const float margin = layers.margin * inv + 1e-4F;
+  const auto z_first = static_cast<float>(std::max(layers.first - block.z * 8, 0)) + layers.shift;
+  const auto z_last = static_cast<float>(std::min(layers.end - 1 - block.z * 8, 7)) + layers.shift;
+  const float middle = 3.5F + layers.shift;
   const float half = 3.5F + margin;
   const float z_middle = 0.5F * (z_first + z_last);
   const float z_half = 0.5F * (z_last - z_first) + margin;
@@ -162,7 +163,7 @@ void RowSamples::select(const Lattice& lattice, const Reach& reach, const Block&
     std::array<std::int32_t, kPiece> row, keep;
   } p;
   for (std::uint32_t r = 0; r < runs.size(); ++r) {
-    const ClumpedBucket& from = *runs[r].from;
+    const ClusteredBucket& from = *runs[r].from;
     for (std::size_t begin = runs[r].begin; begin < runs[r].end; begin += kPiece) {
       const std::size_t count = std::min<std::size_t>(kPiece, runs[r].end - begin);
       const std::int32_t* const px = from.x.data() + begin;
@@ -209,7 +210,7 @@ void RowSamples::place(const Lattice& lattice, int level, std::span<const Run> r
   max_support_ = 0;
   for (const Found& f : found_) {
     const std::uint32_t to = cursor[static_cast<std::size_t>(f.row)]++;
-    const ClumpedBucket& from = *runs[f.run].from;
+    const ClusteredBucket& from = *runs[f.run].from;
     samples_.x[to] = f.x;
     samples_.y[to] = f.y;
     samples_.z[to] = f.z;
@@ -224,10 +225,10 @@ void RowSamples::place(const Lattice& lattice, int level, std::span<const Run> r
   }
   samples_.banded = false;
   for (std::size_t k = 0; k < found_.size(); ++k) {
-    const float reach = band * samples_.inv_band2[k] * inv;
+    const float limit = band * samples_.inv_band2[k] * inv;
     samples_.inv_support2[k] = 1.0F / (samples_.support[k] * samples_.support[k]);
-    samples_.inv_band2[k] = 1.0F / (reach * reach);
-    samples_.banded |= reach < samples_.support[k];
+    samples_.inv_band2[k] = 1.0F / (limit * limit);
+    samples_.banded |= limit < samples_.support[k];
   }
 }
 

@@ -1,4 +1,4 @@
-// Finding the samples of a tile: binning clumps, and gathering samples in rows.
+// Finding the samples of a tile: binning clusters, and gathering samples in rows.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -6,17 +6,17 @@
 #include <span>
 #include <vector>
 
-#include "mls/clumps.h"
 #include "mls/kernel.h"
+#include "mls/sample_clusters.h"
 #include "octree/window.h"
 
 namespace lamina {
 
-using ClumpedBatch = std::vector<std::shared_ptr<const ClumpedBucket>>;
+using ClusteredBatch = std::vector<std::shared_ptr<const ClusteredBucket>>;
 
 /// Samples [begin, end) of a bucket.
 struct Run {
-  const ClumpedBucket* from = nullptr;
+  const ClusteredBucket* from = nullptr;
   std::uint32_t begin = 0, end = 0;
 };
 
@@ -31,17 +31,17 @@ struct TileRuns {
 
 /// Points of a level to look for: those of the layers [first, end), `shift` cells above the corners (0: corners, 0.5:
 /// cell centres). Supports are taken `margin` steps longer than they are.
-struct Reach {
+struct QueryLayers {
   int level = 0;
   std::int32_t first = 0, end = 0;
   float margin = 0;
   float shift = 0;
 };
 
-/// The clumps that may reach a point of each tile. `tiles` are distinct and in canonical order (z, y, x). Deterministic
-/// for any number of threads.
-TileRuns bin_clumps(const Lattice& lattice, const Reach& reach, const ClumpedBatch& batch,
-                    std::span<const Block> tiles);
+/// The clusters that may reach a point of each tile. `tiles` are distinct and in canonical order (z, y, x).
+/// Deterministic for any number of threads.
+TileRuns bin_clusters(const Lattice& lattice, const QueryLayers& layers, const ClusteredBatch& batch,
+                      std::span<const Block> tiles);
 
 /// A tile's samples sorted by rows of cells (z, then y; inside a row in the order of the runs).
 class RowSamples {
@@ -51,7 +51,8 @@ class RowSamples {
   static constexpr int kRows = 16;
 
   /// Takes the samples that can reach a point of the block. `band`: ProjectSettings::band.
-  void gather(const Lattice& lattice, const Reach& reach, const Block& block, std::span<const Run> runs, float band);
+  void gather(const Lattice& lattice, const QueryLayers& layers, const Block& block, std::span<const Run> runs,
+              float band);
   [[nodiscard]] const TileSamples& samples() const { return samples_; }
   /// Ranges of samples within the largest support of a box (cells relative to the tile); `out` has kRows entries.
   int ranges(float y_lo, float y_hi, float z_lo, float z_hi, SampleRange* out) const;
@@ -63,7 +64,7 @@ class RowSamples {
     std::int32_t row;
     std::uint32_t run, sample;
   };
-  void select(const Lattice& lattice, const Reach& reach, const Block& block, std::span<const Run> runs);
+  void select(const Lattice& lattice, const QueryLayers& layers, const Block& block, std::span<const Run> runs);
   void place(const Lattice& lattice, int level, std::span<const Run> runs, float band);
 
   TileSamples samples_;

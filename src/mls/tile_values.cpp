@@ -39,7 +39,7 @@ constexpr float kAlone = 1;
 /// Makes a corner's projected point the average of its samples, on the side where the fit has it: a fit that reaches
 /// beyond its samples tells no more.
 void keep_to_samples(const Lanes* sums, const FitInput& in, int l, FitOutput& fit) {
-  if (sums[kSeen][l] < 2) fit.reach[l] = std::max(fit.reach[l], kAlone);
+  if (sums[kSeen][l] < 2) fit.offset_from_mean[l] = std::max(fit.offset_from_mean[l], kAlone);
   const float inv = 1.0F / sums[kW][l];
   const float x = in.offset.x[l] - sums[kPx][l] * inv;
   const float y = in.offset.y[l] - sums[kPy][l] * inv;
@@ -56,13 +56,13 @@ void keep_to_samples(const Lanes* sums, const FitInput& in, int l, FitOutput& fi
 
 }  // namespace
 
-Tally fit_tile(const Kernel& kernel, const ProjectSettings& settings, std::size_t channels, const TileState& state,
-               const std::vector<Query>& queries, TileFit& out) {
+FitCounts fit_tile(const Kernel& kernel, const ProjectSettings& settings, std::size_t channels, const TileState& state,
+                   const std::vector<Query>& queries, TileFit& out) {
   const std::size_t groups = state.all.points.size();
   out.fits.resize(std::max(groups, out.fits.size()));
   out.seen.assign(groups * kLanes, 0);
-  out.good.assign(groups * kLanes, 0);
-  Tally tally;
+  out.trusted.assign(groups * kLanes, 0);
+  FitCounts counts;
   for (std::size_t g = 0; g < groups; ++g) {
     const Lanes* sums = &state.all.sums[g * channels];
     if (!any_seen(sums)) continue;
@@ -73,17 +73,17 @@ Tally fit_tile(const Kernel& kernel, const ProjectSettings& settings, std::size_
     for (int l = 0; l < lanes; ++l) {
       const bool has_normal = fit.nx[l] != 0 || fit.ny[l] != 0 || fit.nz[l] != 0;
       const bool seen = is_seen(sums, l) && has_normal;
-      const bool good =
-          seen && fit.reach[l] <= settings.good_reach && sums[kSeen][l] >= static_cast<float>(settings.good_samples);
-      if (seen && !good && !settings.centres) keep_to_samples(sums, in, l, fit);
+      const bool trusted = seen && fit.offset_from_mean[l] <= settings.trusted_offset &&
+                           sums[kSeen][l] >= static_cast<float>(settings.trusted_samples);
+      if (seen && !trusted && !settings.centres) keep_to_samples(sums, in, l, fit);
       out.seen[g * kLanes + static_cast<std::size_t>(l)] = seen ? 1 : 0;
-      out.good[g * kLanes + static_cast<std::size_t>(l)] = good ? 1 : 0;
-      tally.seen += seen ? 1 : 0;
-      tally.good += good ? 1 : 0;
-      tally.torn += seen && is_torn(sums, l) ? 1 : 0;
+      out.trusted[g * kLanes + static_cast<std::size_t>(l)] = trusted ? 1 : 0;
+      counts.seen += seen ? 1 : 0;
+      counts.trusted += trusted ? 1 : 0;
+      counts.torn += seen && is_torn(sums, l) ? 1 : 0;
     }
   }
-  return tally;
+  return counts;
 }
 
 void store_values(Window& window, int level, const Work& work, const std::vector<Query>& queries,
@@ -93,16 +93,16 @@ void store_values(Window& window, int level, const Work& work, const std::vector
   const bool corners = work.points == work.tile.leaf;
   const std::size_t channels = kSums + static_cast<std::size_t>(window.attributes());
   for (int z = work.begin; z < work.end; ++z) {
-    points.seen.words[z] = points.good.words[z] = 0;
-    if (corners) leaf.positive.words[z] = 0;
+    points.seen.words[z] = points.trusted.words[z] = 0;
+    if (corners) leaf.outside.words[z] = 0;
   }
   for (std::size_t i = 0; i < queries.size(); ++i) {
     if (fit.seen[i] == 0) continue;
     const Query& q = queries[i];
     const std::uint64_t one = std::uint64_t{1} << (q.x + 8 * q.y);
     points.seen.words[q.z] |= one;
-    if (fit.good[i] != 0) points.good.words[q.z] |= one;
-    if (corners && fit.fits[i / kLanes].distance[static_cast<int>(i % kLanes)] >= 0) leaf.positive.words[q.z] |= one;
+    if (fit.trusted[i] != 0) points.trusted.words[q.z] |= one;
+    if (corners && fit.fits[i / kLanes].distance[static_cast<int>(i % kLanes)] >= 0) leaf.outside.words[q.z] |= one;
   }
   std::array<std::uint16_t, 512> numbers;  // of queries, by place
   for (std::size_t i = 0; i < queries.size(); ++i) {
@@ -112,10 +112,10 @@ void store_values(Window& window, int level, const Work& work, const std::vector
   std::uint32_t count = 0;
   for (int z = work.begin; z < work.end; ++z) {
     if (corners && level > 0) take_shared(window, level, work.tile, z);
-    points.near.words[z] = points.seen.words[z];
+    points.active.words[z] = points.seen.words[z];
     count += static_cast<std::uint32_t>(std::popcount(points.seen.words[z]));
   }
-  CornerValues& values = points.values[window.brick_of(level, work.begin)];
+  CornerValues& values = points.values[window.slab_in_leaf(level, work.begin)];
   values.allocate(count, window.channels());
   const auto cell = static_cast<float>(window.lattice().cell_size(level));
   std::uint32_t at = 0;
@@ -138,7 +138,7 @@ void store_values(Window& window, int level, const Work& work, const std::vector
       v[kNormalY] = out.ny[l];
       v[kNormalZ] = out.nz[l];
       v[kCurvature] = out.curvature[l] / cell;
-      v[kReach] = out.reach[l];
+      v[kOffsetFromMean] = out.offset_from_mean[l];
       const float inv = 1.0F / sums[kW][l];
       for (int c = 0; c < window.attributes(); ++c) v[kFirstAttribute + c] = sums[kSums + c][l] * inv;
     }

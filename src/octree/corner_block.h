@@ -13,12 +13,13 @@
 
 namespace lamina {
 
-/// What a valued corner holds after projection, in channels (lengths in fixed-point steps).
+/// What a defined corner holds after projection, in channels (lengths in fixed-point steps).
 /// Distance is signed (positive outside), the normal is the fit's at the projected point, which lies at corner -
 /// distance * normal; curvature is the fit's signed curvature there (1/steps, positive where the surface bends away
-/// from its normal, as a sphere seen from outside); reach is |projected point - weighted average| in units of the local
-/// support radius. Of a corner that is not trusted the projected point is that average itself (its reach is the fit's).
-enum Channel : int { kDistance = 0, kNormalX, kNormalY, kNormalZ, kCurvature, kReach, kFirstAttribute };
+/// from its normal, as a sphere seen from outside); offset from the mean is |projected point - weighted average| in
+/// units of the local support radius. Of a corner that is not trusted the projected point is that average itself (its
+/// offset is the fit's).
+enum Channel : int { kDistance = 0, kNormalX, kNormalY, kNormalZ, kCurvature, kOffsetFromMean, kFirstAttribute };
 
 /// Leaves what it allocates as it is, for values that are written next.
 template <typename T>
@@ -37,7 +38,7 @@ struct RawAllocator : std::allocator<T> {
   }
 };
 
-/// Values of the `near` corners of one slab's layers inside a leaf: a record of channels per corner, in mask order.
+/// Values of the `active` corners of one slab's layers inside a leaf: a record of channels per corner, in mask order.
 /// Stages ask for all of a corner, so that records touch fewer lines of the cache than an array per channel would.
 struct CornerValues {
   std::vector<float, RawAllocator<float>> data;
@@ -75,18 +76,18 @@ struct LayerNumbers {
 
 /// Points of a block that are projected, and what came of it.
 struct Projected {
-  BlockMask near;  ///< worth projecting, close enough to samples; once projected: carry values (CornerValues)
-  BlockMask seen;  ///< subset of near: samples contributed; an edge with such an end is valid
-  BlockMask good;  ///< subset of seen: own value is trusted; other corners are extended from good neighbours
-  std::array<CornerValues, 8> values;  ///< by slab inside the leaf, Window::brick_of()
+  BlockMask active;   ///< worth projecting, close enough to samples; once projected: carry values (CornerValues)
+  BlockMask seen;     ///< subset of active: samples contributed; an edge with such an end is valid
+  BlockMask trusted;  ///< subset of seen: own value is trusted; other corners are extended from trusted neighbours
+  std::array<CornerValues, 8> values;  ///< by slab inside the leaf, Window::slab_in_leaf()
 
-  /// Index of a corner in CornerValues of its brick (`brick_layers` = layers of a slab inside a leaf, a power of two <=
-  /// 8). Meaningful only where near.test(offset).
-  [[nodiscard]] std::uint32_t value_index(int offset, int brick_layers) const {
+  /// Index of a corner in its slab's CornerValues (`slab_layers` = layers of a slab inside a leaf, a power of two <=
+  /// 8). Meaningful only where active.test(offset).
+  [[nodiscard]] std::uint32_t value_index(int offset, int slab_layers) const {
     const int z = offset >> 6;
     std::uint32_t n = 0;
-    for (int w = z & ~(brick_layers - 1); w < z; ++w) n += static_cast<std::uint32_t>(std::popcount(near.words[w]));
-    return n + static_cast<std::uint32_t>(std::popcount(near.words[z] & ((std::uint64_t{1} << (offset & 63)) - 1)));
+    for (int w = z & ~(slab_layers - 1); w < z; ++w) n += static_cast<std::uint32_t>(std::popcount(active.words[w]));
+    return n + static_cast<std::uint32_t>(std::popcount(active.words[z] & ((std::uint64_t{1} << (offset & 63)) - 1)));
   }
 };
 
@@ -114,10 +115,10 @@ struct CornerBlock : Projected {
   BlockMask acted_on;  ///< corners up to two cells from a sample of this level, and not beyond its support
   BlockMask corners;   ///< of the leaf cells in `cells`, of this level
   BlockMask shared;    ///< subset of corners: held by a finer level too, whose value counts
-  BlockMask positive;  ///< sign (outside): once projected, of the seen corners' own distances; once finished, of all
-  // Set when the slab is finished.
-  BlockMask valued;   ///< subset of corners: the sign rests on samples, its own or its neighbours'; others are a guess
-  BlockMask carried;  ///< corners with samples of their own, or with trusted neighbours on all sides
+  BlockMask outside;   ///< sign (outside): once projected, of the seen corners' own distances; once extended, of all
+  // Set when the slab is extended.
+  BlockMask defined;  ///< subset of corners: the sign rests on samples, its own or its neighbours'; others are a guess
+  BlockMask supported;  ///< corners with samples of their own, or with trusted neighbours on all sides
 
   // Minimal edges with a sign change, by axis, keyed by their lower corner; written by extraction.
   std::array<BlockMask, 3> crossing;

@@ -154,7 +154,7 @@ void split_parents(Window& window, int level, std::int32_t slab) {
   });
 }
 
-/// Hands reach and closeness of coarser samples down to the children of split cells.
+/// Hands down of coarser samples down to the children of split cells.
 void inherit(Window& window, int level, std::int32_t slab) {
   const int parent_level = level + 1;
   for (const Tile& t : window.tiles(parent_level, slab)) {
@@ -215,9 +215,9 @@ typedef std::int16_t FourRows __attribute__((vector_size(8)));   // NOLINT(moder
 /// Four rows of 16 bits, from the lowest bits up.
 using RowWord = std::uint64_t;
 
-/// Of the 4^3 corners around a cell, from one below its low corner on, those less than `reach` from a point in the cell
-/// (all in cells): rows of x, a word per layer.
-std::array<RowWord, 4> corners_within(const std::array<float, 3>& point, float reach) {
+/// Of the 4^3 corners around a cell, from one below its low corner on, those less than `radius` from a point in the
+/// cell (all in cells): rows of x, a word per layer.
+std::array<RowWord, 4> corners_within(const std::array<float, 3>& point, float radius) {
   const auto squares = [](float at) {
     const Four d = Four{-1, 0, 1, 2} - at;
     return d * d;
@@ -227,7 +227,7 @@ std::array<RowWord, 4> corners_within(const std::array<float, 3>& point, float r
   const Four dz = squares(point[2]);
   std::array<RowWord, 4> out;
   for (int z = 0; z < 4; ++z) {
-    const Four left = (reach * reach - dz[z]) - dy;  // a lane a row
+    const Four left = (radius * radius - dz[z]) - dy;  // a lane a row
     FourInts rows{};
     for (int x = 0; x < 4; ++x) rows |= (left > dx[x] + Four{}) & (1 << x);
     out[static_cast<std::size_t>(z)] = std::bit_cast<RowWord>(__builtin_convertvector(rows, FourRows));
@@ -309,8 +309,8 @@ void share_across_levels(const Window& window, int level, const Tile& t, int beg
           finer_corner(window, level, {t.block.x * 8 + (bit & 7), t.block.y * 8 + (bit >> 3), t.block.z * 8 + z});
       if (finer.block == nullptr) continue;
       t.leaf->shared.words[z] |= one;
-      t.leaf->near.words[z] &= ~one;
-      if (finer.block->near.test(finer.offset)) t.leaf->near.words[z] |= one;
+      t.leaf->active.words[z] &= ~one;
+      if (finer.block->active.test(finer.offset)) t.leaf->active.words[z] |= one;
     }
   }
 }
@@ -340,8 +340,9 @@ void mark_samples(Window& window, std::span<const Mark> marks) {
       return static_cast<float>(std::int64_t{v} - std::int64_t{low} * a) * inv;
     };
     block.mark_cell(offset_in_block(cell));
-    block.mark_corners(offset_in_block(cell),
-                       corners_within({inside(m.x, cell.x), inside(m.y, cell.y), inside(m.z, cell.z)}, m.reach * inv));
+    block.mark_corners(
+        offset_in_block(cell),
+        corners_within({inside(m.x, cell.x), inside(m.y, cell.y), inside(m.z, cell.z)}, m.active_radius * inv));
   }
   block.write_to(window);
 }
@@ -371,13 +372,13 @@ void place_corners(Window& window, std::int32_t slab) {
     for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
       const bits::Neighbourhood cells = gather(*t.leaf, &CornerBlock::cells, 0);
       bits::dilate_layers<0, 1>(cells, begin, end, &t.leaf->corners.words[begin]);
-      std::copy_n(&t.leaf->acted_on.words[begin], end - begin, &t.leaf->near.words[begin]);
+      std::copy_n(&t.leaf->acted_on.words[begin], end - begin, &t.leaf->active.words[begin]);
       if (inherits(*t.leaf)) {
         std::array<std::uint64_t, 8> above{};
         bits::dilate_layers<0, 1>(gather(*t.leaf, &CornerBlock::above, 0), begin, end, above.data());
-        for (int z = begin; z < end; ++z) t.leaf->near.words[z] |= above[z - begin];
+        for (int z = begin; z < end; ++z) t.leaf->active.words[z] |= above[z - begin];
       }
-      for (int z = begin; z < end; ++z) t.leaf->near.words[z] &= t.leaf->corners.words[z];
+      for (int z = begin; z < end; ++z) t.leaf->active.words[z] &= t.leaf->corners.words[z];
     });
     if (level == 0) continue;
     // A corner that a finer level holds too is projected there; what it is there it is here.
@@ -393,9 +394,9 @@ void place_corners(Window& window, std::int32_t slab) {
           const int cz = (z - oz) * 2;
           const std::uint64_t shared =
               bits::even_quarter(child->corners.words[cz], octant & 1, (octant >> 1) & 1) & t.leaf->corners.words[z];
-          const std::uint64_t near = bits::even_quarter(child->near.words[cz], octant & 1, (octant >> 1) & 1);
+          const std::uint64_t active = bits::even_quarter(child->active.words[cz], octant & 1, (octant >> 1) & 1);
           t.leaf->shared.words[z] |= shared;
-          t.leaf->near.words[z] = (t.leaf->near.words[z] & ~shared) | (near & shared);
+          t.leaf->active.words[z] = (t.leaf->active.words[z] & ~shared) | (active & shared);
         }
       }
       if (level > 1) share_across_levels(window, level, t, begin, end);

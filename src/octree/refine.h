@@ -1,4 +1,5 @@
-// Adaptive refinement: which cells of which level exist, and which corners are worth projecting (METHOD 3.4).
+// Adaptive refinement: which cells of which level exist, and which corners are worth projecting (Cuccuru et al. 2009,
+// section 3.4).
 #pragma once
 #include <cstdint>
 #include <span>
@@ -11,7 +12,7 @@ namespace lamina {
 struct Mark {
   std::int32_t x, y, z;  ///< fixed-point position
   std::uint8_t level;    ///< coarsest level whose cells are small enough for the sample
-  float reach;           ///< how far it acts on corners, steps, > 0
+  float active_radius;   ///< how far it acts on corners, steps, > 0
 };
 
 /// Notes samples' home cells and the corners they act on among those up to two cells away (on each axis the two below
@@ -21,7 +22,7 @@ void mark_samples(Window& window, std::span<const Mark> marks);
 
 /// Fixes the octree of one slab: cells that samples reach, subdivision, taking part. Samples must be marked up to three
 /// slabs further, and the slab below be refined. A cell is split when a sample of a finer level lies within three
-/// of that level's cells (METHOD 3.4 with a wider ball, taken as the cells it can meet).
+/// of that level's cells (Cuccuru et al. 2009, section 3.4, with a wider ball, taken as the cells it can meet).
 void refine_slab(Window& window, std::int32_t slab);
 
 /// Cells of the block's layers [begin, end) within one cell of the home of a sample of this or a coarser level, to

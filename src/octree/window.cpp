@@ -219,10 +219,10 @@ Tiles Window::tiles(int level, std::int32_t slab) const {
 
 void Window::retire_values(std::int32_t slab) {
   for (int level = 0; level < levels(); ++level) {
-    const int brick = brick_of(level, lattice_.first_layer(level, slab) & 7);
+    const int place = slab_in_leaf(level, lattice_.first_layer(level, slab) & 7);
     for (const Tile& t : tiles(level, slab)) {
-      t.leaf->values[brick] = {};
-      if (t.leaf->centres != nullptr) t.leaf->centres->values[brick] = {};
+      t.leaf->values[place] = {};
+      if (t.leaf->centres != nullptr) t.leaf->centres->values[place] = {};
     }
   }
 }

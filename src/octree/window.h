@@ -57,8 +57,8 @@ class Window {
   [[nodiscard]] int attributes() const { return attributes_; }
   [[nodiscard]] int channels() const { return kFirstAttribute + attributes_; }
   /// Layers of a slab inside one leaf of a level (1..8), and the leaf layers [first, first + n) a slab covers there.
-  [[nodiscard]] int brick_layers(int level) const { return lattice_.layers(level) < 8 ? lattice_.layers(level) : 8; }
-  [[nodiscard]] int brick_of(int level, int leaf_layer) const { return leaf_layer / brick_layers(level); }
+  [[nodiscard]] int slab_layers(int level) const { return lattice_.layers(level) < 8 ? lattice_.layers(level) : 8; }
+  [[nodiscard]] int slab_in_leaf(int level, int leaf_layer) const { return leaf_layer / slab_layers(level); }
 
   /// Null where there is none. Safe from several threads while no leaf is added or removed.
   [[nodiscard]] const CornerBlock* probe(int level, const Block& b) const;

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <utility>
 
-#include "boundary/rim_bytes.h"
+#include "boundary/boundary.h"
 #include "chunks/part_slabs.h"
 #include "meshes/streamed_ply.h"
 
@@ -31,7 +31,7 @@ void RankSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {
     return;
   }
   if (slab.slab >= span_.end) return;
-  if (!begun_) finder_ = holes::RimFinder(first_, stands_on_);
+  if (!begun_) finder_ = boundary::BoundaryFinder(first_, stands_on_);
   begun_ = true;
   require_writable(vertices, layout_.attributes, layout_.double_positions, vertices_);
   const std::size_t record = vertex_record_bytes(layout_.attributes, layout_.double_positions);
@@ -46,18 +46,18 @@ void RankSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {
   faces_.append(std::as_bytes(std::span(relative_)));
   vertices_ += vertices.size();
   triangles_ += relative_.size();
-  piece_.clear();
-  finder_.add(vertices, slab.triangles, piece_);
-  if (!piece_.empty()) holes::pack(piece_, rims_);
+  boundary_.clear();
+  finder_.add(vertices, slab.triangles, boundary_);
+  if (!boundary_.empty()) boundary::pack(boundary_, packed_boundary_);
 }
 
-std::vector<std::byte> RankSlabs::take_rims() {
+std::vector<std::byte> RankSlabs::take_boundary() {
   if (begun_) {
-    piece_.clear();
-    finder_.finish(/*more=*/true, piece_);
-    holes::pack(piece_, rims_);
+    boundary_.clear();
+    finder_.finish(/*more=*/true, boundary_);
+    boundary::pack(boundary_, packed_boundary_);
   }
-  return std::move(rims_);
+  return std::move(packed_boundary_);
 }
 
 void RankSlabs::read_vertices(const std::function<void(std::span<const std::byte>)>& take) {

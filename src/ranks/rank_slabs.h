@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/spill_file.h"
-#include "boundary/rim_finder.h"
+#include "boundary/boundary_finder.h"
 #include "chunks/part_file.h"
 #include "reconstruct/mesh_output.h"
 
@@ -31,8 +31,8 @@ class RankSlabs : public SlabSink {
   [[nodiscard]] std::uint64_t disk_bytes() const { return records_.size() + faces_.size(); }
   /// After the sweep: hands over all of it, piece by piece, in order.
   void read_vertices(const std::function<void(std::span<const std::byte>)>& take);
-  /// After the sweep, once: the part's rims, packed (rim_bytes.h).
-  std::vector<std::byte> take_rims();
+  /// After the sweep, once: the boundary of the part, packed (boundary/boundary.h).
+  std::vector<std::byte> take_boundary();
   void read_triangles(const std::function<void(std::span<const PartTriangle>)>& take);
 
  private:
@@ -41,9 +41,9 @@ class RankSlabs : public SlabSink {
   SpillFile records_, faces_;
   bool begun_ = false;
   VertexBatch stands_on_;  ///< vertices of the slab below the part
-  holes::RimFinder finder_;
-  holes::RimPiece piece_;
-  std::vector<std::byte> rims_;  ///< packed
+  boundary::BoundaryFinder finder_;
+  boundary::BoundaryBatch boundary_;
+  std::vector<std::byte> packed_boundary_;  ///< packed
   SlabMark below_, last_;
   std::uint64_t first_ = 0;  ///< vertices below the part, as the clusterer counts
   std::uint64_t vertices_ = 0, triangles_ = 0;

@@ -49,13 +49,13 @@ void sum_stats(Ranks& ranks, SurfaceStats& stats) {
   ClusterCounts& c = stats.clusters;
   std::vector<std::uint64_t*> counts{&undersampled,        &cpu,
                                      &stats.corners,       &stats.corner_sums,
-                                     &stats.corners_seen,  &stats.corners_good,
+                                     &stats.corners_seen,  &stats.corners_trusted,
                                      &stats.corners_torn,  &stats.isovertices,
                                      &stats.isotriangles,  &stats.rejected_loops,
                                      &stats.general_cells, &stats.crossing_cells,
                                      &stats.disk_bytes,    &c.corners,
                                      &c.collapsed,         &c.patches,
-                                     &c.kept_isovertices,  &c.hard};
+                                     &c.kept_isovertices,  &c.resolved};
   for (std::uint64_t& cells : stats.leaf_cells) counts.push_back(&cells);
   std::vector<std::uint64_t> values;
   values.reserve(counts.size());
@@ -90,7 +90,7 @@ void check_job(const SurfaceSettings& settings, const RunContext& run, bool firs
 /// The buckets that a sweep through the span reads.
 BucketSpan buckets_for(const ReconstructionPlan& plan, const SlabStore& store, const SlabSpan& span) {
   const ZRead z = z_read(plan, span);
-  const double filter = plan.refit.support > 0 ? RefitNormals(plan.refit, plan.lattice, select_kernel()).reach() : 0;
+  const double filter = plan.refit.support > 0 ? RefitNormals(plan.refit, plan.lattice, select_kernel()).halo() : 0;
   return buckets_read(store, plan.radii, plan.given_radii, z.from, z.to, filter);
 }
 

@@ -8,8 +8,8 @@
 #include <optional>
 
 #include "base/output_file.h"
+#include "boundary/boundary.h"
 #include "boundary/hole_closer.h"
-#include "boundary/rim_bytes.h"
 #include "chunks/merge_parts.h"
 #include "lamina/error.h"
 #include "meshes/streamed_ply.h"
@@ -61,17 +61,17 @@ void write_part(SharedFile& file, RankSlabs& part, const Place& place, bool firs
 }
 
 /// What rank 0 finds closes the holes of all; of the others, only how much there is.
-holes::Addition close_together(Ranks& ranks, RankSlabs& part, const std::vector<Border>& borders,
-                               const HoleSettings& settings, Place& place, HoleStats& stats) {
-  const std::vector<Bytes> rims = ranks.gather(part.take_rims());
-  holes::Addition addition;
+boundary::Addition close_together(Ranks& ranks, RankSlabs& part, const std::vector<Border>& borders,
+                                  const HoleSettings& settings, Place& place, HoleStats& stats) {
+  const std::vector<Bytes> rims = ranks.gather(part.take_boundary());
+  boundary::Addition addition;
   std::array<std::uint64_t, 2> added{};
   ranks.together([&] {
     if (!ranks.first()) return;
-    holes::HoleCloser closer(settings, part.layout().attributes.size());
+    boundary::HoleCloser closer(settings, part.layout().attributes.size());
     std::uint64_t first = 0;
     for (std::size_t r = 0; r < rims.size(); ++r) {
-      if (borders[r].any) closer.add_part(holes::unpack(rims[r]), first);
+      if (borders[r].any) closer.add_part(boundary::unpack(rims[r]), first);
       first += borders[r].vertices;
     }
     addition = closer.finish(place.vertices);
@@ -84,7 +84,7 @@ holes::Addition close_together(Ranks& ranks, RankSlabs& part, const std::vector<
   return addition;
 }
 
-void write_addition(SharedFile& file, const RankSlabs& part, const Place& place, const holes::Addition& addition) {
+void write_addition(SharedFile& file, const RankSlabs& part, const Place& place, const boundary::Addition& addition) {
   const std::uint64_t record = vertex_record_bytes(part.layout().attributes, part.layout().double_positions);
   const std::uint64_t own = place.vertices - addition.vertices.size();
   const std::uint64_t header = make_header(part, place).size();
@@ -138,7 +138,7 @@ Place write_together(Ranks& ranks, const ReconstructionPlan& plan, RankSlabs& pa
     place = find_place(borders, static_cast<std::size_t>(ranks.rank()), output);
     if (place.triangles == 0) no_surface(plan);
   });
-  const holes::Addition addition = close_together(ranks, part, borders, plan.holes, place, job.stats.holes);
+  const boundary::Addition addition = close_together(ranks, part, borders, plan.holes, place, job.stats.holes);
   ranks.together([&] {
     if (!ranks.first()) return;
     file.emplace(output, std::string());

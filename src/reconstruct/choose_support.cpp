@@ -18,7 +18,7 @@ void choose_for_noise(float noise, bool cell_given, StageSettings& out) {
   out.feed.blend = kNoisyBlend + (kVeryNoisyBlend - kNoisyBlend) * share;
   out.feed.cell = {kChosenCell, Length::Unit::sample_radius};
   out.refit.support = kNoisyRefit;
-  out.projection.good_reach = kNoisyTrust;
+  out.projection.trusted_offset = kNoisyTrust;
   if (!cell_given) out.projection.band = kNoisyBand;
 }
 
@@ -26,8 +26,8 @@ void choose_for_noise(float noise, bool cell_given, StageSettings& out) {
 void choose_for_even(bool cell_given, StageSettings& out) {
   out.feed.blend = 1;
   out.feed.cell = {kChosenCell, Length::Unit::sample_radius};
-  out.projection.good_reach = kEvenTrust;
-  out.projection.good_samples = kEvenTrustedSamples;
+  out.projection.trusted_offset = kEvenTrust;
+  out.projection.trusted_samples = kEvenTrustedSamples;
   out.holes.watertight = true;
   if (cell_given) return;
   out.feed.thin_cells = true;

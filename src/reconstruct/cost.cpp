@@ -84,12 +84,12 @@ double volume_memory(const ReconstructionPlan& plan, double per_slab) {
 }
 
 /// Of fitting normals again, measured with supports of 2 to 8 r: samples within reach of the slab's whose normals are
-/// found, in the order they came and in clumps; the normals until the sweep has passed; bins and rows of tiles.
+/// found, in the order they came and in clusters; the normals until the sweep has passed; bins and rows of tiles.
 double refit_memory(const ReconstructionPlan& plan, double per_step) {
   if (plan.refit.support <= 0) return 0;
   constexpr double kHeld = 80, kNormal = 12, kBins = 12e6;
   const double slab = plan.lattice.slab_height();
-  const double reach = RefitNormals(plan.refit, plan.lattice, select_kernel()).reach();
+  const double reach = RefitNormals(plan.refit, plan.lattice, select_kernel()).halo();
   const auto within = [&](double height) { return std::min(per_step * height, static_cast<double>(plan.samples)); };
   const double slabs_with_normals = reach_of(Stage::mark).ahead - 1 + static_cast<double>(plan.window);
   return kBins + kHeld * within(2 * reach + slab) + kNormal * within(slabs_with_normals * slab);

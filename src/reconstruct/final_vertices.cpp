@@ -56,7 +56,7 @@ void place_points(const ClusteredSlab& from, const Frame& frame, float chord, Ve
         const double t = v.t;
         p = (1 - t) * position(*a.corner) + t * position(*b.corner);
         // Where a corner is not trusted its point keeps to the samples, which the edge may not.
-        if (a.corner->reach < 0 || b.corner->reach < 0)
+        if (a.corner->offset_from_mean < 0 || b.corner->offset_from_mean < 0)
           p = (1 - t) * clustered(*a.corner, chord) + t * clustered(*b.corner, chord);
         const Vec3 blended = (1 - t) * normal + t * to_vec(b.corner->normal);
         if (blended.squaredNorm() > 1e-12) normal = blended.normalized();

@@ -1,6 +1,6 @@
 // From a finished slab's vertex kinds to positions, normals and attributes in the input's coordinates.
 #pragma once
-#include "clustering/cluster.h"
+#include "clustering/clusterer.h"
 #include "isosurface/iso_mesh.h"
 #include "lamina/frame.h"
 #include "meshes/mesh_sink.h"

@@ -70,22 +70,22 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
 }
 
 void ClosingSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {
-  piece_.clear();
-  finder_.add(vertices, slab.triangles, piece_);
-  closer_.add(piece_);
+  boundary_.clear();
+  finder_.add(vertices, slab.triangles, boundary_);
+  closer_.add(boundary_);
   vertices_ += vertices.size();
   to_.write(slab, vertices);
 }
 
-holes::Addition ClosingSlabs::finish() {
-  piece_.clear();
-  finder_.finish(/*more=*/false, piece_);
-  closer_.add(piece_);
+boundary::Addition ClosingSlabs::finish() {
+  boundary_.clear();
+  finder_.finish(/*more=*/false, boundary_);
+  closer_.add(boundary_);
   return closer_.finish(vertices_);
 }
 
 HoleStats close_holes(ClosingSlabs& slabs, MeshSink& sink) {
-  const holes::Addition addition = slabs.finish();
+  const boundary::Addition addition = slabs.finish();
   sink.append_vertices(addition.vertices);
   sink.append_triangles(addition.triangles);
   return slabs.stats();

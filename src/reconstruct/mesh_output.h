@@ -9,9 +9,9 @@
 #include <mutex>
 #include <vector>
 
+#include "boundary/boundary_finder.h"
 #include "boundary/hole_closer.h"
-#include "boundary/rim_finder.h"
-#include "clustering/cluster.h"
+#include "clustering/clusterer.h"
 #include "isosurface/iso_mesh.h"
 #include "lamina/frame.h"
 #include "lamina/surface.h"
@@ -96,13 +96,13 @@ class ClosingSlabs final : public SlabSink {
       : closer_(settings, attributes), to_(to) {}
   void write(const FinalSlab& slab, const VertexBatch& vertices) override;
   /// All slabs have come: what is to be added to the mesh.
-  holes::Addition finish();
+  boundary::Addition finish();
   [[nodiscard]] const HoleStats& stats() const { return closer_.stats(); }
 
  private:
-  holes::RimFinder finder_;
-  holes::HoleCloser closer_;
-  holes::RimPiece piece_;
+  boundary::BoundaryFinder finder_;
+  boundary::HoleCloser closer_;
+  boundary::BoundaryBatch boundary_;
   std::uint64_t vertices_ = 0;
   SlabSink& to_;
 };

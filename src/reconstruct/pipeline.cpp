@@ -8,7 +8,7 @@
 
 #include "lamina/error.h"
 #include "mls/diffuse.h"
-#include "mls/finish.h"
+#include "mls/extension.h"
 #include "octree/refine.h"
 
 namespace lamina {
@@ -26,7 +26,7 @@ Pipeline::Pipeline(const ReconstructionPlan& plan, SampleFeed& feed, const SlabS
       refined_(stages_.of(Stage::refine).begin),
       placed_(stages_.of(Stage::place).begin),
       projected_(stages_.of(Stage::project).begin),
-      finished_(stages_.of(Stage::extend).begin),
+      extended_(stages_.of(Stage::extend).begin),
       numbered_(stages_.of(Stage::number).begin),
       triangulated_(stages_.of(Stage::triangulate).begin),
       held_(stages_.of(Stage::triangulate).begin),
@@ -76,9 +76,9 @@ void Pipeline::project_to(std::int32_t slab) {
   }
 }
 
-void Pipeline::finish_to(std::int32_t slab) {
-  for (; finished_ < std::min(slab + 1, stages_.of(Stage::extend).end); ++finished_) {
-    finish_slab(window_, finished_, kernel_, plan_.boundary);
+void Pipeline::extend_to(std::int32_t slab) {
+  for (; extended_ < std::min(slab + 1, stages_.of(Stage::extend).end); ++extended_) {
+    extend_slab(window_, extended_, kernel_, plan_.boundary);
   }
 }
 
@@ -135,7 +135,7 @@ void Pipeline::run(const RunContext& run, Stopwatch& watch) {
     });
     watch.time("refine", [&] { refine_to(ahead(Stage::refine)); });
     watch.time("project", [&] { project_to(ahead(Stage::project)); });
-    watch.time("finish", [&] { finish_to(ahead(Stage::extend)); });
+    watch.time("extend", [&] { extend_to(ahead(Stage::extend)); });
     watch.time("number", [&] { number_to(ahead(Stage::number), watch); });
     watch.time("triangulate", [&] { triangulate_to(ahead(Stage::triangulate)); });
     watch.time("cluster and write", [&] { output_.start(); });
@@ -157,7 +157,7 @@ void Pipeline::note_disk() {
 void Pipeline::report(SurfaceStats& stats) const {
   stats.corners = projector_.counts().corners;
   stats.corners_seen = projector_.counts().seen;
-  stats.corners_good = projector_.counts().good;
+  stats.corners_trusted = projector_.counts().trusted;
   stats.corner_sums = projector_.counts().sums;
   stats.corners_torn = projector_.counts().torn;
   stats.torn_slab = projector_.counts().torn_slab - plan_.slabs.begin;

@@ -18,7 +18,7 @@
 
 namespace lamina {
 
-/// Refine, project, finish, number, triangulate, cluster, write: run() takes the slabs through all of them, each as far
+/// Refine, project, extend, number, triangulate, cluster, write: run() takes the slabs through all of them, each as far
 /// ahead as kStageReach says.
 class Pipeline {
  public:
@@ -32,7 +32,7 @@ class Pipeline {
   void mark(const ActiveBucket& bucket);
   void refine_to(std::int32_t slab);
   void project_to(std::int32_t slab);
-  void finish_to(std::int32_t slab);
+  void extend_to(std::int32_t slab);
   void number_to(std::int32_t slab, Stopwatch& watch);
   void triangulate_to(std::int32_t slab);
   void hand_over();
@@ -50,7 +50,7 @@ class Pipeline {
   double sample_reach_;  ///< sample_reach() of the plan
 
   // Next slab of each stage.
-  std::int32_t refined_, placed_, projected_, finished_, numbered_, triangulated_;
+  std::int32_t refined_, placed_, projected_, extended_, numbered_, triangulated_;
   std::int32_t held_;  ///< first slab of iso_
   std::int32_t covered_;
   std::deque<std::shared_ptr<IsoSlab>> iso_;  ///< slabs held_ .. numbered_ - 1

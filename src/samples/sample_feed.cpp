@@ -26,16 +26,16 @@ std::int64_t cell_of(std::int64_t z, std::int64_t height) {
 }
 
 /// The first bucket that a feed beginning at z reads; `counting`: side of the coarsest counting cells, 0 where there
-/// are none; `filter_reach`: of the filter of normals.
-std::size_t first_bucket(const SlabStore& store, std::int64_t z, std::int64_t counting, double filter_reach) {
+/// are none; `filter_halo`: of the filter of normals.
+std::size_t first_bucket(const SlabStore& store, std::int64_t z, std::int64_t counting, double filter_halo) {
   const auto first_reaching = [&](std::int64_t from) {
     std::size_t bucket = 0;
     while (bucket < store.buckets() && (store.count(bucket) == 0 || store.z_upper(bucket) < from)) ++bucket;
     return bucket;
   };
   std::size_t first = first_reaching(z);
-  if (filter_reach > 0 && first < store.buckets())
-    first = first_reaching(store.z_lower(first) - static_cast<std::int64_t>(filter_reach));
+  if (filter_halo > 0 && first < store.buckets())
+    first = first_reaching(store.z_lower(first) - static_cast<std::int64_t>(filter_halo));
   if (counting == 0 || first == store.buckets()) return first;
   // A radius depends on the counting cells above and below the sample's own.
   return first_reaching((cell_of(store.z_lower(first), counting) - 1) * counting);
@@ -90,14 +90,14 @@ std::size_t SampleFeed::next_filled(std::size_t bucket) const {
 
 void SampleFeed::begin_at(std::int64_t z) {
   const std::size_t first =
-      first_bucket(store_, z, estimator_ == nullptr ? 0 : counting_height_, filter_ == nullptr ? 0 : filter_->reach());
+      first_bucket(store_, z, estimator_ == nullptr ? 0 : counting_height_, filter_ == nullptr ? 0 : filter_->halo());
   pushed_ = announced_ = measured_ = ready_ = first_ = first;
 }
 
 BucketSpan buckets_read(const SlabStore& store, const RadiiSettings& radii, bool given_radii,
-                        std::optional<std::int64_t> from, std::int64_t to, double filter_reach) {
+                        std::optional<std::int64_t> from, std::int64_t to, double filter_halo) {
   const std::int64_t height = given_radii ? 0 : counting_height(radii);
-  BucketSpan span{from ? first_bucket(store, *from, height, filter_reach) : 0, 0};
+  BucketSpan span{from ? first_bucket(store, *from, height, filter_halo) : 0, 0};
   std::int64_t known = to;  // below this all samples are asked for
   span.end = span.begin;
   const auto ask_below = [&](std::int64_t limit) {
@@ -107,7 +107,7 @@ BucketSpan buckets_read(const SlabStore& store, const RadiiSettings& radii, bool
     }
   };
   ask_below(to);
-  if (filter_reach > 0) ask_below(known + static_cast<std::int64_t>(filter_reach) + 1);
+  if (filter_halo > 0) ask_below(known + static_cast<std::int64_t>(filter_halo) + 1);
   if (given_radii) return span;
   // The last one's radii are final when a sample lies beyond the counting cells above its own.
   const std::int64_t beyond = (cell_of(known - 1, height) + 2) * height;
@@ -162,7 +162,7 @@ bool SampleFeed::is_surrounded(std::size_t bucket) const {
   if (filter_ == nullptr || store_.count(bucket) == 0 || measured_ == store_.buckets()) return true;
   const std::size_t next = next_filled(measured_);
   return next == store_.buckets() ||
-         static_cast<double>(store_.z_lower(next)) > static_cast<double>(store_.z_upper(bucket)) + filter_->reach();
+         static_cast<double>(store_.z_lower(next)) > static_cast<double>(store_.z_upper(bucket)) + filter_->halo();
 }
 
 void SampleFeed::make_ready(const OnReady& on_ready) {
@@ -170,7 +170,7 @@ void SampleFeed::make_ready(const OnReady& on_ready) {
     if (filter_ != nullptr) {
       known_[ready_].normals = filter_->find(ready_);
       filter_->forget_below(static_cast<std::int64_t>(store_.z_lower(ready_)) -
-                            static_cast<std::int64_t>(filter_->reach()) - 1);
+                            static_cast<std::int64_t>(filter_->halo()) - 1);
     }
     on_ready(*fetch(ready_));
   }

@@ -31,10 +31,10 @@ class NormalFilter {
   NormalFilter(const NormalFilter&) = delete;
   NormalFilter& operator=(const NormalFilter&) = delete;
   /// As far as samples act, steps.
-  [[nodiscard]] virtual double reach() const = 0;
+  [[nodiscard]] virtual double halo() const = 0;
   /// A bucket's samples and the radii they have (steps; 0: left out).
   virtual void add(std::size_t bucket, const LocalSamples& samples, const std::vector<float>& radii) = 0;
-  /// Of a bucket that was added, in its order; all samples within reach() have been added.
+  /// Of a bucket that was added, in its order; all samples within halo() have been added.
   virtual UnitNormals find(std::size_t bucket) = 0;
   /// Samples below z act on nothing more.
   virtual void forget_below(std::int64_t z) = 0;
@@ -76,9 +76,9 @@ struct BucketSpan {
 };
 
 /// The buckets that a feed reads which begins at `from` (begin_at(); nothing: at the bottom) and prepares all below
-/// `to`: it may look for two more, but does without them. `filter_reach`: NormalFilter::reach(), 0 without one.
+/// `to`: it may look for two more, but does without them. `filter_halo`: NormalFilter::halo(), 0 without one.
 BucketSpan buckets_read(const SlabStore& store, const RadiiSettings& radii, bool given_radii,
-                        std::optional<std::int64_t> from, std::int64_t to, double filter_reach = 0);
+                        std::optional<std::int64_t> from, std::int64_t to, double filter_halo = 0);
 
 /// Buckets go by ascending z: prepare() runs ahead, release() follows behind. Inside a bucket samples are sorted by
 /// blocks of cells (feed/block_order.h): successive ones lie close to each other, which the stages may rely on for

@@ -110,19 +110,19 @@ void find_samples(benchmark::State& state, const Scene& scene, bool gather) {
     for (std::int32_t slab = replay->first(); slab <= replay->last(); ++slab) {
       const std::int64_t height = lattice.slab_height();
       for (const auto& numbers : replay->feed().batches(slab * height, (slab + 1) * height, 0)) {
-        ClumpedBatch batch;
+        ClusteredBatch batch;
         for (const auto& bucket : replay->feed().load(numbers)) {
-          batch.push_back(std::make_shared<const ClumpedBucket>(clump(*bucket, lattice)));
+          batch.push_back(std::make_shared<const ClusteredBucket>(cluster_samples(*bucket, lattice)));
         }
         for (int level = 0; level < window.levels(); ++level) {
           const Tiles tiles = window.tiles(level, slab);
           std::vector<Block> blocks;
           for (const Tile& t : tiles) blocks.push_back(t.block);
           const std::int32_t first = lattice.first_layer(level, slab);
-          const Reach reach{level, first, first + lattice.layers(level), 0, 0};
-          const TileRuns bins = bin_clumps(lattice, reach, batch, blocks);
+          const QueryLayers layers{level, first, first + lattice.layers(level), 0, 0};
+          const TileRuns bins = bin_clusters(lattice, layers, batch, blocks);
           for (std::size_t t = 0; t < tiles.size(); ++t) {
-            if (gather) rows.gather(lattice, reach, tiles[t].block, bins.of(t), ProjectSettings{}.band);
+            if (gather) rows.gather(lattice, layers, tiles[t].block, bins.of(t), ProjectSettings{}.band);
             found += gather ? rows.samples().x.size() : bins.of(t).size();
           }
         }

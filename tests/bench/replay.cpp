@@ -7,7 +7,7 @@
 #include <limits>
 
 #include "mls/diffuse.h"
-#include "mls/finish.h"
+#include "mls/extension.h"
 #include "octree/refine.h"
 #include "reconstruct/final_vertices.h"
 #include "reconstruct/stages.h"
@@ -112,9 +112,9 @@ void Replay::run(Stage stage) {
     case Stage::diffuse:
       if (settings_.centres) every_slab([&](std::int32_t s) { diffuse_slab(window_, s); });
       return;
-    case Stage::finish:
+    case Stage::extend:
       return every_slab(
-          [&](std::int32_t s) { finish_slab(window_, s, kernel_, static_cast<float>(scene_.settings.boundary)); });
+          [&](std::int32_t s) { extend_slab(window_, s, kernel_, static_cast<float>(scene_.settings.boundary)); });
     case Stage::number:
       return number();
     case Stage::triangulate:

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bench/scene.h"
-#include "clustering/cluster.h"
+#include "clustering/clusterer.h"
 #include "isosurface/extract.h"
 #include "mls/project.h"
 #include "octree/window.h"
@@ -18,7 +18,7 @@ class Replay {
  public:
   explicit Replay(const Scene& scene, const ProjectSettings& settings = {}, const Kernel& kernel = select_kernel());
 
-  enum class Stage { load, mark, refine, place, project, diffuse, finish, number, triangulate, cluster };
+  enum class Stage { load, mark, refine, place, project, diffuse, extend, number, triangulate, cluster };
   /// Runs one stage; those before must have run (diffuse only with settings.centres, cluster is the last).
   void run(Stage stage);
   /// Runs every stage before `stage`.

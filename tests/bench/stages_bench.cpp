@@ -47,7 +47,7 @@ void add_stage_benches(const Scene& scene, const std::string& suffix) {
     add_stage(scene, "mark", Stage::mark);
     add_stage(scene, "refine", Stage::refine);
     add_stage(scene, "place", Stage::place);
-    add_stage(scene, "finish", Stage::finish);
+    add_stage(scene, "extend", Stage::extend);
     add_stage(scene, "triangulate", Stage::triangulate);
     add("cluster/none", [&scene](benchmark::State& s) { cluster(s, scene, ClusterMode::none); });
     add("cluster/free", [&scene](benchmark::State& s) { cluster(s, scene, ClusterMode::free); });

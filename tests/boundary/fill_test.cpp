@@ -1,4 +1,4 @@
-// Fillings of rims on surfaces whose truth is known.
+// Fillings of boundary loops on surfaces whose truth is known.
 #include "boundary/fill.h"
 
 #include <gtest/gtest.h>
@@ -11,20 +11,21 @@
 
 #include "support/mesh_check.h"
 
-namespace lamina::holes {
+namespace lamina::boundary {
 namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
 
-/// A rim of n vertices around the pole of the unit sphere, `angle` away from it: filled anticlockwise from outside.
-Loop sphere_rim(std::uint32_t n, double angle, double radius, double jitter = 0, std::uint32_t seed = 1) {
+/// A boundary loop of n vertices around the pole of the unit sphere, `angle` away from it: filled anticlockwise from
+/// outside.
+Loop sphere_loop(std::uint32_t n, double angle, double radius, double jitter = 0, std::uint32_t seed = 1) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<> uniform(-jitter, jitter);
   Loop loop;
   for (std::uint32_t i = 0; i < n; ++i) {
     const double a = kTurn * (i + 0.4 * uniform(random)) / n, b = angle * (1 + uniform(random));
     const std::array<double, 3> p{std::sin(b) * std::cos(a), std::sin(b) * std::sin(a), std::cos(b)};
-    RimVertex v;
+    BoundaryVertex v;
     v.number = 10 * i;
     v.position = p;
     v.normal = {static_cast<float>(p[0]), static_cast<float>(p[1]), static_cast<float>(p[2])};
@@ -41,7 +42,7 @@ void reverse(Loop& loop) {
   std::reverse(loop.facing.begin(), loop.facing.end());
 }
 
-/// A disc whose rim is the loop.
+/// A disc whose boundary loop is the loop.
 void expect_disc(const Loop& loop, const Filling& filling) {
   ASSERT_EQ(filling.verdict, Verdict::filled) << describe(filling.verdict);
   const auto n = static_cast<std::uint32_t>(loop.vertices.size());
@@ -53,7 +54,7 @@ void expect_disc(const Loop& loop, const Filling& filling) {
 }
 
 TEST(Fill, OfASphereLiesOnTheSphere) {
-  const Loop loop = sphere_rim(16, 0.3, 0.2);
+  const Loop loop = sphere_loop(16, 0.3, 0.2);
   const Filling filling = fill_loop(loop, 12);
   expect_disc(loop, filling);
   ASSERT_GT(filling.positions.size(), 4U);
@@ -67,7 +68,7 @@ TEST(Fill, OfASphereLiesOnTheSphere) {
 
 RC_GTEST_PROP(Fill, RaggedRimsBecomeDiscsNearTheSphere, ()) {
   const auto n = *rc::gen::inRange<std::uint32_t>(3, 40);
-  const Loop loop = sphere_rim(n, 0.25, 0.2, 0.15, *rc::gen::arbitrary<std::uint32_t>());
+  const Loop loop = sphere_loop(n, 0.25, 0.2, 0.15, *rc::gen::arbitrary<std::uint32_t>());
   const Filling filling = fill_loop(loop, 100);
   RC_ASSERT(filling.verdict == Verdict::filled);
   expect_disc(loop, filling);
@@ -75,19 +76,19 @@ RC_GTEST_PROP(Fill, RaggedRimsBecomeDiscsNearTheSphere, ()) {
 }
 
 TEST(Fill, NotBeyondTheBound) {
-  const Loop loop = sphere_rim(16, 0.3, 0.2);  // the rim is 9.2 radii long
+  const Loop loop = sphere_loop(16, 0.3, 0.2);  // the boundary loop is 9.2 radii long
   EXPECT_EQ(fill_loop(loop, 9).verdict, Verdict::too_long);
   EXPECT_EQ(fill_loop(loop, 9.5).verdict, Verdict::filled);
 }
 
 TEST(Fill, NotOutsideOfASurface) {
-  Loop loop = sphere_rim(12, 0.3, 0.2);
+  Loop loop = sphere_loop(12, 0.3, 0.2);
   reverse(loop);
-  EXPECT_EQ(fill_loop(loop, 100).verdict, Verdict::outer_rim);
+  EXPECT_EQ(fill_loop(loop, 100).verdict, Verdict::outer_boundary);
 }
 
 TEST(Fill, NotTheEndOfATube) {
-  Loop loop = sphere_rim(12, 0.3, 0.2);
+  Loop loop = sphere_loop(12, 0.3, 0.2);
   for (std::size_t i = 0; i < 12; ++i) {
     const double a = kTurn * static_cast<double>(i) / 12;
     loop.vertices[i].normal = {static_cast<float>(std::cos(a)), static_cast<float>(std::sin(a)), 0};
@@ -96,14 +97,14 @@ TEST(Fill, NotTheEndOfATube) {
 }
 
 TEST(Fill, NotTheBackOfALoneTriangle) {
-  Loop loop = sphere_rim(3, 0.2, 0.3);
+  Loop loop = sphere_loop(3, 0.2, 0.3);
   ASSERT_EQ(fill_loop(loop, 100).verdict, Verdict::filled);
   loop.facing.assign(3, {0, 0, -1});
-  EXPECT_EQ(fill_loop(loop, 100).verdict, Verdict::outer_rim);
+  EXPECT_EQ(fill_loop(loop, 100).verdict, Verdict::outer_boundary);
 }
 
 TEST(Fill, UsesNoEdgeOfTheMesh) {
-  Loop loop = sphere_rim(4, 0.2, 0.3);
+  Loop loop = sphere_loop(4, 0.2, 0.3);
   loop.taken = {{0, 2}};
   const Filling filling = fill_loop(loop, 100);
   expect_disc(loop, filling);
@@ -129,19 +130,19 @@ double least_area(const Loop& loop, std::uint32_t i, std::uint32_t k) {
   return least;
 }
 
-/// A rim that no plane shows without crossings.
+/// A boundary loop that no plane shows without crossings.
 Loop winding_rim(std::uint32_t n, std::uint32_t seed) {
-  Loop loop = sphere_rim(n, 0.5, 0.2);
+  Loop loop = sphere_loop(n, 0.5, 0.2);
   std::mt19937 random(seed);
   std::normal_distribution<> normal;
-  for (RimVertex& v : loop.vertices) v.position = {normal(random), normal(random), normal(random)};
+  for (BoundaryVertex& v : loop.vertices) v.position = {normal(random), normal(random), normal(random)};
   return loop;
 }
 
 RC_GTEST_PROP(FillAny, IsADiscOfLeastArea, ()) {
   const auto n = *rc::gen::inRange<std::uint32_t>(3, 9);
   const Loop loop = winding_rim(n, *rc::gen::arbitrary<std::uint32_t>());
-  RC_PRE(!(n == 3 && fill_any(loop).verdict == Verdict::outer_rim));
+  RC_PRE(!(n == 3 && fill_any(loop).verdict == Verdict::outer_boundary));
   const Filling filling = fill_any(loop);
   expect_disc(loop, filling);
   RC_ASSERT(filling.positions.empty());
@@ -149,7 +150,7 @@ RC_GTEST_PROP(FillAny, IsADiscOfLeastArea, ()) {
 }
 
 TEST(FillAny, ClosesWhatNothingSupports) {
-  Loop outer = sphere_rim(12, 0.3, 0.2);
+  Loop outer = sphere_loop(12, 0.3, 0.2);
   reverse(outer);
   expect_disc(outer, fill_any(outer));
   const Loop winding = winding_rim(30, 3);
@@ -158,7 +159,7 @@ TEST(FillAny, ClosesWhatNothingSupports) {
 }
 
 TEST(FillAny, GoesAroundANewVertexWhereEdgesAreTaken) {
-  Loop loop = sphere_rim(4, 0.2, 0.3);
+  Loop loop = sphere_loop(4, 0.2, 0.3);
   loop.taken = {{0, 2}, {1, 3}};
   const Filling filling = fill_any(loop);
   expect_disc(loop, filling);
@@ -169,17 +170,17 @@ TEST(FillAny, GoesAroundANewVertexWhereEdgesAreTaken) {
 }
 
 TEST(FillAny, GivesNoLoneTriangleABack) {
-  Loop loop = sphere_rim(3, 0.2, 0.3);
+  Loop loop = sphere_loop(3, 0.2, 0.3);
   expect_disc(loop, fill_any(loop));
   loop.facing.assign(3, {0, 0, -1});
-  EXPECT_EQ(fill_any(loop).verdict, Verdict::outer_rim);
+  EXPECT_EQ(fill_any(loop).verdict, Verdict::outer_boundary);
 }
 
 TEST(Fill, IsOccupiedByVerticesInItOnly) {
-  const Loop loop = sphere_rim(12, 0.3, 0.2);
+  const Loop loop = sphere_loop(12, 0.3, 0.2);
   const Filling filling = fill_loop(loop, 100);
   ASSERT_EQ(filling.verdict, Verdict::filled);
-  RimVertex other;
+  BoundaryVertex other;
   other.position = {0.02, 0.01, 1.05};
   EXPECT_TRUE(occupies(other, loop, filling));
   other.position = {0.02, 0.01, 0.7};
@@ -189,4 +190,4 @@ TEST(Fill, IsOccupiedByVerticesInItOnly) {
 }
 
 }  // namespace
-}  // namespace lamina::holes
+}  // namespace lamina::boundary

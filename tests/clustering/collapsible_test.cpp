@@ -2,14 +2,14 @@
 
 #include <gtest/gtest.h>
 
-namespace lamina::cluster {
+namespace lamina::clustering {
 namespace {
 
 /// Triangles by vertex; a vertex's label is label[vertex].
 bool test(const std::vector<std::uint64_t>& label, const std::vector<std::array<std::uint32_t, 3>>& triangles) {
   std::vector<StarTriangle> star;
   for (const auto& t : triangles) star.push_back({t, {label[t[0]], label[t[1]], label[t[2]]}});
-  PieceScratch scratch;
+  ComponentScratch scratch;
   return collapses(star, 100, scratch);
 }
 
@@ -55,4 +55,4 @@ TEST(Collapsible, AVertexMetTwiceForbids) {
 }
 
 }  // namespace
-}  // namespace lamina::cluster
+}  // namespace lamina::clustering

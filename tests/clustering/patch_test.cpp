@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace lamina::cluster {
+namespace lamina::clustering {
 namespace {
 
 /// A fan around vertex 0 at `centre` over the given ring.
@@ -54,4 +54,4 @@ TEST(Patch, WithoutAreaIsTheMean) {
 }
 
 }  // namespace
-}  // namespace lamina::cluster
+}  // namespace lamina::clustering

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <set>
 
-namespace lamina::cluster {
+namespace lamina::clustering {
 namespace {
 
 using Pair = std::pair<int, int>;
@@ -91,4 +91,4 @@ TEST(Shape, AgreesWithAPlainSearch) {
 }
 
 }  // namespace
-}  // namespace lamina::cluster
+}  // namespace lamina::clustering

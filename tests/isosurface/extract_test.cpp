@@ -76,7 +76,7 @@ struct Case {
     FieldSample s;
     s.distance = static_cast<float>((negative ? -kCell : kCell) * magnitude);
     s.seen = noise(seed + 2, p) >= unseen;
-    s.valued = noise(seed + 3, p) < 0.6;
+    s.defined = noise(seed + 3, p) < 0.6;
     return s;
   }
   [[nodiscard]] WholeMesh mesh(const std::function<void(IsoSlab&)>& prepare = {}) {
@@ -262,9 +262,9 @@ TEST(Extract, NothingStaysOfWhatASlabHeldBefore) {
     ASSERT_EQ(a.corners.size(), b.corners.size());
     for (std::size_t k = 0; k < a.corners.size(); ++k) {
       EXPECT_EQ(std::tie(a.corners[k].position, a.corners[k].offset, a.corners[k].normal, a.corners[k].distance,
-                         a.corners[k].curvature, a.corners[k].cell, a.corners[k].reach),
+                         a.corners[k].curvature, a.corners[k].cell, a.corners[k].offset_from_mean),
                 std::tie(b.corners[k].position, b.corners[k].offset, b.corners[k].normal, b.corners[k].distance,
-                         b.corners[k].curvature, b.corners[k].cell, b.corners[k].reach));
+                         b.corners[k].curvature, b.corners[k].cell, b.corners[k].offset_from_mean));
     }
   }
 }

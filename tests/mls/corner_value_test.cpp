@@ -21,7 +21,7 @@ struct Truth {
 Truth truth_of(const std::map<Cell, OwnValue>& values, const Cell& c, double cell, int channels) {
   Truth t{false, false, std::vector<double>(channels, 0.0), std::vector<double>(channels, 0.0)};
   const auto own = values.find(c);
-  if (own != values.end() && own->second.good) {
+  if (own != values.end() && own->second.trusted) {
     t.found = t.own = true;
     t.channels = own->second.channels;
     return t;
@@ -45,12 +45,12 @@ Truth truth_of(const std::map<Cell, OwnValue>& values, const Cell& c, double cel
     t.channels[k] /= length;
     t.error[k] = kRounding / length;
   }
-  t.channels[kReach] = t.error[kReach] = 0;
+  t.channels[kOffsetFromMean] = t.error[kOffsetFromMean] = 0;
   return t;
 }
 
 std::vector<float> channels_of(const CornerValue& v, const std::vector<float>& attributes) {
-  std::vector<float> out{v.distance, v.normal[0], v.normal[1], v.normal[2], v.curvature, v.reach};
+  std::vector<float> out{v.distance, v.normal[0], v.normal[1], v.normal[2], v.curvature, v.offset_from_mean};
   out.insert(out.end(), attributes.begin(), attributes.end());
   return out;
 }

@@ -18,47 +18,49 @@ namespace {
 struct Centre {
   std::array<std::int64_t, 3> low;  ///< the cell's lower end, steps
   std::int64_t size;
-  bool good;
+  bool trusted;
   std::vector<double> values;  ///< channels
 };
 
 std::vector<Centre> centres_of(const Window& window, std::int32_t first, std::int32_t end) {
   std::vector<Centre> out;
   for (int level = 0; level < window.levels(); ++level) {
-    for_set(
-        window, level, first, end, &CornerBlock::cells, [&](int, const Cell& c, const CornerBlock& leaf, int offset) {
-          if (leaf.centres == nullptr || !leaf.centres->seen.test(offset)) return;
-          const auto at = window.lattice().position(level, c);
-          Centre centre{{at[0], at[1], at[2]}, window.lattice().cell_size(level), leaf.centres->good.test(offset), {}};
-          const CornerValues& v = leaf.centres->values[window.brick_of(level, offset >> 6)];
-          const std::uint32_t i = leaf.centres->value_index(offset, window.brick_layers(level));
-          for (int channel = 0; channel < window.channels(); ++channel) centre.values.push_back(v.channel(channel)[i]);
-          out.push_back(std::move(centre));
-        });
+    for_set(window, level, first, end, &CornerBlock::cells,
+            [&](int, const Cell& c, const CornerBlock& leaf, int offset) {
+              if (leaf.centres == nullptr || !leaf.centres->seen.test(offset)) return;
+              const auto at = window.lattice().position(level, c);
+              Centre centre{
+                  {at[0], at[1], at[2]}, window.lattice().cell_size(level), leaf.centres->trusted.test(offset), {}};
+              const CornerValues& v = leaf.centres->values[window.slab_in_leaf(level, offset >> 6)];
+              const std::uint32_t i = leaf.centres->value_index(offset, window.slab_layers(level));
+              for (int channel = 0; channel < window.channels(); ++channel)
+                centre.values.push_back(v.channel(channel)[i]);
+              out.push_back(std::move(centre));
+            });
   }
   return out;
 }
 
 struct Mean {
-  bool good = false;
+  bool trusted = false;
   std::vector<double> values, error;
 };
 
 /// The mean over the leaf cells that touch a point, by definition: all cells are looked at.
 std::optional<Mean> mean_at(const std::vector<Centre>& centres, const std::array<std::int32_t, 3>& p, int channels) {
   std::vector<const Centre*> around;
-  bool good = false;
+  bool trusted = false;
   for (const Centre& c : centres) {
     bool touches = true;
     for (int k = 0; k < 3; ++k) touches = touches && c.low[k] <= p[k] && p[k] <= c.low[k] + c.size;
     if (!touches) continue;
     around.push_back(&c);
-    good = good || c.good;
+    trusted = trusted || c.trusted;
   }
-  Mean mean{good, std::vector<double>(channels, 0.0), std::vector<double>(channels, 0.0)};
+  Mean mean{trusted, std::vector<double>(channels, 0.0), std::vector<double>(channels, 0.0)};
   double weight = 0;
   for (const Centre* c : around) {
-    if (good && !c->good) continue;
+    if (trusted && !c->trusted) continue;
     const double w = 1.0 / static_cast<double>(c->size);
     weight += w;
     // From the centre to the point; the distance there of the sphere that osculates the centre's surface.
@@ -126,23 +128,23 @@ TEST(Diffuse, CornersTakeTheMeanOfTheCellsThatTouchThem) {
     const std::vector<Centre> centres = centres_of(s.window, s.first, s.end);
     std::size_t compared = 0;
     std::size_t shared = 0;
-    std::size_t good = 0;
+    std::size_t trusted = 0;
     for (int level = 0; level < scene.lattice.levels; ++level) {
       for_set(s.window, level, s.first, s.end, &CornerBlock::corners,
               [&](int, const Cell& c, const CornerBlock& leaf, int offset) {
-                if (!leaf.near.test(offset)) {
+                if (!leaf.active.test(offset)) {
                   ASSERT_FALSE(leaf.seen.test(offset));
                   return;
                 }
                 const auto truth = mean_at(centres, scene.lattice.position(level, c), s.window.channels());
                 ASSERT_EQ(leaf.seen.test(offset), truth.has_value()) << c.x << " " << c.y << " " << c.z;
-                ASSERT_EQ(leaf.good.test(offset), truth.has_value() && truth->good);
+                ASSERT_EQ(leaf.trusted.test(offset), truth.has_value() && truth->trusted);
                 if (!truth.has_value()) return;
                 ++compared;
-                good += truth->good ? 1 : 0;
+                trusted += truth->trusted ? 1 : 0;
                 shared += leaf.shared.test(offset) ? 1 : 0;
-                const CornerValues& v = leaf.values[s.window.brick_of(level, offset >> 6)];
-                const std::uint32_t i = leaf.value_index(offset, s.window.brick_layers(level));
+                const CornerValues& v = leaf.values[s.window.slab_in_leaf(level, offset >> 6)];
+                const std::uint32_t i = leaf.value_index(offset, s.window.slab_layers(level));
                 for (int channel = 0; channel < s.window.channels(); ++channel) {
                   ASSERT_NEAR(v.channel(channel)[i], truth->values[channel], truth->error[channel])
                       << "channel " << channel << " level " << level;
@@ -152,8 +154,8 @@ TEST(Diffuse, CornersTakeTheMeanOfTheCellsThatTouchThem) {
     }
     EXPECT_GT(compared, 1000U);
     EXPECT_GT(shared, 50U);
-    EXPECT_GT(good, 300U);
-    EXPECT_GT(compared - good, 100U);
+    EXPECT_GT(trusted, 300U);
+    EXPECT_GT(compared - trusted, 100U);
   }
 }
 

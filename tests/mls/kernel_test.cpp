@@ -200,7 +200,7 @@ TEST(Kernel, AllKindsGiveTheSameBits) {
       FitOutput out{};
       kernel.fit(sums.data(), in, out);
       for (const auto member : {&FitOutput::distance, &FitOutput::nx, &FitOutput::ny, &FitOutput::nz,
-                                &FitOutput::curvature, &FitOutput::reach}) {
+                                &FitOutput::curvature, &FitOutput::offset_from_mean}) {
         ASSERT_TRUE(same_bits(fit.*member, out.*member)) << kernel.name;
       }
     }

@@ -18,7 +18,7 @@ inline double dot(const Vec3& a, const Vec3& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-/// A sample as METHOD defines it: R = H r, q proportional to quality / r^2, and the size of the cells it asks for.
+/// A sample as the method defines it: R = H r, q proportional to quality / r^2, and the size of the cells it asks for.
 struct TruthSample {
   Vec3 p, n;           ///< steps
   double support = 0;  ///< R, steps; 0: left out
@@ -32,11 +32,11 @@ struct TruthValue {
   double weight = 0;
   int seen = 0;
   double nearest = 1e30;  ///< least (distance / band)^2 over the samples that contribute
-  double distance = 0, curvature = 0, reach = 0;
+  double distance = 0, curvature = 0, offset_from_mean = 0;
   Vec3 from_average{};  ///< the point minus the weighted average of its samples
   Vec3 normal{};
   std::vector<double> attributes;
-  double distance_error = 0, curvature_error = 0, reach_error = 0, normal_error = 0;
+  double distance_error = 0, curvature_error = 0, offset_error = 0, normal_error = 0;
   std::vector<double> attribute_errors;
   bool undecided = false;  ///< so near a switch (curved or flat, seen or not) that rounding may turn it
 };
@@ -93,8 +93,8 @@ class MlsTruth {
     }
     v.curvature = fit.out[4] / cell;
     v.curvature_error = fit.error[4] / cell;
-    v.reach = fit.out[5];
-    v.reach_error = fit.error[5];
+    v.offset_from_mean = fit.out[5];
+    v.offset_error = fit.error[5];
     for (int k = 0; k < 3; ++k) v.from_average[k] = fit.from_average[k] * cell;
     const std::size_t attributes = samples_.empty() ? 0 : samples_.front().attributes.size();
     v.attributes.assign(fit.out.begin() + 6, fit.out.begin() + 6 + static_cast<std::ptrdiff_t>(attributes));
@@ -105,10 +105,10 @@ class MlsTruth {
  private:
   static constexpr double kUnit = 0x1p-24;  ///< rounding of a float, relative
 
-  /// Sums of METHOD 3.2 and DESIGN's sphere fit about the query point: w, p, n, p.p, p.n, R, attributes.
+  /// Sums of Cuccuru et al. 2009, 3.2, and the sphere fit's about the query point: w, p, n, p.p, p.n, R, attributes.
   using Sums = std::array<double, 13>;
   enum : std::size_t { kSumW = 0, kSumP = 1, kSumN = 4, kSumPP = 7, kSumPN = 8, kSumR = 9, kSumC = 10 };
-  /// Distance, normal, curvature, reach, attributes.
+  /// Distance, normal, curvature, offset, attributes.
   using Outputs = std::array<double, 9>;
 
   struct Fit {

@@ -25,7 +25,7 @@ struct Scene {
 
 /// How much of a scene could be compared; the rest lies at a switch or is ill-conditioned beyond floats.
 struct Share {
-  std::size_t points = 0, seen = 0, good = 0, compared = 0, undecided = 0, rough = 0;
+  std::size_t points = 0, seen = 0, trusted = 0, compared = 0, undecided = 0, rough = 0;
 };
 
 ProjectCounts project_all(StreamedCloud& s, const ProjectSettings& settings, const Kernel& kernel) {
@@ -44,7 +44,7 @@ std::vector<std::set<Cell>> worth_projecting(const StreamedCloud& s, bool centre
               std::array<std::uint64_t, 8> close{};
               close_cells(leaf, 0, 8, close.data());
               if (centres ? ((close[static_cast<std::size_t>(offset >> 6)] >> (offset & 63)) & 1U) != 0
-                          : leaf.near.test(offset)) {
+                          : leaf.active.test(offset)) {
                 out.back().insert(c);
               }
             });
@@ -57,8 +57,8 @@ void compare(const Window& window, int level, const Projected& points, int offse
              const ProjectSettings& settings, Share& share) {
   ++share.points;
   share.seen += points.seen.test(offset) ? 1 : 0;
-  share.good += points.good.test(offset) ? 1 : 0;
-  ASSERT_TRUE(points.seen.test(offset) || !points.good.test(offset));
+  share.trusted += points.trusted.test(offset) ? 1 : 0;
+  ASSERT_TRUE(points.seen.test(offset) || !points.trusted.test(offset));
   if (truth.undecided) {
     ++share.undecided;
     return;
@@ -66,7 +66,7 @@ void compare(const Window& window, int level, const Projected& points, int offse
   const bool has_normal = dot(truth.normal, truth.normal) > 0;
   ASSERT_EQ(points.seen.test(offset), truth.weight > 0 && has_normal && truth.nearest <= 1)
       << "weight " << truth.weight << " nearest " << truth.nearest << " contributing " << truth.seen;
-  ASSERT_EQ(points.near.test(offset), points.seen.test(offset)) << "values for what is seen";
+  ASSERT_EQ(points.active.test(offset), points.seen.test(offset)) << "values for what is seen";
   if (!points.seen.test(offset)) return;
   const double cell = window.lattice().cell_size(level);
   if (!(truth.distance_error < 0.01 * cell && truth.normal_error < 0.01)) {
@@ -74,15 +74,16 @@ void compare(const Window& window, int level, const Projected& points, int offse
     return;
   }
   ++share.compared;
-  if (std::abs(truth.reach - settings.good_reach) > truth.reach_error) {
-    ASSERT_EQ(points.good.test(offset), truth.reach <= settings.good_reach && truth.seen >= settings.good_samples)
-        << "reach " << truth.reach << " of " << truth.seen;
+  if (std::abs(truth.offset_from_mean - settings.trusted_offset) > truth.offset_error) {
+    ASSERT_EQ(points.trusted.test(offset),
+              truth.offset_from_mean <= settings.trusted_offset && truth.seen >= settings.trusted_samples)
+        << "offset " << truth.offset_from_mean << " of " << truth.seen;
   }
-  const CornerValues& values = points.values[window.brick_of(level, offset >> 6)];
-  const std::uint32_t i = points.value_index(offset, window.brick_layers(level));
+  const CornerValues& values = points.values[window.slab_in_leaf(level, offset >> 6)];
+  const std::uint32_t i = points.value_index(offset, window.slab_layers(level));
   ASSERT_LT(i, values.count);
   const double away = std::sqrt(dot(truth.from_average, truth.from_average));
-  if (settings.centres || points.good.test(offset) || away < 0.01 * cell) {
+  if (settings.centres || points.trusted.test(offset) || away < 0.01 * cell) {
     ASSERT_NEAR(values.channel(kDistance)[i], truth.distance, truth.distance_error);
     for (int k = 0; k < 3; ++k) ASSERT_NEAR(values.channel(kNormalX + k)[i], truth.normal[k], truth.normal_error);
     ASSERT_NEAR(values.channel(kCurvature)[i], truth.curvature, truth.curvature_error);
@@ -97,8 +98,9 @@ void compare(const Window& window, int level, const Projected& points, int offse
     ASSERT_EQ(values.channel(kCurvature)[i], 0);
   }
   // What sees a single sample is as far from it as to stand on nothing of its own.
-  const bool alone = !settings.centres && !points.good.test(offset) && truth.seen < 2;
-  ASSERT_NEAR(values.channel(kReach)[i], alone ? std::max(1.0, truth.reach) : truth.reach, truth.reach_error);
+  const bool alone = !settings.centres && !points.trusted.test(offset) && truth.seen < 2;
+  ASSERT_NEAR(values.channel(kOffsetFromMean)[i],
+              alone ? std::max(1.0, truth.offset_from_mean) : truth.offset_from_mean, truth.offset_error);
   for (int c = 0; c < window.attributes(); ++c) {
     ASSERT_NEAR(values.channel(kFirstAttribute + c)[i], truth.attributes[c], truth.attribute_errors[c]);
   }
@@ -123,7 +125,7 @@ void expect_truth(const Scene& scene, Share& share) {
         return;
       }
       if (!wanted) {
-        ASSERT_FALSE(points->seen.test(offset) || points->good.test(offset));
+        ASSERT_FALSE(points->seen.test(offset) || points->trusted.test(offset));
         return;
       }
       // The finest level that holds a corner is where it is projected.
@@ -135,7 +137,7 @@ void expect_truth(const Scene& scene, Share& share) {
         // Without a sample in reach of its slab a corner is not looked at.
         own.corners += s.feed.batches(slab * height, (slab + 1) * height, margin).empty() ? 0 : 1;
         own.seen += points->seen.test(offset) ? 1 : 0;
-        own.good += points->good.test(offset) ? 1 : 0;
+        own.trusted += points->trusted.test(offset) ? 1 : 0;
       }
       int from = level;
       Cell fine = c;
@@ -158,7 +160,7 @@ void expect_truth(const Scene& scene, Share& share) {
   }
   EXPECT_EQ(counts.corners, own.corners);
   EXPECT_EQ(counts.seen, own.seen);
-  EXPECT_EQ(counts.good, own.good);
+  EXPECT_EQ(counts.trusted, own.trusted);
 }
 
 /// Shapes, levels, qualities, attributes, supports: what the projection can meet.
@@ -222,7 +224,7 @@ void run(const std::vector<Scene>& scenes, Fit fit, int steps, bool centres = fa
     expect_truth(scene, share);
     if (testing::Test::HasFatalFailure()) return;
     EXPECT_GT(share.seen, 500U) << scene.name;
-    EXPECT_GT(share.good, share.seen / 4) << scene.name;
+    EXPECT_GT(share.trusted, share.seen / 4) << scene.name;
     EXPECT_LT(share.undecided, share.points / 100 + 10) << scene.name;
     EXPECT_LT(share.rough, share.seen / 20) << scene.name;
   }
@@ -314,17 +316,17 @@ TEST(Project, PlaneSamplesGiveTheirPlane) {
     StreamedCloud s(cloud, scene.lattice, scene.feed, 500);
     scene.project.fit = fit;
     project_all(s, scene.project, select_kernel());
-    std::size_t good = 0;
-    for_set(s.window, 0, s.first, s.end, &CornerBlock::good,
+    std::size_t trusted = 0;
+    for_set(s.window, 0, s.first, s.end, &CornerBlock::trusted,
             [&](int, const Cell& c, const CornerBlock& leaf, int offset) {
-              const CornerValues& v = leaf.values[s.window.brick_of(0, offset >> 6)];
-              const std::uint32_t i = leaf.value_index(offset, s.window.brick_layers(0));
+              const CornerValues& v = leaf.values[s.window.slab_in_leaf(0, offset >> 6)];
+              const std::uint32_t i = leaf.value_index(offset, s.window.slab_layers(0));
               const Vec3 at{c.x * 1024.0, c.y * 1024.0, c.z * 1024.0};
-              ++good;
+              ++trusted;
               ASSERT_NEAR(v.channel(kDistance)[i], dot(n, at), fit == Fit::plane ? 1.5 : 4.0);
               ASSERT_NEAR(v.channel(kCurvature)[i], 0, 2e-6);
             });
-    EXPECT_GT(good, 300U);
+    EXPECT_GT(trusted, 300U);
   }
 }
 

@@ -34,21 +34,23 @@ inline void project_all(StreamedCloud& s) {
 
 /// A corner as projection left it.
 struct OwnValue {
-  bool seen = false, good = false;
+  bool seen = false, trusted = false;
   std::vector<double> channels;
 };
 
-/// The near corners of a level.
+/// The active corners of a level.
 inline std::map<Cell, OwnValue> own_values(const Window& window, int level, std::int32_t first, std::int32_t end) {
   std::map<Cell, OwnValue> out;
-  for_set(window, level, first, end, &CornerBlock::near, [&](int, const Cell& c, const CornerBlock& leaf, int offset) {
-    OwnValue& v = out[c];
-    v.seen = leaf.seen.test(offset);
-    v.good = leaf.good.test(offset);
-    const CornerValues& values = leaf.values[window.brick_of(level, offset >> 6)];
-    const std::uint32_t i = leaf.value_index(offset, window.brick_layers(level));
-    for (int channel = 0; channel < window.channels(); ++channel) v.channels.push_back(values.channel(channel)[i]);
-  });
+  for_set(window, level, first, end, &CornerBlock::active,
+          [&](int, const Cell& c, const CornerBlock& leaf, int offset) {
+            OwnValue& v = out[c];
+            v.seen = leaf.seen.test(offset);
+            v.trusted = leaf.trusted.test(offset);
+            const CornerValues& values = leaf.values[window.slab_in_leaf(level, offset >> 6)];
+            const std::uint32_t i = leaf.value_index(offset, window.slab_layers(level));
+            for (int channel = 0; channel < window.channels(); ++channel)
+              v.channels.push_back(values.channel(channel)[i]);
+          });
   return out;
 }
 
@@ -59,7 +61,7 @@ void for_trusted_neighbours(const std::map<Cell, OwnValue>& values, const Cell& 
     const Cell d{i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1};
     const int m = std::abs(d.x) + std::abs(d.y) + std::abs(d.z);
     const auto found = values.find(corner + d);
-    if (m == 0 || found == values.end() || !found->second.good) continue;
+    if (m == 0 || found == values.end() || !found->second.trusted) continue;
     const std::vector<double>& v = found->second.channels;
     // The corner lies at -d from its neighbour.
     const double plane = v[kDistance] - cell * (v[kNormalX] * d.x + v[kNormalY] * d.y + v[kNormalZ] * d.z);

@@ -34,9 +34,10 @@ Batch random_batch(std::uint64_t seed, const Lattice& lattice, int buckets, std:
   return out;
 }
 
-ClumpedBatch clumped(const Batch& batch, const Lattice& lattice) {
-  ClumpedBatch out;
-  for (const auto& bucket : batch) out.push_back(std::make_shared<const ClumpedBucket>(clump(*bucket, lattice)));
+ClusteredBatch clustered(const Batch& batch, const Lattice& lattice) {
+  ClusteredBatch out;
+  for (const auto& bucket : batch)
+    out.push_back(std::make_shared<const ClusteredBucket>(cluster_samples(*bucket, lattice)));
   return out;
 }
 
@@ -59,14 +60,14 @@ TEST(Clumps, HoldEverySampleOnceInsideTheirBox) {
   for (std::uint64_t seed = 0; seed < 8; ++seed) {
     const Batch batch = random_batch(seed, lattice, 1, 300);
     const ActiveBucket& bucket = *batch.front();
-    const ClumpedBucket c = clump(bucket, lattice);
+    const ClusteredBucket c = cluster_samples(bucket, lattice);
     std::map<Name, std::size_t> left;
     for (std::size_t i = 0; i < bucket.samples.size(); ++i) {
       if (bucket.support[i] > 0) left[name_of(bucket.samples.attributes, i)] = i;
     }
     ASSERT_EQ(c.x.size(), left.size());
     std::uint32_t end = 0;
-    for (const Clump& k : c.clumps) {
+    for (const SampleCluster& k : c.clusters) {
       ASSERT_EQ(k.begin, end);
       ASSERT_LT(k.begin, k.end);
       end = k.end;
@@ -110,10 +111,10 @@ TEST(Clumps, OfAbsurdExtentsAndCells) {
       bucket.weight.push_back(1);
       bucket.level.push_back(static_cast<std::uint8_t>(i % lattice.levels));
     }
-    const ClumpedBucket c = clump(bucket, lattice);
+    const ClusteredBucket c = cluster_samples(bucket, lattice);
     EXPECT_EQ(c.x.size(), 16U);
-    EXPECT_EQ(c.clumps.back().end, 16U);
-    for (const Clump& k : c.clumps) {
+    EXPECT_EQ(c.clusters.back().end, 16U);
+    for (const SampleCluster& k : c.clusters) {
       for (std::uint32_t i = k.begin; i < k.end; ++i) EXPECT_LE(k.low[0], c.x[i]);
     }
   }
@@ -123,40 +124,40 @@ TEST(TileSamples, HoldWhatReachesTheTile) {
   const Lattice lattice{48, 3};
   for (std::uint64_t seed = 0; seed < 6; ++seed) {
     const Batch batch = random_batch(seed, lattice, 1 + static_cast<int>(seed % 3), 150);
-    const ClumpedBatch in_clumps = clumped(batch, lattice);
+    const ClusteredBatch in_clusters = clustered(batch, lattice);
     for (int level = 0; level < 2; ++level) {
       // Every second block takes part.
       std::vector<Block> blocks;
       for (int i = 0; i < 216; i += 2) blocks.push_back({i % 6 - 3, i / 6 % 6 - 3, i / 36 - 3});
-      Reach reach;
-      reach.level = level;
-      reach.first = -4;
-      reach.end = reach.first + lattice.layers(level);
-      reach.margin = seed % 2 == 0 ? 0.0F : 60.0F;
-      reach.shift = seed < 3 ? 0.0F : 0.5F;
-      const TileRuns bins = bin_clumps(lattice, reach, in_clumps, blocks);
+      QueryLayers layers;
+      layers.level = level;
+      layers.first = -4;
+      layers.end = layers.first + lattice.layers(level);
+      layers.margin = seed % 2 == 0 ? 0.0F : 60.0F;
+      layers.shift = seed < 3 ? 0.0F : 0.5F;
+      const TileRuns bins = bin_clusters(lattice, layers, in_clusters, blocks);
       ASSERT_EQ(bins.begin.size(), blocks.size() + 1);
       ASSERT_EQ(bins.begin.back(), bins.runs.size());
       std::size_t held = 0;
       RowSamples rows;
       for (std::size_t t = 0; t < blocks.size(); ++t) {
         const Block& b = blocks[t];
-        const std::int32_t z_first = std::max(b.z * 8, reach.first);
-        const std::int32_t z_last = std::min(b.z * 8 + 7, reach.end - 1);
+        const std::int32_t z_first = std::max(b.z * 8, layers.first);
+        const std::int32_t z_last = std::min(b.z * 8 + 7, layers.end - 1);
         if (z_first > z_last) {
           ASSERT_TRUE(bins.of(t).empty());
           continue;
         }
-        rows.gather(lattice, reach, b, bins.of(t), 1.75F);
+        rows.gather(lattice, layers, b, bins.of(t), 1.75F);
         std::multiset<Name> in;
         for (std::size_t k = 0; k < rows.samples().x.size(); ++k) in.insert(name_of(rows.samples().attributes, k));
         held += in.size();
         const double cell = lattice.cell_size(level);
-        const double shift = static_cast<double>(reach.shift);
+        const double shift = static_cast<double>(layers.shift);
         for (const auto& bucket : batch) {
           for (std::size_t i = 0; i < bucket->samples.size(); ++i) {
             const double support = static_cast<double>(bucket->support[i]);
-            const double far = support + static_cast<double>(reach.margin);
+            const double far = support + static_cast<double>(layers.margin);
             const LocalSamples& s = bucket->samples;
             // To the nearest point of the tile's lattice, and to the box of its points.
             const double x = away(s.x[i], b.x * 8, b.x * 8 + 7, shift, cell);
@@ -184,13 +185,13 @@ TEST(TileSamples, HoldWhatReachesTheTile) {
 
 TEST(TileSamples, BinsDoNotDependOnThreads) {
   const Lattice lattice{48, 3};
-  const ClumpedBatch batch = clumped(random_batch(1, lattice, 8, 4'000), lattice);
+  const ClusteredBatch batch = clustered(random_batch(1, lattice, 8, 4'000), lattice);
   std::vector<Block> blocks;
   for (int i = 0; i < 8; ++i) blocks.push_back({(i & 1) - 1, ((i >> 1) & 1) - 1, (i >> 2) - 1});
   std::vector<TileRuns> found;
   for (const std::size_t n : {1U, 2U, 4U}) {
     const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, n);
-    found.push_back(bin_clumps(lattice, {0, -4, 0, 0, 0}, batch, blocks));
+    found.push_back(bin_clusters(lattice, {0, -4, 0, 0, 0}, batch, blocks));
     EXPECT_EQ(found.back().begin, found.front().begin);
     ASSERT_EQ(found.back().runs.size(), found.front().runs.size());
     for (std::size_t r = 0; r < found.back().runs.size(); ++r) {
@@ -207,22 +208,22 @@ TEST(TileSamples, RowsHoldSamplesInCells) {
   std::mt19937_64 random(3);
   for (int level = 0; level < 3; ++level) {
     const Batch batch = random_batch(10 + level, lattice, 3, 400);
-    const ClumpedBatch in_clumps = clumped(batch, lattice);
+    const ClusteredBatch in_clusters = clustered(batch, lattice);
     const Block block{-1, 0, level - 1};
-    Reach reach;
-    reach.level = level;
-    reach.first = block.z * 8;
-    reach.end = reach.first + 8;
+    QueryLayers layers;
+    layers.level = level;
+    layers.first = block.z * 8;
+    layers.end = layers.first + 8;
     std::map<Name, std::pair<const ActiveBucket*, std::size_t>> places;
     for (const auto& b : batch) {
       for (std::size_t i = 0; i < b->samples.size(); ++i) places[name_of(b->samples.attributes, i)] = {b.get(), i};
     }
     std::vector<lamina::Run> runs;
-    for (const auto& b : in_clumps) {
-      for (const Clump& c : b->clumps) runs.push_back({b.get(), c.begin, c.end});
+    for (const auto& b : in_clusters) {
+      for (const SampleCluster& c : b->clusters) runs.push_back({b.get(), c.begin, c.end});
     }
     RowSamples rows;
-    rows.gather(lattice, reach, block, runs, 1.75F);
+    rows.gather(lattice, layers, block, runs, 1.75F);
     const TileSamples& t = rows.samples();
     ASSERT_GT(t.x.size(), 20U);
     const double a = lattice.cell_size(level);

@@ -16,7 +16,7 @@ class OctreeTruth {
  public:
   struct Level {
     std::set<Cell> nodes;  ///< existing cells, subdivided or not
-    std::set<Cell> split, cells, corners, shared, near;
+    std::set<Cell> split, cells, corners, shared, active;
   };
   std::vector<Level> levels;
 
@@ -98,18 +98,19 @@ class OctreeTruth {
       }
       if (finer >= 0) {
         here.shared.insert(corner);
-        if (levels[static_cast<std::size_t>(finer)].near.contains(fine)) here.near.insert(corner);
+        if (levels[static_cast<std::size_t>(finer)].active.contains(fine)) here.active.insert(corner);
         continue;
       }
-      bool near = std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {
-        return s.level == level && distance(lattice_, s.mark, corner) < static_cast<double>(s.mark.reach);
+      bool active = std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {
+        return s.level == level && distance(lattice_, s.mark, corner) < static_cast<double>(s.mark.active_radius);
       });
       for_around(corner, -1, 0, [&](const Cell& c) {
-        near = near || (here.nodes.contains(c) && std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {
-                          return s.level > level && reaches(s, level, c, 1);
-                        }));
+        active =
+            active || (here.nodes.contains(c) && std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {
+                         return s.level > level && reaches(s, level, c, 1);
+                       }));
       });
-      if (near) here.near.insert(corner);
+      if (active) here.active.insert(corner);
     }
   }
 

@@ -37,14 +37,14 @@ struct Marked {
   }
 };
 
-/// A sample whose reach ends so far from all corners that rounding leaves no doubt.
+/// A sample whose active radius ends so far from all corners that rounding leaves no doubt.
 Mark decided(const Lattice& lattice, Mark m) {
   const std::int32_t a = lattice.cell_size(m.level);
   const Cell home{floor_div(m.x, a), floor_div(m.y, a), floor_div(m.z, a)};
   for (int i = 0; i < 64; ++i) {
     const double d = OctreeTruth::distance(lattice, m, home + Cell{i % 4 - 1, i / 4 % 4 - 1, i / 16 - 1});
-    if (std::abs(d - static_cast<double>(m.reach)) > 1e-5 * a) continue;
-    m.reach *= 1.001F;
+    if (std::abs(d - static_cast<double>(m.active_radius)) > 1e-5 * a) continue;
+    m.active_radius *= 1.001F;
     i = -1;
   }
   return m;
@@ -63,9 +63,9 @@ Marked random_marks(std::uint64_t seed, int levels) {
     const int n = between(1, 8);
     for (int i = 0; i < n; ++i) {
       const auto level = static_cast<std::uint8_t>(between(0, levels - 1));
-      const float reach = static_cast<float>(out.lattice.cell_size(level)) * static_cast<float>(between(1, 300)) / 100;
+      const float radius = static_cast<float>(out.lattice.cell_size(level)) * static_cast<float>(between(1, 300)) / 100;
       out.marks.push_back(decided(out.lattice, {at[0] + between(-width, width), at[1] + between(-width, width),
-                                                at[2] + between(-width, width), level, reach}));
+                                                at[2] + between(-width, width), level, radius}));
     }
   }
   out.bound();
@@ -104,7 +104,7 @@ void expect_truth(const Window& window, const Marked& m) {
     EXPECT_TRUE(same("leaf cells", level, found(&CornerBlock::cells), t.cells));
     EXPECT_TRUE(same("corners", level, found(&CornerBlock::corners), t.corners));
     EXPECT_TRUE(same("shared corners", level, found(&CornerBlock::shared), t.shared));
-    EXPECT_TRUE(same("near corners", level, found(&CornerBlock::near), t.near));
+    EXPECT_TRUE(same("active corners", level, found(&CornerBlock::active), t.active));
     std::uint64_t cells = 0;
     for (std::int32_t s = m.first; s < m.end; ++s) {
       const std::uint64_t n = count_cells(window, level, s);

@@ -133,12 +133,12 @@ TEST(Window, LeavesUsedAgainAreEmpty) {
   for (std::int32_t z = 0; z < 4; ++z) {
     for (std::int32_t x = 0; x < 5; ++x) {
       CornerBlock& block = window.touch(0, {x, 0, z});
-      EXPECT_FALSE(block.home.any() || block.surface.any() || block.near.any());
+      EXPECT_FALSE(block.home.any() || block.surface.any() || block.active.any());
       EXPECT_EQ(block.busy_layers | block.doubtful_layers | block.surface_layers, 0);
       EXPECT_TRUE(block.values[0].data.empty());
       EXPECT_EQ(block.values[0].count, 0U);
       EXPECT_EQ(block.centres, nullptr);
-      for (BlockMask* m : {&block.home, &block.surface, &block.near}) m->set(x);
+      for (BlockMask* m : {&block.home, &block.surface, &block.active}) m->set(x);
       block.busy_layers = block.doubtful_layers = block.surface_layers = 1;
       block.values[0].allocate(7, window.channels());
       block.centres = std::make_shared<Projected>();
@@ -199,10 +199,10 @@ TEST(Window, ValueIndexCountsNearCornersOfTheSlab) {
   for (const int layers : {1, 2, 4, 8}) {
     for (int round = 0; round < 10; ++round) {
       Projected points;
-      for (std::uint64_t& w : points.near.words) w = random() & random();
+      for (std::uint64_t& w : points.active.words) w = random() & random();
       std::map<int, std::uint32_t> count;  // by slab inside the leaf
       for (int offset = 0; offset < 512; ++offset) {
-        if (!points.near.test(offset)) continue;
+        if (!points.active.test(offset)) continue;
         ASSERT_EQ(points.value_index(offset, layers), count[(offset >> 6) / layers]++) << "layers " << layers;
       }
     }
@@ -217,9 +217,9 @@ TEST(Window, RetiringValuesKeepsMasksAndOtherSlabs) {
     CornerBlock& leaf = window.touch(level, {0, 0, 0});
     leaf.centres = std::make_shared<Projected>();
     for (Projected* points : {static_cast<Projected*>(&leaf), leaf.centres.get()}) {
-      for (std::uint64_t& w : points->near.words) w = 0xFF;
-      for (int brick = 0; brick < 8 / window.brick_layers(level); ++brick) {
-        points->values[brick].allocate(8 * static_cast<std::uint32_t>(window.brick_layers(level)), window.channels());
+      for (std::uint64_t& w : points->active.words) w = 0xFF;
+      for (int place = 0; place < 8 / window.slab_layers(level); ++place) {
+        points->values[place].allocate(8 * static_cast<std::uint32_t>(window.slab_layers(level)), window.channels());
       }
     }
   }
@@ -231,10 +231,10 @@ TEST(Window, RetiringValuesKeepsMasksAndOtherSlabs) {
     const CornerBlock& leaf = *window.probe(level, {0, 0, 0});
     for (const Projected* points :
          {static_cast<const Projected*>(&leaf), static_cast<const Projected*>(leaf.centres.get())}) {
-      for (int brick = 0; brick < 8 / window.brick_layers(level); ++brick) {
-        EXPECT_EQ(points->values[brick].count == 0, brick == 1) << "level " << level;
+      for (int place = 0; place < 8 / window.slab_layers(level); ++place) {
+        EXPECT_EQ(points->values[place].count == 0, place == 1) << "level " << level;
       }
-      EXPECT_EQ(points->near.count(), 64);
+      EXPECT_EQ(points->active.count(), 64);
     }
   }
   window.retire_below(10'000);

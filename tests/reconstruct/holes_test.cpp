@@ -107,7 +107,7 @@ TEST(Holes, OuterRimsStayOpen) {
   const Reconstruction plane = test::reconstruct(test::plane_cloud(600), closing(1000));
   EXPECT_EQ(plane.facts.euler, std::vector<long>{1});
   ASSERT_EQ(plane.stats.holes.open, 1U);
-  EXPECT_EQ(plane.stats.holes.longest.front().reason, "outer rim");
+  EXPECT_EQ(plane.stats.holes.longest.front().reason, "outer boundary");
   EXPECT_NEAR(plane.stats.holes.longest.front().length, 8, 1.5);
 }
 

@@ -15,7 +15,7 @@ struct FieldSample {
   float distance = 1;  ///< steps
   std::array<float, 3> normal{0, 0, 1};
   bool seen = true;
-  bool valued = true;  ///< the sign is more than a guess; what is seen always is
+  bool defined = true;  ///< the sign is more than a guess; what is seen always is
 };
 
 /// A dense octree over `size` coarsest cells from `origin` on (in coarsest cells); levels counted from 0, the finest.
@@ -115,26 +115,26 @@ class Octree {
                           const std::function<FieldSample(const std::array<std::int32_t, 3>&)>& field) {
     const Lattice& lattice = window.lattice();
     std::vector<FieldSample> samples;
-    int brick = -1;
+    int place = -1;
     for (int offset = 0; offset < 512; ++offset) {
       const Cell c{t.block.x * 8 + (offset & 7), t.block.y * 8 + ((offset >> 3) & 7), t.block.z * 8 + (offset >> 6)};
       if (lattice.slab_of_layer(level, c.z) != slab) continue;
-      brick = window.brick_of(level, offset >> 6);
+      place = window.slab_in_leaf(level, offset >> 6);
       if (!t.leaf->corners.test(offset)) continue;
       const FieldSample s = field(lattice.position(level, c));
-      t.leaf->positive.assign(offset, s.distance >= 0);
-      t.leaf->valued.assign(offset, s.seen || s.valued);
-      t.leaf->carried.assign(offset, s.seen);
+      t.leaf->outside.assign(offset, s.distance >= 0);
+      t.leaf->defined.assign(offset, s.seen || s.defined);
+      t.leaf->supported.assign(offset, s.seen);
       if (!s.seen) continue;
-      t.leaf->near.set(offset);
+      t.leaf->active.set(offset);
       t.leaf->seen.set(offset);
-      t.leaf->good.set(offset);
+      t.leaf->trusted.set(offset);
       samples.push_back(s);
     }
-    if (brick < 0) return;
-    CornerValues& values = t.leaf->values[brick];
+    if (place < 0) return;
+    CornerValues& values = t.leaf->values[place];
     values.allocate(static_cast<std::uint32_t>(samples.size()), window.channels());
-    std::fill(values.data.begin(), values.data.end(), 0.0F);  // curvature and reach stay so
+    std::fill(values.data.begin(), values.data.end(), 0.0F);  // curvature and offset stay so
     for (std::size_t i = 0; i < samples.size(); ++i) {
       values.channel(kDistance)[i] = samples[i].distance;
       for (int a = 0; a < 3; ++a) values.channel(kNormalX + a)[i] = samples[i].normal[a];

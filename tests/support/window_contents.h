@@ -47,18 +47,18 @@ inline HeldCorner held_finer(const Window& window, int level, const Cell& corner
 
 inline void append_bits(const Window& window, int level, const Block& b, const Projected& points,
                         std::vector<std::uint64_t>& out) {
-  for (const BlockMask* m : {&points.near, &points.seen, &points.good}) {
+  for (const BlockMask* m : {&points.active, &points.seen, &points.trusted}) {
     out.insert(out.end(), m->words.begin(), m->words.end());
   }
-  for (int layer = 0; layer < 8; layer += window.brick_layers(level)) {
-    const CornerValues& v = points.values[window.brick_of(level, layer)];
+  for (int layer = 0; layer < 8; layer += window.slab_layers(level)) {
+    const CornerValues& v = points.values[window.slab_in_leaf(level, layer)];
     out.push_back(v.count);
     for (const float f : v.data) out.push_back(std::bit_cast<std::uint32_t>(f));
   }
   out.push_back(static_cast<std::uint32_t>(b.x));
 }
 
-/// Every bit that stages up to finishing leave behind, in canonical order.
+/// Every bit that stages up to extension leave behind, in canonical order.
 inline std::vector<std::uint64_t> all_bits(const Window& window, std::int32_t first, std::int32_t end) {
   std::vector<std::uint64_t> out;
   for (int level = 0; level < window.levels(); ++level) {

@@ -1,4 +1,4 @@
-#include "clustering/hard.h"
+#include "clustering/resolve.h"
 
 #include <algorithm>
 #include <atomic>
@@ -6,22 +6,23 @@
 
 #include "clustering/patch.h"
 
-namespace lamina::cluster {
+namespace lamina::clustering {
 namespace {
 
-std::span<const HardTriangle> triangles_of(const SlabRecord& record, const HardCluster& hard) {
-  return {record.hard_triangles.data() + hard.first, hard.count};
+std::span<const ClusterTriangle> triangles_of(const SlabRecord& record, const UnresolvedCluster& cluster) {
+  return {record.unresolved_triangles.data() + cluster.first, cluster.count};
 }
 
-Ref corner_ref(const SlabRecord& record, const HardCluster& hard) {
-  return slab_tag(record.slab) | hard.corner;
+Ref corner_ref(const SlabRecord& record, const UnresolvedCluster& cluster) {
+  return slab_tag(record.slab) | cluster.corner;
 }
 
 /// Members in mesh order: those of the slab below first.
-void list_members(const Window& window, const SlabRecord& record, const HardCluster& hard, std::vector<Ref>& members) {
-  const Ref own = corner_ref(record, hard);
+void list_members(const Window& window, const SlabRecord& record, const UnresolvedCluster& cluster,
+                  std::vector<Ref>& members) {
+  const Ref own = corner_ref(record, cluster);
   members.clear();
-  for (const HardTriangle& t : triangles_of(record, hard)) {
+  for (const ClusterTriangle& t : triangles_of(record, cluster)) {
     for (const Ref v : t.vertex) {
       if (window.corner_of(v) == own) members.push_back(v);
     }
@@ -40,7 +41,7 @@ std::uint32_t root(std::vector<std::uint32_t>& parent, std::uint32_t i) {
 }
 
 std::uint64_t label_of(const Window& window, Ref v) {
-  return static_cast<std::uint64_t>(window.corner_of(v)) << 16 | window.vertex(v).piece;
+  return static_cast<std::uint64_t>(window.corner_of(v)) << 16 | window.vertex(v).component;
 }
 
 /// The isovertex relative to `corner`; differences of positions are exact.
@@ -62,9 +63,9 @@ Eigen::Vector3d point_of(const Window& window, Ref v, const SurfaceCorner& corne
   return point;
 }
 
-std::array<float, 3> place(const Window& window, const SlabRecord& record, const HardCluster& hard,
+std::array<float, 3> place(const Window& window, const SlabRecord& record, const UnresolvedCluster& cluster,
                            std::span<const StarTriangle> star, std::uint64_t own) {
-  const SurfaceCorner& corner = record.iso->corners[hard.corner];
+  const SurfaceCorner& corner = record.iso->corners[cluster.corner];
   std::vector<PatchTriangle> patch;
   patch.reserve(star.size());
   for (const StarTriangle& t : star) {
@@ -81,16 +82,16 @@ std::array<float, 3> place(const Window& window, const SlabRecord& record, const
 
 }  // namespace
 
-void split_pieces(Window& window, const SlabRecord& record, HardCluster& hard, HardScratch& scratch) {
+void split_components(Window& window, const SlabRecord& record, UnresolvedCluster& cluster, ResolveScratch& scratch) {
   std::vector<Ref>& members = scratch.members;
   std::vector<std::uint32_t>& parent = scratch.parent;
-  list_members(window, record, hard, members);
+  list_members(window, record, cluster, members);
   const auto index_of = [&](Ref v) {
     return static_cast<std::uint32_t>(std::find(members.begin(), members.end(), v) - members.begin());
   };
   parent.resize(members.size());
   std::iota(parent.begin(), parent.end(), 0U);
-  for (const HardTriangle& t : triangles_of(record, hard)) {
+  for (const ClusterTriangle& t : triangles_of(record, cluster)) {
     std::uint32_t first = kNone;
     for (const Ref v : t.vertex) {
       const std::uint32_t i = index_of(v);
@@ -100,20 +101,21 @@ void split_pieces(Window& window, const SlabRecord& record, HardCluster& hard, H
       first = i;
     }
   }
-  std::uint16_t pieces = 0;
+  std::uint16_t components = 0;
   for (std::uint32_t i = 0; i < members.size(); ++i) {  // a root is its component's smallest member
     const std::uint32_t r = root(parent, i);
-    window.vertex(members[i]).piece = r == i ? pieces++ : window.vertex(members[r]).piece;
+    window.vertex(members[i]).component = r == i ? components++ : window.vertex(members[r]).component;
   }
-  hard.pieces.assign(pieces, {});
+  cluster.components.assign(components, {});
 }
 
-void veto_neighbours(Window& window, const SlabRecord& record, const HardCluster& hard, HardScratch& scratch) {
-  const Ref own = corner_ref(record, hard);
+void veto_neighbours(Window& window, const SlabRecord& record, const UnresolvedCluster& cluster,
+                     ResolveScratch& scratch) {
+  const Ref own = corner_ref(record, cluster);
   std::vector<std::uint64_t>& steps =
       scratch.steps;  // neighbour cluster and the vertex of this one that begins a step of its ring
   steps.clear();
-  for (const HardTriangle& t : triangles_of(record, hard)) {
+  for (const ClusterTriangle& t : triangles_of(record, cluster)) {
     const std::array<Ref, 3> corner{window.corner_of(t.vertex[0]), window.corner_of(t.vertex[1]),
                                     window.corner_of(t.vertex[2])};
     for (std::size_t k = 0; k < 3; ++k) {
@@ -131,28 +133,29 @@ void veto_neighbours(Window& window, const SlabRecord& record, const HardCluster
   }
 }
 
-Verdict judge(const Window& window, const SlabRecord& record, HardCluster& hard, HardScratch& scratch) {
-  const Ref corner = corner_ref(record, hard);
+Verdict resolve(const Window& window, const SlabRecord& record, UnresolvedCluster& cluster, ResolveScratch& scratch) {
+  const Ref corner = corner_ref(record, cluster);
   std::vector<StarTriangle>&all = scratch.all, &star = scratch.star;
   all.clear();
-  for (const HardTriangle& t : triangles_of(record, hard)) {
+  for (const ClusterTriangle& t : triangles_of(record, cluster)) {
     StarTriangle& s = all.emplace_back();
     s.vertex = t.vertex;
     for (std::size_t k = 0; k < 3; ++k) s.label[k] = label_of(window, t.vertex[k]);
   }
   bool any = false;
-  for (std::size_t piece = 0; piece < hard.pieces.size(); ++piece) {
-    const std::uint64_t own = static_cast<std::uint64_t>(corner) << 16 | piece;
+  for (std::size_t component = 0; component < cluster.components.size(); ++component) {
+    const std::uint64_t own = static_cast<std::uint64_t>(corner) << 16 | component;
     star.clear();
     std::copy_if(all.begin(), all.end(), std::back_inserter(star),
                  [own](const StarTriangle& t) { return t.label[0] == own || t.label[1] == own || t.label[2] == own; });
-    if (!collapses(star, own, scratch.piece)) continue;
+    if (!collapses(star, own, scratch.component)) continue;
     any = true;
-    hard.pieces[piece].collapses = true;
-    if (hard.pieces.size() > 1) hard.pieces[piece].position = place(window, record, hard, star, own);
+    cluster.components[component].collapses = true;
+    if (cluster.components.size() > 1)
+      cluster.components[component].position = place(window, record, cluster, star, own);
   }
   if (!any) return Verdict::kept;
-  return hard.pieces.size() == 1 ? Verdict::corner : Verdict::split;
+  return cluster.components.size() == 1 ? Verdict::corner : Verdict::split;
 }
 
-}  // namespace lamina::cluster
+}  // namespace lamina::clustering

@@ -1,5 +1,5 @@
-// Rims of streamed meshes; the truth is the whole mesh in memory.
-#include "boundary/rim_finder.h"
+// Boundary loops of streamed meshes; the truth is the whole mesh in memory.
+#include "boundary/boundary_finder.h"
 
 #include <gtest/gtest.h>
 
@@ -9,12 +9,12 @@
 
 #include "support/mesh_check.h"
 
-namespace lamina::holes {
+namespace lamina::boundary {
 namespace {
 
 struct Rows {
   std::vector<VertexBatch> vertices;
-  std::vector<RimFinder::Triangles> triangles;
+  std::vector<BoundaryFinder::Triangles> triangles;
   std::vector<std::uint64_t> first;
 };
 
@@ -29,7 +29,7 @@ Rows ragged_sheet(std::mt19937& random, std::uint32_t rows, std::uint32_t column
       v.nx.push_back(0), v.ny.push_back(0), v.nz.push_back(1);
       v.radius.push_back(1);
     }
-    RimFinder::Triangles t;
+    BoundaryFinder::Triangles t;
     for (std::uint32_t c = 0; r > 0 && c + 1 < columns; ++c) {
       const std::uint32_t d = r * columns + c, b = d - columns;
       if (uniform(random) >= missing) t.push_back({b, b + 1, d});
@@ -53,41 +53,41 @@ Edges true_rims(const Rows& rows) {
   return edges;
 }
 
-Edges ends(const std::vector<RimEdge>& edges, Number first = 0) {
+Edges ends(const std::vector<BoundaryEdge>& edges, Number first = 0) {
   Edges out;
-  for (const RimEdge& e : edges) out.insert({e.from + first, e.to + first});
+  for (const BoundaryEdge& e : edges) out.insert({e.from + first, e.to + first});
   return out;
 }
 
-RC_GTEST_PROP(RimFinder, FindsWhatTheWholeMeshShows, ()) {
+RC_GTEST_PROP(BoundaryFinder, FindsWhatTheWholeMeshShows, ()) {
   std::mt19937 random(*rc::gen::arbitrary<std::uint32_t>());
   const auto rows = *rc::gen::inRange<std::uint32_t>(1, 8);
   const Rows sheet =
       ragged_sheet(random, rows, *rc::gen::inRange<std::uint32_t>(2, 9), *rc::gen::element(0.0, 0.1, 0.6));
-  RimFinder finder;
-  RimPiece piece;
-  for (std::size_t r = 0; r < rows; ++r) finder.add(sheet.vertices[r], sheet.triangles[r], piece);
-  finder.finish(false, piece);
+  BoundaryFinder finder;
+  BoundaryBatch batch;
+  for (std::size_t r = 0; r < rows; ++r) finder.add(sheet.vertices[r], sheet.triangles[r], batch);
+  finder.finish(false, batch);
   const Edges truth = true_rims(sheet);
-  RC_ASSERT(ends(piece.edges) == truth);
-  RC_ASSERT(piece.edges.size() == truth.size());
-  RC_ASSERT(piece.loose.empty());
+  RC_ASSERT(ends(batch.edges) == truth);
+  RC_ASSERT(batch.edges.size() == truth.size());
+  RC_ASSERT(batch.loose.empty());
   std::set<Number> listed;
-  for (const RimVertex& v : piece.vertices) RC_ASSERT(listed.insert(v.number).second);
+  for (const BoundaryVertex& v : batch.vertices) RC_ASSERT(listed.insert(v.number).second);
   for (const auto& [from, to] : truth) RC_ASSERT(listed.contains(from) && listed.contains(to));
-  for (const InnerEdge& e : piece.inner) RC_ASSERT(!truth.contains({e.a, e.b}) && !truth.contains({e.b, e.a}));
+  for (const InnerEdge& e : batch.inner) RC_ASSERT(!truth.contains({e.a, e.b}) && !truth.contains({e.b, e.a}));
 }
 
-RC_GTEST_PROP(RimFinder, PartsHaveTheSameRimsOnceTheirLooseEdgesHaveMet, ()) {
+RC_GTEST_PROP(BoundaryFinder, PartsHaveTheSameRimsOnceTheirLooseEdgesHaveMet, ()) {
   std::mt19937 random(*rc::gen::arbitrary<std::uint32_t>());
   const auto rows = *rc::gen::inRange<std::uint32_t>(2, 9);
   const Rows sheet = ragged_sheet(random, rows, 6, *rc::gen::element(0.0, 0.15, 0.6));
   const auto cut = *rc::gen::inRange<std::uint32_t>(1, rows);
-  RimPiece lower, upper;
-  RimFinder below;
+  BoundaryBatch lower, upper;
+  BoundaryFinder below;
   for (std::size_t r = 0; r < cut; ++r) below.add(sheet.vertices[r], sheet.triangles[r], lower);
   below.finish(true, lower);
-  RimFinder above(sheet.first[cut], sheet.vertices[cut - 1]);
+  BoundaryFinder above(sheet.first[cut], sheet.vertices[cut - 1]);
   for (std::size_t r = cut; r < rows; ++r) above.add(sheet.vertices[r], sheet.triangles[r], upper);
   above.finish(false, upper);
   const auto shift = static_cast<Number>(sheet.first[cut]);
@@ -103,16 +103,16 @@ RC_GTEST_PROP(RimFinder, PartsHaveTheSameRimsOnceTheirLooseEdgesHaveMet, ()) {
   RC_ASSERT(all == true_rims(sheet));
 }
 
-TEST(RimFinder, TellsTheNormalOfTheTriangleBeside) {
+TEST(BoundaryFinder, TellsTheNormalOfTheTriangleBeside) {
   std::mt19937 random(1);
   const Rows sheet = ragged_sheet(random, 3, 3, 0);
-  RimFinder finder;
-  RimPiece piece;
-  for (std::size_t r = 0; r < 3; ++r) finder.add(sheet.vertices[r], sheet.triangles[r], piece);
-  finder.finish(false, piece);
-  EXPECT_EQ(piece.edges.size(), 8U);
-  for (const RimEdge& e : piece.edges) EXPECT_EQ(e.normal, (std::array<double, 3>{0, 0, 1}));
+  BoundaryFinder finder;
+  BoundaryBatch batch;
+  for (std::size_t r = 0; r < 3; ++r) finder.add(sheet.vertices[r], sheet.triangles[r], batch);
+  finder.finish(false, batch);
+  EXPECT_EQ(batch.edges.size(), 8U);
+  for (const BoundaryEdge& e : batch.edges) EXPECT_EQ(e.normal, (std::array<double, 3>{0, 0, 1}));
 }
 
 }  // namespace
-}  // namespace lamina::holes
+}  // namespace lamina::boundary

@@ -1,4 +1,4 @@
-#include "mls/finish.h"
+#include "mls/extension.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -11,23 +11,23 @@
 namespace lamina::test {
 namespace {
 
-void finish_all(StreamedCloud& s, const Kernel& kernel, float boundary) {
-  for (std::int32_t slab = s.first; slab < s.end; ++slab) finish_slab(s.window, slab, kernel, boundary);
+void extend_all(StreamedCloud& s, const Kernel& kernel, float boundary) {
+  for (std::int32_t slab = s.first; slab < s.end; ++slab) extend_slab(s.window, slab, kernel, boundary);
 }
 
 /// What the rule says of a corner.
 struct Sign {
-  bool positive = true, valued = false, carried = false;
+  bool outside = true, defined = false, supported = false;
   bool tie = false;   ///< the sign hangs on rounding
-  bool edge = false;  ///< whether it is carried does
+  bool edge = false;  ///< whether it is supported does
 };
 
 Sign sign_of(const std::map<Cell, OwnValue>& values, const Cell& c, double cell, double boundary) {
   Sign out;
   const auto own = values.find(c);
-  if (own != values.end() && own->second.good) {
-    out.valued = true;
-    out.positive = own->second.channels[kDistance] >= 0;
+  if (own != values.end() && own->second.trusted) {
+    out.defined = true;
+    out.outside = own->second.channels[kDistance] >= 0;
   } else {
     double sum = 0;
     double terms = 0;
@@ -35,39 +35,39 @@ Sign sign_of(const std::map<Cell, OwnValue>& values, const Cell& c, double cell,
     Eigen::Vector3d offset = Eigen::Vector3d::Zero();
     Eigen::Vector3d normal = Eigen::Vector3d::Zero();
     for_trusted_neighbours(values, c, cell, [&](const OwnValue& v, double w, double plane, const Cell& d) {
-      out.valued = true;
+      out.defined = true;
       sum += w * plane;
       total += w;
       terms += w * (std::abs(v.channels[kDistance]) + 2 * cell);
       offset += w * Eigen::Vector3d(d.x, d.y, d.z);
       normal += w * Eigen::Vector3d(v.channels[kNormalX], v.channels[kNormalY], v.channels[kNormalZ]);
     });
-    out.positive = sum >= 0;
-    out.tie = out.valued && std::abs(sum) <= 64 * 0x1p-24 * terms;
-    if (out.valued) {
+    out.outside = sum >= 0;
+    out.tie = out.defined && std::abs(sum) <= 64 * 0x1p-24 * terms;
+    if (out.defined) {
       // How far the neighbours' mean lies aside, along the surface.
       const Eigen::Vector3d mean = offset / total;
       const double aside = (mean - mean.dot(normal) / normal.squaredNorm() * normal).norm();
-      out.carried = aside <= 0.3;
+      out.supported = aside <= 0.3;
       out.edge = std::abs(aside - 0.3) < 1e-3 || normal.norm() < 1e-2;
-    } else if (own != values.end() && own->second.seen && own->second.channels[kReach] <= 0.7F) {
-      out.valued = true;
-      out.positive = own->second.channels[kDistance] >= 0;
+    } else if (own != values.end() && own->second.seen && own->second.channels[kOffsetFromMean] <= 0.7F) {
+      out.defined = true;
+      out.outside = own->second.channels[kDistance] >= 0;
     }
   }
   const bool seen = own != values.end() && own->second.seen;
-  out.carried = out.carried || seen;
-  if (boundary > 0 && seen && own->second.channels[kReach] > boundary) out.valued = false;
+  out.supported = out.supported || seen;
+  if (boundary > 0 && seen && own->second.channels[kOffsetFromMean] > boundary) out.defined = false;
   return out;
 }
 
-TEST(Finish, SignsAreTheRule) {
+TEST(Extension, SignsAreTheRule) {
   std::size_t skipping = 0;  // corners that no level in between holds
   for (const ProjectedScene& scene : projected_scenes()) {
     for (const float boundary : {0.0F, 0.25F, 0.7F}) {
       StreamedCloud s(random_cloud(scene.cloud, 21), scene.lattice, {}, 77);
       project_all(s);
-      finish_all(s, select_kernel(), boundary);
+      extend_all(s, select_kernel(), boundary);
       std::size_t own = 0;
       std::size_t extended = 0;
       std::size_t guessed = 0;
@@ -78,34 +78,35 @@ TEST(Finish, SignsAreTheRule) {
         const auto values = own_values(s.window, level, s.first, s.end);
         for_set(s.window, level, s.first, s.end, &CornerBlock::corners,
                 [&](int, const Cell& c, const CornerBlock& leaf, int offset) {
-                  const bool positive = leaf.positive.test(offset);
-                  const bool valued = leaf.valued.test(offset);
-                  const bool carried = leaf.carried.test(offset);
+                  const bool outside = leaf.outside.test(offset);
+                  const bool defined = leaf.defined.test(offset);
+                  const bool supported = leaf.supported.test(offset);
                   if (leaf.shared.test(offset)) {
                     const HeldCorner finer = held_finer(s.window, level, c);
-                    ASSERT_EQ(positive, finer.block->positive.test(offset_in_block(finer.corner)));
-                    ASSERT_EQ(valued, finer.block->valued.test(offset_in_block(finer.corner)));
-                    ASSERT_EQ(carried, finer.block->carried.test(offset_in_block(finer.corner)));
+                    ASSERT_EQ(outside, finer.block->outside.test(offset_in_block(finer.corner)));
+                    ASSERT_EQ(defined, finer.block->defined.test(offset_in_block(finer.corner)));
+                    ASSERT_EQ(supported, finer.block->supported.test(offset_in_block(finer.corner)));
                     skipping += level - finer.level > 1 ? 1 : 0;
                     return;
                   }
                   const Sign truth = sign_of(values, c, scene.lattice.cell_size(level), boundary);
-                  ASSERT_EQ(valued, truth.valued) << "level " << level << " " << c.x << " " << c.y << " " << c.z;
+                  ASSERT_EQ(defined, truth.defined) << "level " << level << " " << c.x << " " << c.y << " " << c.z;
                   if (!truth.edge) {
-                    ASSERT_EQ(carried, truth.carried) << "level " << level << " " << c.x << " " << c.y << " " << c.z;
+                    ASSERT_EQ(supported, truth.supported)
+                        << "level " << level << " " << c.x << " " << c.y << " " << c.z;
                   }
-                  surrounded += carried && !leaf.seen.test(offset) ? 1 : 0;
+                  surrounded += supported && !leaf.seen.test(offset) ? 1 : 0;
                   if (!truth.tie) {
-                    ASSERT_EQ(positive, truth.positive) << "level " << level << " " << c.x << " " << c.y << " " << c.z;
+                    ASSERT_EQ(outside, truth.outside) << "level " << level << " " << c.x << " " << c.y << " " << c.z;
                   }
                   const Sign unlimited = sign_of(values, c, scene.lattice.cell_size(level), 0);
-                  (leaf.good.test(offset) ? own : unlimited.valued ? extended : guessed) += 1;
-                  negative += positive ? 0 : 1;
-                  beyond += unlimited.valued && !valued ? 1 : 0;
+                  (leaf.trusted.test(offset) ? own : unlimited.defined ? extended : guessed) += 1;
+                  negative += outside ? 0 : 1;
+                  beyond += unlimited.defined && !defined ? 1 : 0;
                 });
         ASSERT_FALSE(HasFatalFailure());
         // Only corners carry bits.
-        for (const auto mask : {&CornerBlock::positive, &CornerBlock::valued, &CornerBlock::carried}) {
+        for (const auto mask : {&CornerBlock::outside, &CornerBlock::defined, &CornerBlock::supported}) {
           for_set(s.window, level, s.first, s.end, mask, [&](int, const Cell&, const CornerBlock& leaf, int offset) {
             ASSERT_TRUE(leaf.corners.test(offset));
           });
@@ -122,7 +123,7 @@ TEST(Finish, SignsAreTheRule) {
   EXPECT_GT(skipping, 5U);
 }
 
-TEST(Finish, KernelsThreadsAndOrderGiveTheSameBits) {
+TEST(Extension, KernelsThreadsAndOrderGiveTheSameBits) {
   for (const ProjectedScene& scene : projected_scenes()) {
     StreamedCloud s(random_cloud(scene.cloud, 22), scene.lattice, {}, 77);
     project_all(s);
@@ -130,11 +131,11 @@ TEST(Finish, KernelsThreadsAndOrderGiveTheSameBits) {
     for (const Kernel& kernel : available_kernels()) {
       for (const std::size_t n : {1U, 4U}) {
         const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, n);
-        // Finishing reads projected values alone, so it can be repeated, from above as well.
-        for (std::int32_t slab = s.end - 1; slab >= s.first; --slab) finish_slab(s.window, slab, kernel, 0.5F);
+        // Extension reads projected values alone, so it can be repeated, from above as well.
+        for (std::int32_t slab = s.end - 1; slab >= s.first; --slab) extend_slab(s.window, slab, kernel, 0.5F);
         std::vector<std::set<Cell>> found;
         for (int level = 0; level < scene.lattice.levels; ++level) {
-          for (const auto mask : {&CornerBlock::positive, &CornerBlock::valued, &CornerBlock::carried}) {
+          for (const auto mask : {&CornerBlock::outside, &CornerBlock::defined, &CornerBlock::supported}) {
             found.push_back(set_cells(s.window, level, s.first, s.end, mask));
           }
         }

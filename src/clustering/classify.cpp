@@ -1,17 +1,17 @@
-#include "clustering/sift.h"
+#include "clustering/classify.h"
 
 #include <algorithm>
 #include <bit>
 
 #include "clustering/chunks.h"
-#include "clustering/hard.h"
+#include "clustering/resolve.h"
 #include "clustering/shape.h"
 
-namespace lamina::cluster {
+namespace lamina::clustering {
 namespace {
 
 constexpr std::size_t kLeast = 1 << 13;
-constexpr std::size_t kLeastHard = 64;
+constexpr std::size_t kLeastUnresolved = 64;
 /// Folds a used vertex into its cluster's note.
 void fold(const VertexNote& vertex, CornerNote& corner) {
   if (!vertex.used()) return;
@@ -41,7 +41,7 @@ void fold_members(Window& window, std::int64_t slab) {
   }
 }
 
-void list_hard(SlabRecord& here) {
+void list_unresolved(SlabRecord& here) {
   for (std::uint32_t c = 0; c < here.corners.size(); ++c) {
     const CornerNote& note = here.corners[c];
     if (note.members == 0) {
@@ -49,19 +49,20 @@ void list_hard(SlabRecord& here) {
     } else if (plainly_collapses(note)) {
       here.verdicts[c] = Verdict::corner;
     } else {
-      here.verdicts[c] = Verdict::hard;
-      here.seats[c] = static_cast<std::uint32_t>(here.hard.size());
-      here.hard.push_back({.corner = c, .first = 0, .count = 0, .pieces = {}});
+      here.verdicts[c] = Verdict::unresolved;
+      here.seats[c] = static_cast<std::uint32_t>(here.unresolved.size());
+      here.unresolved.push_back({.corner = c, .first = 0, .count = 0, .components = {}});
     }
   }
 }
 
-/// Marks the vertices of this slab's hard clusters, so that finding their triangles costs one look per vertex.
+/// Marks the vertices of this slab's unresolved clusters, so that finding their triangles costs one look per vertex.
 void mark_vertices(Window& window, std::int64_t slab) {
   SlabRecord& here = window.at(slab);
   SlabRecord& below = window.at(slab - 1);
   const auto mark = [&](VertexNote& vertex) {
-    if (here.verdicts[vertex.corner & ~SlabIndex::kNextSlab] == Verdict::hard) vertex.marks |= VertexNote::kHard;
+    if (here.verdicts[vertex.corner & ~SlabIndex::kNextSlab] == Verdict::unresolved)
+      vertex.marks |= VertexNote::kUnresolved;
   };
   for (const std::uint32_t v : below.crossing) mark(below.vertices[v]);
   for_chunks(here.vertices.size(), chunk_count(here.vertices.size(), kLeast),
@@ -72,87 +73,88 @@ void mark_vertices(Window& window, std::int64_t slab) {
              });
 }
 
-struct HardEntry {
-  std::uint32_t hard;
-  HardTriangle triangle;
+struct GatheredTriangle {
+  std::uint32_t cluster;
+  ClusterTriangle triangle;
 };
 
-/// Appends the triangle once for each hard cluster of `owner` it touches.
-void gather(const Window& window, const SlabRecord& owner, const HardTriangle& triangle,
-            std::vector<HardEntry>& entries) {
-  std::array<std::uint32_t, 3> hard{kNone, kNone, kNone};
+/// Appends the triangle once for each unresolved cluster of `owner` it touches.
+void gather(const Window& window, const SlabRecord& owner, const ClusterTriangle& triangle,
+            std::vector<GatheredTriangle>& entries) {
+  std::array<std::uint32_t, 3> cluster{kNone, kNone, kNone};
   for (std::size_t k = 0; k < 3; ++k) {
     const Ref corner = window.corner_of(triangle.vertex[k]);
-    if (&window.record_of(corner) != &owner || owner.verdicts[corner & kRefIndex] != Verdict::hard) continue;
-    hard[k] = owner.seats[corner & kRefIndex];
-    if (std::find(hard.begin(), hard.begin() + k, hard[k]) == hard.begin() + k) entries.push_back({hard[k], triangle});
+    if (&window.record_of(corner) != &owner || owner.verdicts[corner & kRefIndex] != Verdict::unresolved) continue;
+    cluster[k] = owner.seats[corner & kRefIndex];
+    if (std::find(cluster.begin(), cluster.begin() + k, cluster[k]) == cluster.begin() + k)
+      entries.push_back({cluster[k], triangle});
   }
 }
 
 void gather_range(const Window& window, const SlabRecord& owner, std::int64_t slab,
-                  std::span<const IsoTriangle> triangles, std::vector<HardEntry>& entries) {
+                  std::span<const IsoTriangle> triangles, std::vector<GatheredTriangle>& entries) {
   const std::array<Ref, 2> tag{slab_tag(slab), slab_tag(slab + 1)};
   const std::array<const VertexNote*, 2> notes{window.records[tag[0] >> kRefShift].vertices.data(),
                                                window.records[tag[1] >> kRefShift].vertices.data()};
   for (const IsoTriangle& t : triangles) {
     unsigned marks = 0;
     for (const SlabIndex index : t) marks |= notes[index.bits >> 31][index.index()].marks;
-    if ((marks & VertexNote::kHard) == 0) continue;
-    HardTriangle triangle{};
+    if ((marks & VertexNote::kUnresolved) == 0) continue;
+    ClusterTriangle triangle{};
     for (std::size_t k = 0; k < 3; ++k) triangle.vertex[k] = tag[t[k].bits >> 31] | t[k].index();
     gather(window, owner, triangle, entries);
   }
 }
 
-/// Lists for each hard cluster of `slab` the triangles that touch it, in mesh order.
+/// Lists for each unresolved cluster of `slab` the triangles that touch it, in mesh order.
 void gather_triangles(Window& window, std::int64_t slab) {
   SlabRecord& here = window.at(slab);
-  if (here.hard.empty()) return;
+  if (here.unresolved.empty()) return;
   const std::span<const IsoTriangle> triangles(here.iso->triangles);
   const std::size_t chunks = chunk_count(triangles.size(), kLeast);
-  std::vector<std::vector<HardEntry>> entries(chunks + 1);
+  std::vector<std::vector<GatheredTriangle>> entries(chunks + 1);
   gather_range(window, here, slab - 1, window.at(slab - 1).border, entries[0]);
   for_chunks(triangles.size(), chunks, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     gather_range(window, here, slab, triangles.subspan(begin, end - begin), entries[chunk + 1]);
   });
   for (const auto& part : entries) {
-    for (const HardEntry& entry : part) ++here.hard[entry.hard].count;
+    for (const GatheredTriangle& entry : part) ++here.unresolved[entry.cluster].count;
   }
   std::uint32_t total = 0;
-  for (HardCluster& hard : here.hard) {
-    hard.first = total;
-    total += hard.count;
-    hard.count = 0;
+  for (UnresolvedCluster& cluster : here.unresolved) {
+    cluster.first = total;
+    total += cluster.count;
+    cluster.count = 0;
   }
-  here.hard_triangles.resize(total);
+  here.unresolved_triangles.resize(total);
   for (const auto& part : entries) {
-    for (const HardEntry& entry : part) {
-      HardCluster& hard = here.hard[entry.hard];
-      here.hard_triangles[hard.first + hard.count++] = entry.triangle;
+    for (const GatheredTriangle& entry : part) {
+      UnresolvedCluster& cluster = here.unresolved[entry.cluster];
+      here.unresolved_triangles[cluster.first + cluster.count++] = entry.triangle;
     }
   }
 }
 
 template <class Fn>
-void for_hard(SlabRecord& here, const Fn& fn) {
-  for_chunks(here.hard.size(), chunk_count(here.hard.size(), kLeastHard),
+void for_unresolved(SlabRecord& here, const Fn& fn) {
+  for_chunks(here.unresolved.size(), chunk_count(here.unresolved.size(), kLeastUnresolved),
              [&](std::size_t, std::size_t begin, std::size_t end) {
-               HardScratch scratch;
-               for (std::size_t h = begin; h < end; ++h) fn(here.hard[h], scratch);
+               ResolveScratch scratch;
+               for (std::size_t h = begin; h < end; ++h) fn(here.unresolved[h], scratch);
              });
 }
 
 }  // namespace
 
-void sift(Window& window, std::int64_t slab) {
+void classify(Window& window, std::int64_t slab) {
   fold_members(window, slab);
   SlabRecord& here = window.at(slab);
-  list_hard(here);
+  list_unresolved(here);
   mark_vertices(window, slab);
   gather_triangles(window, slab);
-  for_hard(here, [&](HardCluster& hard, HardScratch& scratch) {
-    split_pieces(window, here, hard, scratch);
-    veto_neighbours(window, here, hard, scratch);
+  for_unresolved(here, [&](UnresolvedCluster& cluster, ResolveScratch& scratch) {
+    split_components(window, here, cluster, scratch);
+    veto_neighbours(window, here, cluster, scratch);
   });
 }
 
@@ -161,9 +163,9 @@ void decide(Window& window, std::int64_t slab) {
   for (std::size_t c = 0; c < here.corners.size(); ++c) {
     if (here.vetoes[c] != 0 && here.verdicts[c] == Verdict::corner) here.verdicts[c] = Verdict::kept;
   }
-  for_hard(here, [&](HardCluster& hard, HardScratch& scratch) {
-    here.verdicts[hard.corner] = judge(window, here, hard, scratch);
+  for_unresolved(here, [&](UnresolvedCluster& cluster, ResolveScratch& scratch) {
+    here.verdicts[cluster.corner] = resolve(window, here, cluster, scratch);
   });
 }
 
-}  // namespace lamina::cluster
+}  // namespace lamina::clustering

@@ -1,4 +1,4 @@
-#include "boundary/rim_finder.h"
+#include "boundary/boundary_finder.h"
 
 #include <algorithm>
 #include <tuple>
@@ -6,7 +6,7 @@
 
 #include "lamina/error.h"
 
-namespace lamina::holes {
+namespace lamina::boundary {
 namespace {
 
 /// Spreads a number over 64 bits (the finishing steps of MurmurHash3), so that sums vanish for nothing but pairs.
@@ -30,7 +30,7 @@ std::array<double, 3> triangle_normal(const std::array<double, 3>& a, const std:
 
 }  // namespace
 
-RimFinder::RimFinder(std::uint64_t first, const VertexBatch& below) : origin_(first), part_below_(true) {
+BoundaryFinder::BoundaryFinder(std::uint64_t first, const VertexBatch& below) : origin_(first), part_below_(true) {
   Slab& slab = slabs_[2];
   slab.vertices = below;
   slab.first = first - below.size();
@@ -38,12 +38,12 @@ RimFinder::RimFinder(std::uint64_t first, const VertexBatch& below) : origin_(fi
   turns_.assign(below.size(), 0);
 }
 
-void RimFinder::count(const Triangles& triangles) {
+void BoundaryFinder::count(const Triangles& triangles) {
   const std::uint64_t end = base_ + turns_.size();
   for (const auto& t : triangles) {
     if (t[0] < slabs_[1].first || t[1] < slabs_[1].first || t[2] < slabs_[1].first || t[0] >= end || t[1] >= end ||
         t[2] >= end)
-      throw Error(ExitCode::internal, "rims: a triangle names a vertex of none of the last two slabs");
+      throw Error(ExitCode::internal, "boundary: a triangle names a vertex of none of the last two slabs");
     const std::uint64_t a = spread(t[0]), b = spread(t[1]), c = spread(t[2]);
     turns_[t[0] - base_] += b - c;
     turns_[t[1] - base_] += c - a;
@@ -51,7 +51,7 @@ void RimFinder::count(const Triangles& triangles) {
   }
 }
 
-void RimFinder::slide(const VertexBatch& vertices, const Triangles& triangles) {
+void BoundaryFinder::slide(const VertexBatch& vertices, const Triangles& triangles) {
   const std::uint64_t gone = slabs_[0].vertices.size();
   turns_.erase(turns_.begin(), turns_.begin() + static_cast<std::ptrdiff_t>(gone));
   base_ += gone;
@@ -65,13 +65,13 @@ void RimFinder::slide(const VertexBatch& vertices, const Triangles& triangles) {
   count(last_);
 }
 
-void RimFinder::add(const VertexBatch& vertices, const Triangles& triangles, RimPiece& out) {
+void BoundaryFinder::add(const VertexBatch& vertices, const Triangles& triangles, BoundaryBatch& out) {
   slide(vertices, triangles);
   settle(std::exchange(part_below_, false), out);
 }
 
 /// The slab before the last has all its triangles: its edges, and those to the one below it, are decided.
-void RimFinder::settle(bool loose, RimPiece& out) {
+void BoundaryFinder::settle(bool loose, BoundaryBatch& out) {
   const Slab& slab = slabs_[1];
   const auto from = turns_.begin() + static_cast<std::ptrdiff_t>(slab.first - base_);
   const auto to = from + static_cast<std::ptrdiff_t>(slab.vertices.size());
@@ -92,14 +92,14 @@ void RimFinder::settle(bool loose, RimPiece& out) {
       continue;
     }
     const auto& t = e.triangle;
-    RimEdge rim{number(e.up ? e.low : e.high), number(e.up ? e.high : e.low),
-                triangle_normal(position(t[0]), position(t[1]), position(t[2]))};
-    (loose ? out.loose : out.edges).push_back(rim);
+    BoundaryEdge boundary{number(e.up ? e.low : e.high), number(e.up ? e.high : e.low),
+                          triangle_normal(position(t[0]), position(t[1]), position(t[2]))};
+    (loose ? out.loose : out.edges).push_back(boundary);
   }
 }
 
 /// Half-edges between open vertices, the later of which is of the slab.
-void RimFinder::collect(const Triangles& triangles, const Slab& slab) {
+void BoundaryFinder::collect(const Triangles& triangles, const Slab& slab) {
   for (const auto& t : triangles) {
     std::array<bool, 3> candidate{};
     for (std::size_t k = 0; k < 3; ++k) candidate[k] = t[k] >= base_ && t[k] < slab.end() && open(t[k]);
@@ -113,34 +113,34 @@ void RimFinder::collect(const Triangles& triangles, const Slab& slab) {
   }
 }
 
-std::array<double, 3> RimFinder::position(std::uint64_t vertex) const {
+std::array<double, 3> BoundaryFinder::position(std::uint64_t vertex) const {
   for (const Slab& s : slabs_) {
     if (vertex < s.first || vertex >= s.end()) continue;
     const std::size_t i = vertex - s.first;
     return {s.vertices.x[i], s.vertices.y[i], s.vertices.z[i]};
   }
-  throw Error(ExitCode::internal, "rims: a triangle names a vertex that has gone");
+  throw Error(ExitCode::internal, "boundary: a triangle names a vertex that has gone");
 }
 
-void RimFinder::put_vertices(const Slab& slab, RimPiece& out) const {
+void BoundaryFinder::put_vertices(const Slab& slab, BoundaryBatch& out) const {
   const VertexBatch& v = slab.vertices;
   for (std::size_t i = 0; i < v.size(); ++i) {
     if (!open(slab.first + i)) continue;
-    RimVertex rim;
-    rim.number = static_cast<Number>(slab.first + i) - static_cast<Number>(origin_);
-    rim.position = {v.x[i], v.y[i], v.z[i]};
-    rim.normal = {v.nx[i], v.ny[i], v.nz[i]};
-    rim.radius = v.radius.empty() ? 0 : v.radius[i];
-    out.vertices.push_back(rim);
+    BoundaryVertex boundary;
+    boundary.number = static_cast<Number>(slab.first + i) - static_cast<Number>(origin_);
+    boundary.position = {v.x[i], v.y[i], v.z[i]};
+    boundary.normal = {v.nx[i], v.ny[i], v.nz[i]};
+    boundary.radius = v.radius.empty() ? 0 : v.radius[i];
+    out.vertices.push_back(boundary);
     for (const auto& values : v.attributes) out.attributes.push_back(values[i]);
   }
 }
 
-void RimFinder::finish(bool more, RimPiece& out) {
+void BoundaryFinder::finish(bool more, BoundaryBatch& out) {
   VertexBatch none;
   none.attributes.resize(slabs_[2].vertices.attributes.size());
   slide(none, {});
   settle(more || std::exchange(part_below_, false), out);
 }
 
-}  // namespace lamina::holes
+}  // namespace lamina::boundary

@@ -1,13 +1,13 @@
-#include "clustering/tally.h"
+#include "clustering/count.h"
 
 #include "base/resize_anew.h"
 #include "clustering/chunks.h"
 
-namespace lamina::cluster {
+namespace lamina::clustering {
 namespace {
 
 constexpr std::uint32_t kNext = SlabIndex::kNextSlab;
-constexpr std::size_t kLeastTallied = 1 << 14;
+constexpr std::size_t kLeastCounted = 1 << 14;
 constexpr double kPositive = 4294967296.0;  // makes positions positive, so that truncation rounds down
 
 /// Two corners of one cell differ by at most one lattice step per axis, so their slots differ on a lattice of one
@@ -164,7 +164,7 @@ void check_border(const SlabRecord& here, const SlabRecord& next) {
 }
 
 template <ClusterMode mode>
-void tally_as(Window& window, std::int64_t slab) {
+void count_as(Window& window, std::int64_t slab) {
   SlabRecord& here = window.at(slab);
   SlabRecord& next = window.at(slab + 1);
   for (const IsoVertex& v : here.iso->vertices) {
@@ -177,7 +177,7 @@ void tally_as(Window& window, std::int64_t slab) {
                       {here.corners.data(), next.corners.data()},
                       {slab_tag(slab), slab_tag(slab + 1)}};
   const std::span<const IsoTriangle> triangles(here.iso->triangles);
-  const std::size_t chunks = chunk_count(triangles.size(), kLeastTallied);
+  const std::size_t chunks = chunk_count(triangles.size(), kLeastCounted);
   const std::vector<Share> shares = make_shares(here, chunks);
   std::vector<ChunkResult> results(chunks);
   for_chunks(triangles.size(), chunks, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
@@ -205,14 +205,14 @@ void lay_out(SlabRecord& record, std::shared_ptr<const IsoSlab> iso) {
   }
   record.crossing.clear();
   record.border.clear();
-  record.hard.clear();
-  record.hard_triangles.clear();
+  record.unresolved.clear();
+  record.unresolved_triangles.clear();
   resize_anew(record.corners, corners.size());
   record.verdicts.assign(corners.size(), Verdict::kept);
   record.vetoes.assign(corners.size(), 0);
   record.seats.assign(corners.size(), kNone);
   resize_anew(record.vertices, vertices.size());
-  for_chunks(corners.size(), chunk_count(corners.size(), kLeastTallied),
+  for_chunks(corners.size(), chunk_count(corners.size(), kLeastCounted),
              [&](std::size_t, std::size_t begin, std::size_t end) {
                for (std::size_t c = begin; c < end; ++c) {
                  CornerNote note;
@@ -235,15 +235,15 @@ void lay_out(SlabRecord& record, std::shared_ptr<const IsoSlab> iso) {
   }
 }
 
-void tally(Window& window, std::int64_t slab, ClusterMode mode) {
+void count_triangles(Window& window, std::int64_t slab, ClusterMode mode) {
   switch (mode) {
     case ClusterMode::none:
-      return tally_as<ClusterMode::none>(window, slab);
+      return count_as<ClusterMode::none>(window, slab);
     case ClusterMode::free:
-      return tally_as<ClusterMode::free>(window, slab);
+      return count_as<ClusterMode::free>(window, slab);
     case ClusterMode::preserving:
-      return tally_as<ClusterMode::preserving>(window, slab);
+      return count_as<ClusterMode::preserving>(window, slab);
   }
 }
 
-}  // namespace lamina::cluster
+}  // namespace lamina::clustering

@@ -1,11 +1,11 @@
-#include "boundary/rim_bytes.h"
+#include "boundary/boundary.h"
 
 #include <cstring>
 #include <type_traits>
 
 #include "lamina/error.h"
 
-namespace lamina::holes {
+namespace lamina::boundary {
 namespace {
 
 template <class T>
@@ -23,7 +23,7 @@ void put(const std::vector<T>& values, std::vector<std::byte>& out) {
 template <class T>
 void get(std::span<const std::byte>& left, std::vector<T>& values) {
   const auto require = [](bool ok) {
-    if (!ok) throw Error(ExitCode::unreadable, "the rims of a part are damaged; make the chunk again");
+    if (!ok) throw Error(ExitCode::unreadable, "the boundary of a part is damaged; make the chunk again");
   };
   std::uint64_t count = 0;
   require(left.size() >= sizeof count);
@@ -38,24 +38,24 @@ void get(std::span<const std::byte>& left, std::vector<T>& values) {
 
 }  // namespace
 
-void pack(const RimPiece& piece, std::vector<std::byte>& out) {
-  put(piece.vertices, out);
-  put(piece.attributes, out);
-  put(piece.inner, out);
-  put(piece.edges, out);
-  put(piece.loose, out);
+void pack(const BoundaryBatch& batch, std::vector<std::byte>& out) {
+  put(batch.vertices, out);
+  put(batch.attributes, out);
+  put(batch.inner, out);
+  put(batch.edges, out);
+  put(batch.loose, out);
 }
 
-RimPiece unpack(std::span<const std::byte> bytes) {
-  RimPiece piece;
+BoundaryBatch unpack(std::span<const std::byte> bytes) {
+  BoundaryBatch batch;
   while (!bytes.empty()) {
-    get(bytes, piece.vertices);
-    get(bytes, piece.attributes);
-    get(bytes, piece.inner);
-    get(bytes, piece.edges);
-    get(bytes, piece.loose);
+    get(bytes, batch.vertices);
+    get(bytes, batch.attributes);
+    get(bytes, batch.inner);
+    get(bytes, batch.edges);
+    get(bytes, batch.loose);
   }
-  return piece;
+  return batch;
 }
 
-}  // namespace lamina::holes
+}  // namespace lamina::boundary

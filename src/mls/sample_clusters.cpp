@@ -1,4 +1,4 @@
-#include "mls/clumps.h"
+#include "mls/sample_clusters.h"
 
 #include <algorithm>
 #include <array>
@@ -13,7 +13,7 @@ namespace {
 constexpr std::int32_t kMost = std::numeric_limits<std::int32_t>::max();
 constexpr std::int32_t kLeast = std::numeric_limits<std::int32_t>::min();
 
-/// Edge of a clump's cube in cells. Smaller ones fit tiles more closely but are more.
+/// Edge of a cluster's cube in cells. Smaller ones fit tiles more closely but are more.
 constexpr int kEdge = 4;
 
 /// More cubes than this in a level are joined to larger ones, so that their numbers stay small.
@@ -99,22 +99,22 @@ std::int32_t bounded(double steps) {
   return static_cast<std::int32_t>(std::clamp(steps, double{kLeast}, double{kMost}));
 }
 
-/// Widens the clump's box by a sample's reach.
-void include(const ClumpedBucket& b, std::size_t i, Clump& c) {
-  const double reach = static_cast<double>(b.support[i]);
+/// Widens the cluster's box by a sample's support.
+void include(const ClusteredBucket& b, std::size_t i, SampleCluster& c) {
+  const double radius = static_cast<double>(b.support[i]);
   const std::array<std::int32_t, 3> p{b.x[i], b.y[i], b.z[i]};
   for (int axis = 0; axis < 3; ++axis) {
-    c.low[axis] = std::min(c.low[axis], bounded(std::floor(p[axis] - reach)));
-    c.high[axis] = std::max(c.high[axis], bounded(std::ceil(p[axis] + reach)));
+    c.low[axis] = std::min(c.low[axis], bounded(std::floor(p[axis] - radius)));
+    c.high[axis] = std::max(c.high[axis], bounded(std::ceil(p[axis] + radius)));
   }
 }
 
 }  // namespace
 
-ClumpedBucket clump(const ActiveBucket& bucket, const Lattice& lattice) {
+ClusteredBucket cluster_samples(const ActiveBucket& bucket, const Lattice& lattice) {
   const std::vector<Keyed> order = in_order(bucket, lattice);
   const LocalSamples& s = bucket.samples;
-  ClumpedBucket out;
+  ClusteredBucket out;
   out.x = pick(s.x, order);
   out.y = pick(s.y, order);
   out.z = pick(s.z, order);
@@ -127,13 +127,13 @@ ClumpedBucket clump(const ActiveBucket& bucket, const Lattice& lattice) {
   for (const std::vector<float>& a : s.attributes) out.attributes.push_back(pick(a, order));
   for (std::size_t k = 0; k < order.size(); ++k) {
     if (k == 0 || order[k].key != order[k - 1].key) {
-      if (k > 0) out.clumps.back().end = static_cast<std::uint32_t>(k);
-      out.clumps.push_back({static_cast<std::uint32_t>(k), 0, {kMost, kMost, kMost}, {kLeast, kLeast, kLeast}});
+      if (k > 0) out.clusters.back().end = static_cast<std::uint32_t>(k);
+      out.clusters.push_back({static_cast<std::uint32_t>(k), 0, {kMost, kMost, kMost}, {kLeast, kLeast, kLeast}});
     }
     out.cell[k] = static_cast<float>(lattice.cell_size(bucket.level[order[k].sample]));
-    include(out, k, out.clumps.back());
+    include(out, k, out.clusters.back());
   }
-  if (!order.empty()) out.clumps.back().end = static_cast<std::uint32_t>(order.size());
+  if (!order.empty()) out.clusters.back().end = static_cast<std::uint32_t>(order.size());
   return out;
 }
 

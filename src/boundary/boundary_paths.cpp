@@ -1,14 +1,14 @@
-#include "boundary/rim_paths.h"
+#include "boundary/boundary_paths.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-namespace lamina::holes {
+namespace lamina::boundary {
 namespace {
 
-RimExtent extent_of(const RimVertex& a, const RimVertex& b) {
-  RimExtent e;
+LoopExtent extent_of(const BoundaryVertex& a, const BoundaryVertex& b) {
+  LoopExtent e;
   double square = 0;
   for (std::size_t k = 0; k < 3; ++k) {
     const double d = b.position[k] - a.position[k];
@@ -23,7 +23,7 @@ RimExtent extent_of(const RimVertex& a, const RimVertex& b) {
   return e;
 }
 
-void include(RimExtent& all, const RimExtent& more) {
+void include(LoopExtent& all, const LoopExtent& more) {
   all.edges += more.edges;
   all.length += more.length;
   all.radii += more.radii;
@@ -35,47 +35,48 @@ void include(RimExtent& all, const RimExtent& more) {
 
 }  // namespace
 
-RimPaths::RimPaths(double longest, std::size_t attributes, std::function<void(Loop&&, const RimExtent&)> closed,
-                   std::function<void(const RimExtent&)> left)
+BoundaryPaths::BoundaryPaths(double longest, std::size_t attributes,
+                             std::function<void(Loop&&, const LoopExtent&)> closed,
+                             std::function<void(const LoopExtent&)> left)
     // Lengths are summed up in the order of coming: what is just about too long is for the closer to decide.
     : longest_(longest * 1.001), attributes_(attributes), closed_(std::move(closed)), left_(std::move(left)) {}
 
-void RimPaths::add(const RimPiece& piece, Number first) {
-  for (std::size_t i = 0; i < piece.vertices.size(); ++i) {
-    RimVertex vertex = piece.vertices[i];
+void BoundaryPaths::add(const BoundaryBatch& batch, Number first) {
+  for (std::size_t i = 0; i < batch.vertices.size(); ++i) {
+    BoundaryVertex vertex = batch.vertices[i];
     vertex.number += first;
     const auto [at, fresh] = nodes_.try_emplace(vertex.number);
     if (!fresh) continue;
     at->second.vertex = vertex;
-    const auto values = piece.attributes.begin() + static_cast<std::ptrdiff_t>(i * attributes_);
+    const auto values = batch.attributes.begin() + static_cast<std::ptrdiff_t>(i * attributes_);
     at->second.attributes.assign(values, values + static_cast<std::ptrdiff_t>(attributes_));
   }
-  for (const InnerEdge& e : piece.inner) {
+  for (const InnerEdge& e : batch.inner) {
     const auto a = nodes_.find(e.a + first);
     const auto b = nodes_.find(e.b + first);
     if (a == nodes_.end() || b == nodes_.end()) continue;
     a->second.inner.push_back(b->first);
     b->second.inner.push_back(a->first);
   }
-  for (RimEdge e : piece.edges) {
+  for (BoundaryEdge e : batch.edges) {
     e.from += first;
     e.to += first;
     join(e);
   }
 }
 
-void RimPaths::join(const RimEdge& edge) {
+void BoundaryPaths::join(const BoundaryEdge& edge) {
   const auto from = nodes_.find(edge.from);
   const auto to = nodes_.find(edge.to);
-  // Where a mesh is not manifold, a vertex may be of a rim that has been dealt with: such edges stay by themselves,
-  // too.
+  // Where a mesh is not manifold, a vertex may be of a boundary loop that has been dealt with: such edges stay by
+  // themselves, too.
   if (from == nodes_.end() || to == nodes_.end()) {
     const auto known = from == nodes_.end() ? to : from;
     if (known != nodes_.end()) left_(extent_of(known->second.vertex, known->second.vertex));
     return;
   }
-  const RimExtent extent = extent_of(from->second.vertex, to->second.vertex);
-  // Several rims meet in a vertex only where a mesh is not manifold: these edges stay by themselves.
+  const LoopExtent extent = extent_of(from->second.vertex, to->second.vertex);
+  // Several boundary loops meet in a vertex only where a mesh is not manifold: these edges stay by themselves.
   if (from->second.next != kNone || to->second.entered) {
     left_(extent);
     return;
@@ -86,7 +87,8 @@ void RimPaths::join(const RimEdge& edge) {
 
   Path path{edge.from, edge.to, extent};
   const std::optional<Path> lower = take_ending(edge.from);
-  const std::optional<Path> upper = take_beginning(edge.to);  // none where the rim closes: it was the lower one
+  const std::optional<Path> upper =
+      take_beginning(edge.to);  // none where the boundary loop closes: it was the lower one
   for (const auto& part : {lower, upper}) {
     if (!part) continue;
     include(path.extent, part->extent);
@@ -115,7 +117,7 @@ void RimPaths::join(const RimEdge& edge) {
   closed_(take_loop(path), path.extent);
 }
 
-std::optional<RimPaths::Path> RimPaths::take_ending(Number vertex) {
+std::optional<BoundaryPaths::Path> BoundaryPaths::take_ending(Number vertex) {
   const auto found = last_to_first_.find(vertex);
   if (found == last_to_first_.end()) return std::nullopt;
   const Path path = by_first_.at(found->second);
@@ -124,7 +126,7 @@ std::optional<RimPaths::Path> RimPaths::take_ending(Number vertex) {
   return path;
 }
 
-std::optional<RimPaths::Path> RimPaths::take_beginning(Number vertex) {
+std::optional<BoundaryPaths::Path> BoundaryPaths::take_beginning(Number vertex) {
   const auto found = by_first_.find(vertex);
   if (found == by_first_.end()) return std::nullopt;
   const Path path = found->second;
@@ -133,7 +135,7 @@ std::optional<RimPaths::Path> RimPaths::take_beginning(Number vertex) {
   return path;
 }
 
-void RimPaths::erase_between(Number first, Number last) {
+void BoundaryPaths::erase_between(Number first, Number last) {
   for (Number at = nodes_.at(first).next; at != last;) {
     const auto node = nodes_.find(at);
     at = node->second.next;
@@ -141,7 +143,7 @@ void RimPaths::erase_between(Number first, Number last) {
   }
 }
 
-Loop RimPaths::take_loop(const Path& path) {
+Loop BoundaryPaths::take_loop(const Path& path) {
   std::vector<Number> order;
   Number at = path.first;
   do {
@@ -171,14 +173,14 @@ Loop RimPaths::take_loop(const Path& path) {
   return loop;
 }
 
-void RimPaths::forget_below(Number number) {
+void BoundaryPaths::forget_below(Number number) {
   std::erase_if(nodes_, [&](const auto& entry) {
     const Node& node = entry.second;
     return entry.first < number && node.next == kNone && !node.entered;
   });
 }
 
-void RimPaths::finish() {
+void BoundaryPaths::finish() {
   std::vector<Number> firsts;
   for (const auto& [first, path] : by_first_) firsts.push_back(first);
   std::sort(firsts.begin(), firsts.end());
@@ -188,4 +190,4 @@ void RimPaths::finish() {
   nodes_.clear();
 }
 
-}  // namespace lamina::holes
+}  // namespace lamina::boundary

@@ -1,33 +1,33 @@
-// Finds the rims of a mesh while it streams by.
+// Finds the boundary loops of a mesh while it streams by.
 #pragma once
 #include <array>
 #include <cstdint>
 #include <vector>
 
-#include "boundary/rim.h"
+#include "boundary/boundary.h"
 #include "meshes/mesh_sink.h"
 
-namespace lamina::holes {
+namespace lamina::boundary {
 
 /// Takes a mesh slab by slab; triangles name vertices of their slab and of the one before. Keeps the vertices of three
 /// slabs and the triangles of two.
 ///
 /// Every vertex sums up, over its triangles, a hash of the next vertex less one of the vertex before: nothing remains
-/// where the triangles around it close. So only the few vertices of rims are looked at edge by edge.
-class RimFinder {
+/// where the triangles around it close. So only the few vertices of boundary loops are looked at edge by edge.
+class BoundaryFinder {
  public:
   using Triangles = std::vector<std::array<std::uint32_t, 3>>;
 
   /// Of a whole mesh, whose vertices count from 0.
-  RimFinder() = default;
-  /// Of a part: triangles name its first vertex `first`, rims name it 0. `below`: the slab that it stands on, which is
-  /// of another part.
-  RimFinder(std::uint64_t first, const VertexBatch& below);
+  BoundaryFinder() = default;
+  /// Of a part: triangles name its first vertex `first`, boundary loops name it 0. `below`: the slab that it stands on,
+  /// which is of another part.
+  BoundaryFinder(std::uint64_t first, const VertexBatch& below);
 
-  /// The next slab; adds to `out` what is known now: the rims of the slab before.
-  void add(const VertexBatch& vertices, const Triangles& triangles, RimPiece& out);
+  /// The next slab; adds to `out` what is known now: the boundary loops of the slab before.
+  void add(const VertexBatch& vertices, const Triangles& triangles, BoundaryBatch& out);
   /// No more slabs come. `more`: those of another part follow.
-  void finish(bool more, RimPiece& out);
+  void finish(bool more, BoundaryBatch& out);
 
  private:
   struct Slab {
@@ -37,11 +37,11 @@ class RimFinder {
   };
   void slide(const VertexBatch& vertices, const Triangles& triangles);
   void count(const Triangles& triangles);
-  void settle(bool loose, RimPiece& out);
+  void settle(bool loose, BoundaryBatch& out);
   void collect(const Triangles& triangles, const Slab& slab);
   [[nodiscard]] bool open(std::uint64_t vertex) const { return turns_[vertex - base_] != 0; }
   [[nodiscard]] std::array<double, 3> position(std::uint64_t vertex) const;
-  void put_vertices(const Slab& slab, RimPiece& out) const;
+  void put_vertices(const Slab& slab, BoundaryBatch& out) const;
 
   struct HalfEdge {
     std::uint64_t low = 0, high = 0;
@@ -58,4 +58,4 @@ class RimFinder {
   std::vector<HalfEdge> found_;
 };
 
-}  // namespace lamina::holes
+}  // namespace lamina::boundary

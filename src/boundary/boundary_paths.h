@@ -1,4 +1,4 @@
-// Joins the edges of rims to closed loops, whatever the order in which they come.
+// Joins the edges of boundary loops to closed loops, whatever the order in which they come.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -8,12 +8,12 @@
 #include <unordered_map>
 #include <vector>
 
-#include "boundary/rim.h"
+#include "boundary/boundary.h"
 
-namespace lamina::holes {
+namespace lamina::boundary {
 
-/// A rim, or as much of it as is known.
-struct RimExtent {
+/// A boundary loop, or as much of it as is known.
+struct LoopExtent {
   std::uint64_t edges = 0;
   double length = 0;  ///< input units
   double radii = 0;   ///< the same in local influence radii
@@ -23,38 +23,39 @@ struct RimExtent {
   }
 };
 
-/// Memory holds the vertices of rims that are open still, and no longer than `longest`: of longer ones only the ends.
-class RimPaths {
+/// Memory holds the vertices of boundary loops that are open still, and no longer than `longest`: of longer ones only
+/// the ends.
+class BoundaryPaths {
  public:
   /// `closed` gets loops of at most about `longest` radii and kMostEdges edges, `left` all others in the end.
   /// `attributes`: of each vertex.
-  RimPaths(double longest, std::size_t attributes, std::function<void(Loop&&, const RimExtent&)> closed,
-           std::function<void(const RimExtent&)> left);
+  BoundaryPaths(double longest, std::size_t attributes, std::function<void(Loop&&, const LoopExtent&)> closed,
+                std::function<void(const LoopExtent&)> left);
   static constexpr std::uint64_t kMostEdges = 512;
 
-  /// `first`: what the piece's numbers count from. Loose edges are not looked at.
-  void add(const RimPiece& piece, Number first);
+  /// `first`: what the batch's numbers count from. Loose edges are not looked at.
+  void add(const BoundaryBatch& batch, Number first);
   /// Forgets vertices below `number` that have no edge.
   void forget_below(Number number);
-  /// No more edges come; rims that never closed are left.
+  /// No more edges come; boundary loops that never closed are left.
   void finish();
 
  private:
   static constexpr Number kNone = std::numeric_limits<Number>::min();
   struct Node {
-    RimVertex vertex;
+    BoundaryVertex vertex;
     std::vector<float> attributes;
     std::vector<Number> inner;
-    Number next = kNone;  ///< along the rim's edges
+    Number next = kNone;  ///< along the boundary loop's edges
     bool entered = false;
     std::array<double, 3> facing{};  ///< of the edge to `next`
   };
   struct Path {
     Number first = 0, last = 0;
-    RimExtent extent;
+    LoopExtent extent;
     bool dropped = false;  ///< only its ends are known
   };
-  void join(const RimEdge& edge);
+  void join(const BoundaryEdge& edge);
   std::optional<Path> take_ending(Number vertex);
   std::optional<Path> take_beginning(Number vertex);
   void erase_between(Number first, Number last);
@@ -62,11 +63,11 @@ class RimPaths {
 
   double longest_;
   std::size_t attributes_;
-  std::function<void(Loop&&, const RimExtent&)> closed_;
-  std::function<void(const RimExtent&)> left_;
+  std::function<void(Loop&&, const LoopExtent&)> closed_;
+  std::function<void(const LoopExtent&)> left_;
   std::unordered_map<Number, Node> nodes_;
   std::unordered_map<Number, Path> by_first_;  ///< open paths by their first vertex
   std::unordered_map<Number, Number> last_to_first_;
 };
 
-}  // namespace lamina::holes
+}  // namespace lamina::boundary

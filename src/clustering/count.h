@@ -2,7 +2,7 @@
 #pragma once
 #include "clustering/record.h"
 
-namespace lamina::cluster {
+namespace lamina::clustering {
 
 /// Fills a fresh record for `iso`: the cluster of each vertex and the slot of each corner.
 /// Throws Error(internal) where an index leaves this slab's corners.
@@ -10,6 +10,6 @@ void lay_out(SlabRecord& record, std::shared_ptr<const IsoSlab> iso);
 
 /// Counts the triangles of `slab` into the notes of `slab` and the next one, and lists its border triangles.
 /// Throws Error(internal) where an index leaves the tables of the two slabs.
-void tally(Window& window, std::int64_t slab, ClusterMode mode);
+void count_triangles(Window& window, std::int64_t slab, ClusterMode mode);
 
-}  // namespace lamina::cluster
+}  // namespace lamina::clustering
