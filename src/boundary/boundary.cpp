@@ -1,7 +1,10 @@
 #include "boundary/boundary.h"
 
+#include <algorithm>
 #include <cstring>
+#include <tuple>
 #include <type_traits>
+#include <utility>
 
 #include "lamina/error.h"
 
@@ -36,6 +39,25 @@ void get(std::span<const std::byte>& left, std::vector<T>& values) {
   left = left.subspan(count * sizeof(T));
 }
 
+/// Spreads a number over 64 bits (the finishing steps of MurmurHash3), so that sums vanish for nothing but pairs.
+std::uint64_t spread(std::uint64_t n) {
+  n ^= n >> 33U;
+  n *= 0xff51afd7ed558ccdU;
+  n ^= n >> 33U;
+  n *= 0xc4ceb9fe1a85ec53U;
+  return n ^ (n >> 33U);
+}
+
+std::array<double, 3> triangle_normal(const std::array<double, 3>& a, const std::array<double, 3>& b,
+                                      const std::array<double, 3>& c) {
+  std::array<double, 3> u{}, v{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    u[k] = b[k] - a[k];
+    v[k] = c[k] - a[k];
+  }
+  return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+}
+
 }  // namespace
 
 void pack(const BoundaryBatch& batch, std::vector<std::byte>& out) {
@@ -56,6 +78,119 @@ BoundaryBatch unpack(std::span<const std::byte> bytes) {
     get(bytes, batch.loose);
   }
   return batch;
+}
+
+BoundaryFinder::BoundaryFinder(std::uint64_t first, const VertexBatch& below) : origin_(first), part_below_(true) {
+  Slab& slab = slabs_[2];
+  slab.vertices = below;
+  slab.first = first - below.size();
+  base_ = slabs_[0].first = slabs_[1].first = slab.first;
+  turns_.assign(below.size(), 0);
+}
+
+void BoundaryFinder::count(const Triangles& triangles) {
+  const std::uint64_t end = base_ + turns_.size();
+  for (const auto& t : triangles) {
+    if (t[0] < slabs_[1].first || t[1] < slabs_[1].first || t[2] < slabs_[1].first || t[0] >= end || t[1] >= end ||
+        t[2] >= end)
+      throw Error(ExitCode::internal, "boundary: a triangle names a vertex of none of the last two slabs");
+    const std::uint64_t a = spread(t[0]), b = spread(t[1]), c = spread(t[2]);
+    turns_[t[0] - base_] += b - c;
+    turns_[t[1] - base_] += c - a;
+    turns_[t[2] - base_] += a - b;
+  }
+}
+
+void BoundaryFinder::slide(const VertexBatch& vertices, const Triangles& triangles) {
+  const std::uint64_t gone = slabs_[0].vertices.size();
+  turns_.erase(turns_.begin(), turns_.begin() + static_cast<std::ptrdiff_t>(gone));
+  base_ += gone;
+  std::swap(slabs_[0], slabs_[1]);
+  std::swap(slabs_[1], slabs_[2]);
+  slabs_[2].vertices = vertices;
+  slabs_[2].first = slabs_[1].end();
+  turns_.resize(turns_.size() + vertices.size(), 0);
+  std::swap(before_, last_);
+  last_ = triangles;
+  count(last_);
+}
+
+void BoundaryFinder::add(const VertexBatch& vertices, const Triangles& triangles, BoundaryBatch& out) {
+  slide(vertices, triangles);
+  settle(std::exchange(part_below_, false), out);
+}
+
+/// The slab before the last has all its triangles: its edges, and those to the one below it, are decided.
+void BoundaryFinder::settle(bool loose, BoundaryBatch& out) {
+  const Slab& slab = slabs_[1];
+  const auto from = turns_.begin() + static_cast<std::ptrdiff_t>(slab.first - base_);
+  const auto to = from + static_cast<std::ptrdiff_t>(slab.vertices.size());
+  if (std::all_of(from, to, [](std::uint64_t t) { return t == 0; })) return;
+  put_vertices(slab, out);
+  found_.clear();
+  collect(before_, slab);
+  collect(last_, slab);
+  std::sort(found_.begin(), found_.end(), [](const HalfEdge& a, const HalfEdge& b) {
+    return std::tie(a.high, a.low, a.up, a.triangle) < std::tie(b.high, b.low, b.up, b.triangle);
+  });
+  const auto number = [&](std::uint64_t v) { return static_cast<Number>(v) - static_cast<Number>(origin_); };
+  for (std::size_t i = 0, j = 0; i < found_.size(); i = j) {
+    for (j = i; j < found_.size() && found_[j].low == found_[i].low && found_[j].high == found_[i].high;) ++j;
+    const HalfEdge& e = found_[i];
+    if (j - i > 1) {
+      out.inner.push_back({number(e.low), number(e.high)});
+      continue;
+    }
+    const auto& t = e.triangle;
+    BoundaryEdge boundary{number(e.up ? e.low : e.high), number(e.up ? e.high : e.low),
+                          triangle_normal(position(t[0]), position(t[1]), position(t[2]))};
+    (loose ? out.loose : out.edges).push_back(boundary);
+  }
+}
+
+/// Half-edges between open vertices, the later of which is of the slab.
+void BoundaryFinder::collect(const Triangles& triangles, const Slab& slab) {
+  for (const auto& t : triangles) {
+    std::array<bool, 3> candidate{};
+    for (std::size_t k = 0; k < 3; ++k) candidate[k] = t[k] >= base_ && t[k] < slab.end() && open(t[k]);
+    if (candidate[0] + candidate[1] + candidate[2] < 2) continue;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t next = (k + 1) % 3;
+      if (!candidate[k] || !candidate[next]) continue;
+      HalfEdge e{std::min(t[k], t[next]), std::max(t[k], t[next]), t[k] < t[next], t};
+      if (e.high >= slab.first) found_.push_back(e);
+    }
+  }
+}
+
+std::array<double, 3> BoundaryFinder::position(std::uint64_t vertex) const {
+  for (const Slab& s : slabs_) {
+    if (vertex < s.first || vertex >= s.end()) continue;
+    const std::size_t i = vertex - s.first;
+    return {s.vertices.x[i], s.vertices.y[i], s.vertices.z[i]};
+  }
+  throw Error(ExitCode::internal, "boundary: a triangle names a vertex that has gone");
+}
+
+void BoundaryFinder::put_vertices(const Slab& slab, BoundaryBatch& out) const {
+  const VertexBatch& v = slab.vertices;
+  for (std::size_t i = 0; i < v.size(); ++i) {
+    if (!open(slab.first + i)) continue;
+    BoundaryVertex boundary;
+    boundary.number = static_cast<Number>(slab.first + i) - static_cast<Number>(origin_);
+    boundary.position = {v.x[i], v.y[i], v.z[i]};
+    boundary.normal = {v.nx[i], v.ny[i], v.nz[i]};
+    boundary.radius = v.radius.empty() ? 0 : v.radius[i];
+    out.vertices.push_back(boundary);
+    for (const auto& values : v.attributes) out.attributes.push_back(values[i]);
+  }
+}
+
+void BoundaryFinder::finish(bool more, BoundaryBatch& out) {
+  VertexBatch none;
+  none.attributes.resize(slabs_[2].vertices.attributes.size());
+  slide(none, {});
+  settle(more || std::exchange(part_below_, false), out);
 }
 
 }  // namespace lamina::boundary

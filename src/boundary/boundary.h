@@ -1,10 +1,13 @@
-// The boundary loops of a mesh: directed edges of one triangle alone, and the vertices at their ends.
+// The boundary of a mesh: directed edges of one triangle alone and the vertices at their ends, found while the mesh
+// streams by, and as bytes for parts of a mesh and for other processes of the same program.
 #pragma once
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
+
+#include "meshes/mesh_sink.h"
 
 namespace lamina::boundary {
 
@@ -62,5 +65,54 @@ void pack(const BoundaryBatch& batch, std::vector<std::byte>& out);
 
 /// Reads all that was packed into one batch. Throws Error(unreadable) where bytes are missing.
 BoundaryBatch unpack(std::span<const std::byte> bytes);
+
+/// Takes a mesh slab by slab; triangles name vertices of their slab and of the one before. Keeps the vertices of three
+/// slabs and the triangles of two.
+///
+/// Every vertex sums up, over its triangles, a hash of the next vertex less one of the vertex before: nothing remains
+/// where the triangles around it close. So only the few vertices of boundary loops are looked at edge by edge.
+class BoundaryFinder {
+ public:
+  using Triangles = std::vector<std::array<std::uint32_t, 3>>;
+
+  /// Of a whole mesh, whose vertices count from 0.
+  BoundaryFinder() = default;
+  /// Of a part: triangles name its first vertex `first`, boundary loops name it 0. `below`: the slab that it stands on,
+  /// which is of another part.
+  BoundaryFinder(std::uint64_t first, const VertexBatch& below);
+
+  /// The next slab; adds to `out` what is known now: the boundary loops of the slab before.
+  void add(const VertexBatch& vertices, const Triangles& triangles, BoundaryBatch& out);
+  /// No more slabs come. `more`: those of another part follow.
+  void finish(bool more, BoundaryBatch& out);
+
+ private:
+  struct Slab {
+    VertexBatch vertices;
+    std::uint64_t first = 0;  ///< number of the first vertex, as triangles name it
+    [[nodiscard]] std::uint64_t end() const { return first + vertices.size(); }
+  };
+  void slide(const VertexBatch& vertices, const Triangles& triangles);
+  void count(const Triangles& triangles);
+  void settle(bool loose, BoundaryBatch& out);
+  void collect(const Triangles& triangles, const Slab& slab);
+  [[nodiscard]] bool open(std::uint64_t vertex) const { return turns_[vertex - base_] != 0; }
+  [[nodiscard]] std::array<double, 3> position(std::uint64_t vertex) const;
+  void put_vertices(const Slab& slab, BoundaryBatch& out) const;
+
+  struct HalfEdge {
+    std::uint64_t low = 0, high = 0;
+    bool up = false;  ///< runs from low to high
+    std::array<std::uint32_t, 3> triangle{};
+  };
+
+  std::uint64_t origin_ = 0;          ///< number of the first vertex that is not `below`
+  std::array<Slab, 3> slabs_{};       ///< two before, the one before, the last
+  Triangles before_, last_;           ///< of the one before and of the last
+  std::vector<std::uint64_t> turns_;  ///< of the three slabs' vertices
+  std::uint64_t base_ = 0;            ///< vertex of turns_[0]
+  bool part_below_ = false;           ///< the slab before is another part's
+  std::vector<HalfEdge> found_;
+};
 
 }  // namespace lamina::boundary

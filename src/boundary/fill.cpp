@@ -15,19 +15,6 @@ namespace {
 using Vec2 = Eigen::Vector2d;
 using Vec3 = Eigen::Vector3d;
 
-/// Normals around a gap lie within 75 degrees of their mean.
-constexpr double kCone = 0.26;
-/// The boundary loop lies within so many influence radii of one sphere.
-constexpr double kOffSphere = 0.4;
-/// Facets fold by less than 100 degrees (one less the cosine), with each other and with those around.
-constexpr double kMostFold = 1.17;
-/// Boundary loops no longer than this (R), hardly wider than one sample acts, need no sphere: ends of thin things.
-/// Facets there fold by less than 140 degrees, which still tells a gap from the outer boundary of a flake.
-constexpr double kSmall = 5;
-constexpr double kMostSmallFold = 1.77;
-/// Boundary loops so near to a filling (R) take its place.
-constexpr double kOccupied = 0.5;
-
 Vec3 to_vec(const std::array<double, 3>& v) {
   return {v[0], v[1], v[2]};
 }
@@ -80,6 +67,23 @@ Base widest_base(const Loop& loop) {
   stand_across(area, base);
   return base;
 }
+
+/// The loop as its base sees it.
+struct LocalLoop {
+  LocalLoop(const Loop& loop, const Base& seen_from) : base(seen_from), taken(loop.taken.begin(), loop.taken.end()) {
+    for (std::size_t i = 0; i < loop.vertices.size(); ++i) {
+      points.push_back(base.local(to_vec(loop.vertices[i].position)));
+      normals.push_back(base.axes * to_vec(loop.vertices[i].normal));
+      facing.push_back(base.axes * to_vec(loop.facing[i]));
+    }
+  }
+  [[nodiscard]] bool allows(std::uint32_t i, std::uint32_t j) const {
+    return j >= points.size() || !taken.contains({i, j});
+  }
+  Base base;
+  std::vector<Vec3> points, normals, facing;
+  std::set<std::array<std::uint32_t, 2>> taken;
+};
 
 double length_in_radii(const Loop& loop) {
   double sum = 0;
@@ -186,8 +190,10 @@ bool folds_too_far(const std::vector<Vec3>& points, const std::vector<Vec3>& fac
 }
 
 /// New vertices on the sphere, bent so that it passes through the boundary loop.
-bool place_inner(const Loop& loop, const Base& base, const Sphere& sphere, const std::vector<Vec3>& outline,
-                 const std::vector<Vec2>& plane, std::vector<Vec3>& points, Filling& out) {
+bool place_inner(const Loop& loop, const LocalLoop& local, const Sphere& sphere, const std::vector<Vec2>& plane,
+                 std::vector<Vec3>& points, Filling& out) {
+  const Base& base = local.base;
+  const std::vector<Vec3>& outline = local.points;
   const std::size_t n = outline.size();
   const std::size_t attributes = loop.attributes.size() / n;
   std::vector<double> above(n);
@@ -225,31 +231,15 @@ Filling refused(Verdict verdict) {
   return filling;
 }
 
-/// The loop as its base sees it.
-struct LocalLoop {
-  LocalLoop(const Loop& loop, const Base& base) : taken(loop.taken.begin(), loop.taken.end()) {
-    for (std::size_t i = 0; i < loop.vertices.size(); ++i) {
-      points.push_back(base.local(to_vec(loop.vertices[i].position)));
-      normals.push_back(base.axes * to_vec(loop.vertices[i].normal));
-      facing.push_back(base.axes * to_vec(loop.facing[i]));
-    }
-  }
-  [[nodiscard]] bool allows(std::uint32_t i, std::uint32_t j) const {
-    return j >= points.size() || !taken.contains({i, j});
-  }
-  std::vector<Vec3> points, normals, facing;
-  std::set<std::array<std::uint32_t, 2>> taken;
-};
-
 /// Where one surface goes on all around.
 Filling fill_smooth(const Loop& loop) {
-  const Base base = base_of(loop);
-  const LocalLoop local(loop, base);
+  const LocalLoop local(loop, base_of(loop));
   const std::size_t n = local.points.size();
   if (signed_area(local.points) <= 0) return refused(Verdict::outer_boundary);
   const Sphere sphere(local.points, local.normals);
   for (std::size_t i = 0; i < n; ++i) {
-    if (local.normals[i].z() < kCone || std::abs(sphere.distance(local.points[i])) > kOffSphere * base.radius ||
+    if (local.normals[i].z() < kLeastNormalCosine ||
+        std::abs(sphere.distance(local.points[i])) > kFarthestFromSphere * local.base.radius ||
         sphere.gradient(local.points[i]).z() <= 0)
       return refused(Verdict::bent);
   }
@@ -269,7 +259,7 @@ Filling fill_smooth(const Loop& loop) {
   }
   refine_triangles(plane, scale, filling.triangles, allowed);
   std::vector<Vec3> points = local.points;
-  if (!place_inner(loop, base, sphere, local.points, plane, points, filling) ||
+  if (!place_inner(loop, local, sphere, plane, points, filling) ||
       folds_too_far(points, local.normals, kMostFold, filling.triangles))
     return refused(Verdict::bent);
   filling.verdict = Verdict::filled;
@@ -323,7 +313,7 @@ Filling fill_loop(const Loop& loop, double longest) {
   Filling filling = fill_smooth(loop);
   // What an outer boundary is does not depend on its length.
   if (filling.verdict != Verdict::outer_boundary && !(length <= longest)) return refused(Verdict::too_long);
-  if (filling.verdict == Verdict::filled || length > std::min(longest, kSmall)) return filling;
+  if (filling.verdict == Verdict::filled || length > std::min(longest, kSmallLoop)) return filling;
   Filling small = fill_small(loop);
   return small.verdict == Verdict::filled ? small : filling;
 }

@@ -8,6 +8,19 @@
 
 namespace lamina::boundary {
 
+/// Normals around a gap lie within 75 degrees of their mean (the cosine): beyond, no plane shows the gap without folds.
+inline constexpr double kLeastNormalCosine = 0.26;
+/// The loop lies this near to one sphere (influence radii R), about as far as the fit itself may err at a boundary.
+inline constexpr double kFarthestFromSphere = 0.4;
+/// Facets fold by less than 100 degrees (one less the cosine), with each other and with those around.
+inline constexpr double kMostFold = 1.17;
+/// Loops no longer than this (R), hardly wider than one sample acts, need no sphere: ends of thin things. Facets there
+/// fold by less than 140 degrees, which still tells a gap from the outer boundary of a flake.
+inline constexpr double kSmallLoop = 5;
+inline constexpr double kMostSmallFold = 1.77;
+/// Another loop so near to a filling (R) takes its place: the two would be one surface twice.
+inline constexpr double kOccupied = 0.5;
+
 enum class Verdict : std::uint8_t {
   filled,
   too_long,        ///< longer than the bound, or of too many edges

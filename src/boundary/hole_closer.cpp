@@ -121,11 +121,6 @@ void HoleCloser::refuse_occupied(std::vector<Filling>& fillings) const {
   }
 }
 
-/// Those of the dragon, whose whiskers leave many, are one in four hundred.
-constexpr std::uint64_t kLeastVerticesPerEdge = 100;
-
-/// An open surface has one long boundary loop at least, unless it is so small that its boundary loop is a good part of
-/// it.
 bool HoleCloser::is_closed_thing(std::uint64_t vertices) const {
   std::uint64_t edges = 0;
   for (const auto& [loop, extent] : loops_) edges += extent.edges;

@@ -12,6 +12,11 @@
 
 namespace lamina::boundary {
 
+/// A mesh is taken for that of a closed thing while its boundary has at most one edge for so many vertices: an open
+/// surface has one long boundary loop at least, unless it is so small that the loop is a good part of it. The dragon's,
+/// whose whiskers leave many loops, has one for four hundred.
+inline constexpr std::uint64_t kLeastVerticesPerEdge = 100;
+
 /// What comes behind a mesh: its triangles name the mesh's vertices, and the new ones behind them.
 struct Addition {
   VertexBatch vertices;

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "boundary/boundary_finder.h"
+#include "boundary/boundary.h"
 #include "chunks/part_file.h"
 #include "reconstruct/mesh_output.h"
 

@@ -3,14 +3,45 @@
 #include <algorithm>
 #include <bit>
 
-#include "clustering/chunks.h"
+#include "clustering/record.h"
 #include "clustering/resolve.h"
-#include "clustering/shape.h"
 
 namespace lamina::clustering {
 namespace {
 
-constexpr std::size_t kLeast = 1 << 13;
+constexpr std::size_t kDirections = 6;
+using Adjacency = std::array<unsigned, kDirections>;
+
+Adjacency unpack(unsigned edges) {
+  Adjacency out{};
+  unsigned bit = 1;
+  for (std::size_t a = 0; a < kDirections; ++a) {
+    for (std::size_t b = a + 1; b < kDirections; ++b, bit <<= 1) {
+      if ((edges & bit) == 0) continue;
+      out[a] |= 1U << b;
+      out[b] |= 1U << a;
+    }
+  }
+  return out;
+}
+
+/// The component of `seed` within `set`.
+unsigned flood(const Adjacency& adjacency, unsigned set, unsigned seed) {
+  unsigned reached = 0, front = seed;
+  while (front != 0) {
+    reached |= front;
+    unsigned next = 0;
+    for (unsigned f = front; f != 0; f &= f - 1) next |= adjacency[static_cast<std::size_t>(std::countr_zero(f))];
+    front = next & set & ~reached;
+  }
+  return reached;
+}
+
+unsigned lowest(unsigned set) {
+  return set & (0U - set);
+}
+
+constexpr std::size_t kLeastClassified = 1 << 13;
 constexpr std::size_t kLeastUnresolved = 64;
 /// Folds a used vertex into its cluster's note.
 void fold(const VertexNote& vertex, CornerNote& corner) {
@@ -65,7 +96,7 @@ void mark_vertices(Window& window, std::int64_t slab) {
       vertex.marks |= VertexNote::kUnresolved;
   };
   for (const std::uint32_t v : below.crossing) mark(below.vertices[v]);
-  for_chunks(here.vertices.size(), chunk_count(here.vertices.size(), kLeast),
+  for_chunks(here.vertices.size(), chunk_count(here.vertices.size(), kLeastClassified),
              [&](std::size_t, std::size_t begin, std::size_t end) {
                for (std::size_t v = begin; v < end; ++v) {
                  if (!here.vertices[v].crossing()) mark(here.vertices[v]);
@@ -111,7 +142,7 @@ void gather_triangles(Window& window, std::int64_t slab) {
   SlabRecord& here = window.at(slab);
   if (here.unresolved.empty()) return;
   const std::span<const IsoTriangle> triangles(here.iso->triangles);
-  const std::size_t chunks = chunk_count(triangles.size(), kLeast);
+  const std::size_t chunks = chunk_count(triangles.size(), kLeastClassified);
   std::vector<std::vector<GatheredTriangle>> entries(chunks + 1);
   gather_range(window, here, slab - 1, window.at(slab - 1).border, entries[0]);
   for_chunks(triangles.size(), chunks, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
@@ -145,6 +176,25 @@ void for_unresolved(SlabRecord& here, const Fn& fn) {
 }
 
 }  // namespace
+
+bool plain_shape(const CornerNote& note) {
+  const unsigned members = note.members, idle = note.idle;
+  const int count = std::popcount(members);
+  if (count + note.inner_triangles != std::popcount(note.edges) + 1) return false;
+  // With V - E + F = 1, up to three members are connected: a second component would need one that holds an open cycle.
+  if (count <= 3 && idle == 0) return true;
+  const Adjacency adjacency = unpack(note.edges);
+  if (flood(adjacency, members, lowest(members)) != members) return false;
+  for (unsigned left = idle != 0 ? members : 0; left != 0; left &= left - 1) {
+    const unsigned rest = members & ~lowest(left);
+    for (unsigned open = rest; open != 0;) {
+      const unsigned component = flood(adjacency, rest, lowest(open));
+      if ((component & ~idle) == 0) return false;
+      open &= ~component;
+    }
+  }
+  return true;
+}
 
 void classify(Window& window, std::int64_t slab) {
   fold_members(window, slab);

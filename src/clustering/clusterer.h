@@ -1,4 +1,5 @@
-// Vertex clustering of the streamed isosurface (METHOD 3.5): none, free, or topology-preserving by a local exact test.
+// Vertex clustering of the streamed isosurface (Cuccuru et al. 2009, section 3.5): none, free, or topology-preserving
+// by a local exact test.
 #pragma once
 #include <array>
 #include <cstdint>

@@ -1,7 +1,7 @@
 #include "clustering/count.h"
 
 #include "base/resize_anew.h"
-#include "clustering/chunks.h"
+#include "clustering/record.h"
 
 namespace lamina::clustering {
 namespace {

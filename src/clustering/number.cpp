@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "base/resize_anew.h"
-#include "clustering/chunks.h"
+#include "clustering/record.h"
 
 namespace lamina::clustering {
 namespace {

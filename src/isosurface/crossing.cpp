@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <atomic>
 
-#include "octree/finer_corner.h"
+#include "octree/window.h"
 
 namespace lamina {
 namespace {
@@ -14,10 +14,6 @@ std::uint64_t beside_split(const Slice& below, const Slice& here) {
     return s.any() ? s.here() | s.at<-1, 0>() | s.at<0, -1>() | s.at<-1, -1>() : 0;
   };
   return four(below) | four(here);
-}
-
-void set_shared(std::uint64_t& word, std::uint64_t bits) {
-  if (bits != 0) std::atomic_ref(word).fetch_or(bits, std::memory_order_relaxed);
 }
 
 void set_layer(std::uint8_t& layers, int z, bool on) {
@@ -51,7 +47,9 @@ void mark_finest(Window& window, int level, Cell corner) {
   CornerBlock* holder = window.probe(level, block_of(corner));
   const int offset = offset_in_block(corner);
   reach_layer(holder, offset >> 6);
-  set_shared(holder->surface.words[offset >> 6], std::uint64_t{1} << (offset & 63));
+  // Several tiles of the level may mark in one block.
+  const std::atomic_ref<std::uint64_t> word(holder->surface.words[offset >> 6]);
+  word.fetch_or(std::uint64_t{1} << (offset & 63), std::memory_order_relaxed);
 }
 
 }  // namespace
@@ -159,7 +157,7 @@ void mark_surface(const TileView& tile, Window& window) {
     if (tile.level > 0) {
       shared = ends & beside_split(Slice(tile, &CornerBlock::split, z - 1), Slice(tile, &CornerBlock::split, z));
     }
-    set_shared(leaf.surface.words[z], ends & ~shared);
+    leaf.surface.words[z] |= ends & ~shared;
     for_bits(shared, [&](int bit) { mark_finest(window, tile.level, tile.cell(z * 64 + bit)); });
   }
 }

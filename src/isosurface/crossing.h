@@ -1,7 +1,7 @@
 // Minimal edges with a sign change and the corners at their ends, as masks: the first half of numbering.
 #pragma once
 #include "isosurface/tile_view.h"
-#include "octree/block_cache.h"
+#include "octree/window.h"
 
 namespace lamina {
 
@@ -15,7 +15,8 @@ void add_finer_busy(const TileView& tile, const Window& window);
 
 /// Sets `surface` for the corners of the tile's layers that end an accepted edge, edges from the layer below included.
 /// A corner that several levels hold is marked in the finest only, possibly in another tile: all tiles of the slab must
-/// have been through find_crossing(), and several may be marked at once.
+/// have been through find_crossing(), and the tiles of finer levels be marked; several of a level may be marked at
+/// once.
 void mark_surface(const TileView& tile, Window& window);
 
 /// A corner's place in the table of its slab.

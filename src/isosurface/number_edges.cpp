@@ -1,3 +1,5 @@
+#include "isosurface/number_edges.h"
+
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -6,8 +8,7 @@
 
 #include "base/resize_anew.h"
 #include "isosurface/crossing.h"
-#include "isosurface/extract.h"
-#include "mls/corner_value.h"
+#include "mls/extension.h"
 
 namespace lamina {
 namespace {
@@ -20,6 +21,18 @@ void for_views(const Window& window, const std::vector<TileView>& views, const B
                       BlockCache cache(window);
                       for (std::size_t i = range.begin(); i < range.end(); ++i) body(views[i], cache);
                     });
+}
+
+/// The same level by level, finest first.
+template <typename Body>
+void for_levels(const std::vector<TileView>& views, const Body& body) {
+  for (std::size_t first = 0, end = 0; first < views.size(); first = end) {
+    while (end < views.size() && views[end].level == views[first].level) ++end;
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(first, end, 16),
+                      [&](const tbb::blocked_range<std::size_t>& range) {
+                        for (std::size_t i = range.begin(); i < range.end(); ++i) body(views[i]);
+                      });
+  }
 }
 
 /// The tiles in which accepted edges begin or end.
@@ -50,18 +63,17 @@ void assign_numbers(const Window& window, const std::vector<TileView>& views, Is
   for (std::vector<float>& a : out.corner_attributes) resize_anew(a, corners);
 }
 
-/// beyond a boundary, and around things thinner than a cell, neighbours' planes lead far away from all samples: the
+/// Beyond a boundary, and around things thinner than a cell, neighbours' planes lead far away from all samples: the
 /// projected point of a corner that is not trusted stays near the average of its own samples, where its record leads
 /// (at `cell`).
 void clamp_to_samples(const float* record, float cell, std::array<float, 3>& offset) {
-  constexpr float kLongest = 0.3F;  // cells
   std::array<float, 3> away{};
   float d2 = 0;
   for (int i = 0; i < 3; ++i) {
     away[i] = offset[i] + record[kDistance] * record[kNormalX + i];
     d2 += away[i] * away[i];
   }
-  const float longest = kLongest * cell;
+  const float longest = kFarthestFromSamples * cell;
   if (d2 <= longest * longest) return;
   const float back = 1.0F - longest / std::sqrt(d2);
   for (int i = 0; i < 3; ++i) offset[i] -= back * away[i];
@@ -80,56 +92,43 @@ void fill_corners(const Window& window, const TileView& tile, IsoSlab& out) {
     if (z % slab_layers == 0) rank = 0;
     const std::uint64_t active = leaf.active.words[z];
     const std::uint64_t trusted = active & leaf.trusted.words[z];
-    const std::uint64_t seen = leaf.seen.words[z];
+    const std::uint64_t doubtful = active & leaf.seen.words[z] & ~trusted;
     const CornerValues& values = leaf.values[z / slab_layers];
     std::uint32_t id = leaf.numbers[z].corner_base;
     for_bits(leaf.surface.words[z], [&](int bit) {
       const Cell cell = tile.cell(z * 64 + bit);
       const std::uint64_t one = std::uint64_t{1} << bit;
+      const auto record = [&] {
+        return values.of(rank + static_cast<std::uint32_t>(std::popcount(active & (one - 1))));
+      };
       SurfaceCorner c;
       c.position = window.lattice().position(tile.level, cell);
       c.cell = size;
       CornerValue value;
-      bool defined = true;
       if ((trusted & one) != 0) {
-        const float* v = values.of(rank + static_cast<std::uint32_t>(std::popcount(active & (one - 1))));
+        const float* const v = record();
         value = {v[kDistance], {v[kNormalX], v[kNormalY], v[kNormalZ]}, v[kCurvature], v[kOffsetFromMean]};
         for (int a = 0; a < attributes; ++a) extra[a] = v[kFirstAttribute + a];
+        c.offset_from_mean = value.offset_from_mean;
       } else {
-        defined = corner_value(window, tile.level, cell, value, extra.data());
+        corner_value(window, tile.level, cell, value, extra.data());  // there is one: both ends of the edge are defined
       }
-      if (defined) {
-        for (int i = 0; i < 3; ++i) c.offset[i] = -value.distance * value.normal[i];
-        if ((trusted & one) == 0 && (active & seen & one) != 0) {
-          clamp_to_samples(values.of(rank + static_cast<std::uint32_t>(std::popcount(active & (one - 1)))), size,
-                           c.offset);
-        }
-        c.normal = value.normal;
-        c.distance = value.distance;
-        c.curvature = value.curvature;
-        c.offset_from_mean = (trusted & one) != 0 ? value.offset_from_mean : -1.0F;
-      }
-      for (int a = 0; a < attributes; ++a) out.corner_attributes[a][id] = defined ? extra[a] : 0.0F;
+      for (int i = 0; i < 3; ++i) c.offset[i] = -value.distance * value.normal[i];
+      if ((doubtful & one) != 0) clamp_to_samples(record(), size, c.offset);
+      c.normal = value.normal;
+      c.distance = value.distance;
+      c.curvature = value.curvature;
+      for (int a = 0; a < attributes; ++a) out.corner_attributes[a][id] = extra[a];
       out.corners[id++] = c;
     });
     rank += static_cast<std::uint32_t>(std::popcount(active));
   }
 }
 
-/// Where the surface meets an edge. Signs are settled; distances that contradict them (or are missing) only say that
-/// it is somewhere between.
-float edge_fraction(const SurfaceCorner& low, const SurfaceCorner& high, bool low_outside) {
-  constexpr std::array<float, 3> kNone{};
-  constexpr float kMargin = 0.01F;  // isovertices stay distinct points
-  const auto unknown = [&](const SurfaceCorner& c) { return c.distance == 0 && c.normal == kNone; };
-  if (unknown(low) || unknown(high)) return 0.5F;
-  if ((low.distance >= 0) != low_outside || (high.distance >= 0) == low_outside) return 0.5F;
-  return std::clamp(low.distance / (low.distance - high.distance), kMargin, 1.0F - kMargin);
-}
-
-/// Completes a vertex whose ends are both known.
-void place(IsoVertex& v, const SurfaceCorner& low, const SurfaceCorner& high, bool low_outside) {
-  v.t = edge_fraction(low, high, low_outside);
+/// Completes a vertex whose ends are both known: the surface meets the edge where the distances, whose signs differ,
+/// pass through zero.
+void place(IsoVertex& v, const SurfaceCorner& low, const SurfaceCorner& high) {
+  v.t = std::clamp(low.distance / (low.distance - high.distance), kEdgeMargin, 1.0F - kEdgeMargin);
   v.near_high = v.t > 0.5F;
 }
 
@@ -163,7 +162,7 @@ class Numbering {
       IsoVertex& v = previous.vertices[id++];
       const std::uint32_t high = corner_number(tile, &tile.leaf(), tile.begin * 64 + bit, {0, 0, 0});
       v.high.bits = high | SlabIndex::kNextSlab;
-      place(v, previous.corners[v.low.index()], slab_.corners[high], below->outside.test(z * 64 + bit));
+      place(v, previous.corners[v.low.index()], slab_.corners[high]);
     });
   }
 
@@ -198,7 +197,7 @@ class Numbering {
         const bool leaves = (offset & kLast) == kLast;
         v.high.bits = leaves ? corner_number(tile, next, offset - kLast, kBeyond)
                              : corner_number(tile, &leaf, offset + kStep, {0, 0, 0});
-        place(v, slab_.corners[v.low.index()], slab_.corners[v.high.index()], leaf.outside.test(offset));
+        place(v, slab_.corners[v.low.index()], slab_.corners[v.high.index()]);
       }
       slab_.vertices[id++] = v;
     });
@@ -216,12 +215,10 @@ void number_edges(Window& window, std::int32_t slab, IsoSlab* previous, IsoSlab&
   out.triangles.clear();
   const std::vector<TileView> views = slab_tiles(window, slab);
   for_views(window, views, [](const TileView& tile, BlockCache&) { find_crossing(tile); });
-  for (std::size_t first = 0, end = 0; first < views.size(); first = end) {  // level by level, finest first
-    while (end < views.size() && views[end].level == views[first].level) ++end;
-    if (views[first].level == 0) continue;
-    tbb::parallel_for(first, end, [&](std::size_t i) { add_finer_busy(views[i], window); });
-  }
-  for_views(window, at_surface(views), [&](const TileView& tile, BlockCache&) { mark_surface(tile, window); });
+  for_levels(views, [&](const TileView& tile) {
+    if (tile.level > 0) add_finer_busy(tile, window);
+  });
+  for_levels(at_surface(views), [&](const TileView& tile) { mark_surface(tile, window); });
   // Again: a corner that a finer level holds may have been marked in a tile without edges.
   const std::vector<TileView> surface = at_surface(views);
   assign_numbers(window, surface, out);

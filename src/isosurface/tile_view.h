@@ -27,7 +27,16 @@ struct TileView {
 };
 
 /// All levels' tiles of a slab in canonical order: level, then z, y, x.
-std::vector<TileView> slab_tiles(const Window& window, std::int32_t slab);
+inline std::vector<TileView> slab_tiles(const Window& window, std::int32_t slab) {
+  std::vector<TileView> views;
+  for (int level = 0; level < window.levels(); ++level) {
+    for (const Tile& t : window.tiles(level, slab)) {
+      const LeafLayers layers = leaf_layers(window, level, slab, t.block);
+      views.push_back({t.leaf, level, t.block, layers.begin, layers.end});
+    }
+  }
+  return views;
+}
 
 /// Layer z in [-1, 8] of a mask over the tile and its eight neighbours across the sweep axis.
 struct Slice {

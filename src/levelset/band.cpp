@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "lattice/bits.h"
-#include "mls/corner_value.h"
-#include "octree/block_cache.h"
+#include "mls/extension.h"
+#include "octree/window.h"
 
 namespace lamina::volume {
 namespace {
@@ -129,7 +129,7 @@ void Band::collect_finer(const Window& window, std::int32_t slab, int level) {
         const Cell corner{t.block.x * 8 + (bit & 7), t.block.y * 8 + (bit >> 3), t.block.z * 8 + z};
         if (((corner.x | corner.y) & mask) != 0) continue;
         CornerValue v;
-        if (!corner_value(window, level, corner, v, attributes.data())) continue;
+        if (!corner_value(window, level, corner, v, attributes.data()) || !v.has_normal()) continue;
         Found f{{corner.x >> shift, corner.y >> shift, corner.z >> shift}, v.distance * per_voxel, v.normal, {}};
         if (!(std::abs(f.distance) < limit)) continue;
         for (const int c : settings_.channels) f.extra.push_back(channel_of(v, attributes, c));
@@ -170,7 +170,7 @@ void Band::collect_coarser(const Window& window, std::int32_t slab, int level) {
         float nearest = farthest;
         for (int k = 0; k < 8; ++k) {
           const Cell corner = cell + Cell{k & 1, k >> 1 & 1, k >> 2};
-          has[k] = corner_value(window, level, corner, corners[k], attributes.data());
+          has[k] = corner_value(window, level, corner, corners[k], attributes.data()) && corners[k].has_normal();
           if (!has[k]) continue;
           nearest = std::min(nearest, std::abs(corners[k].distance) * per_voxel);
           if (nearest >= farthest) break;

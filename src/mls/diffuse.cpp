@@ -6,9 +6,10 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <vector>
 
-#include "mls/shared_corners.h"
-#include "octree/block_cache.h"
+#include "mls/tile_values.h"
+#include "octree/window.h"
 
 namespace lamina {
 namespace {
@@ -45,75 +46,92 @@ Leaf leaf_in_octant(BlockCache& cache, int level, const Cell& corner, int octant
   return {};
 }
 
-/// One mean of centres' values at a corner.
-struct Mean {
-  float weight = 0;
-  float distance = 0, curvature = 0, offset_from_mean = 0;
-  std::array<float, 3> normal{};
+/// Means of the values of the centres around corners, one after the other; one thread's.
+class CentresMean {
+ public:
+  enum class Found { nothing, seen, trusted };
+
+  explicit CentresMean(const Window& window) : window_(window), cache_(window) {}
+
+  /// Writes the record of a corner: the mean of the trusted centres, or of all where none is trusted.
+  Found write(int level, const Cell& corner, float* record) {
+    const bool trusted = list_centres(level, corner);
+    const auto at = window_.lattice().position(level, corner);
+    sum_ = {};
+    attributes_.assign(static_cast<std::size_t>(window_.attributes()), 0.0F);
+    for (int k = 0; k < count_; ++k) {
+      if (!trusted || centres_[k]->trusted.test(offset_in_block(leaves_[k].cell))) add(leaves_[k], *centres_[k], at);
+    }
+    const std::array<float, 3>& n = sum_.normal;
+    const float length = std::sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+    if (sum_.weight <= 0 || !(length > kCancelledShare * sum_.weight)) return Found::nothing;
+    const float inv = 1.0F / sum_.weight;
+    record[kDistance] = sum_.distance * inv;
+    for (int k = 0; k < 3; ++k) record[kNormalX + k] = n[k] / length;
+    record[kCurvature] = sum_.curvature * inv;
+    record[kOffsetFromMean] = sum_.offset_from_mean * inv;
+    for (std::size_t c = 0; c < attributes_.size(); ++c) record[kFirstAttribute + c] = attributes_[c] * inv;
+    return trusted ? Found::trusted : Found::seen;
+  }
+  [[nodiscard]] bool is_outside() const { return sum_.distance >= 0; }  ///< the last corner
+
+ private:
+  /// Normals whose mean is shorter than this cancel.
+  static constexpr float kCancelledShare = 1e-6F;
+
+  struct Sum {
+    float weight = 0;
+    float distance = 0, curvature = 0, offset_from_mean = 0;
+    std::array<float, 3> normal{};
+  };
+
+  /// The seen centres of the leaf cells around a corner, each once; true where one of them is trusted.
+  bool list_centres(int level, const Cell& corner) {
+    count_ = 0;
+    bool trusted = false;
+    for (int octant = 0; octant < 8; ++octant) {
+      const Leaf l = leaf_in_octant(cache_, level, corner, octant);
+      const auto end = leaves_.begin() + count_;
+      if (l.level < 0 || std::find(leaves_.begin(), end, l) != end) continue;
+      const CornerBlock* const block = cache_.block(l.level, l.cell);
+      const int offset = offset_in_block(l.cell);
+      if (block->centres == nullptr || !block->centres->seen.test(offset)) continue;
+      trusted = trusted || block->centres->trusted.test(offset);
+      centres_[count_] = block->centres.get();
+      leaves_[count_++] = l;
+    }
+    return trusted;
+  }
+
+  /// Adds a centre's surface as it is seen from the corner: the second-order distance of the osculating sphere.
+  void add(const Leaf& leaf, const Projected& from, const std::array<std::int32_t, 3>& corner_at) {
+    const int offset = offset_in_block(leaf.cell);
+    const CornerValues& values = from.values[window_.slab_in_leaf(leaf.level, offset >> 6)];
+    const float* const v = values.of(from.value_index(offset, window_.slab_layers(leaf.level)));
+    const auto cell = static_cast<float>(window_.lattice().cell_size(leaf.level));
+    const auto cell_at = window_.lattice().position(leaf.level, leaf.cell);
+    std::array<float, 3> o{};
+    for (int k = 0; k < 3; ++k) o[k] = static_cast<float>(corner_at[k] - cell_at[k]) - 0.5F * cell;
+    const std::array<float, 3> n{v[kNormalX], v[kNormalY], v[kNormalZ]};
+    const float along = n[0] * o[0] + n[1] * o[1] + n[2] * o[2];
+    const float across = o[0] * o[0] + o[1] * o[1] + o[2] * o[2] - along * along;
+    const float w = 1.0F / cell;
+    sum_.weight += w;
+    sum_.distance += w * (v[kDistance] + along + 0.5F * v[kCurvature] * across);
+    sum_.curvature += w * v[kCurvature];
+    sum_.offset_from_mean += w * v[kOffsetFromMean];
+    for (int k = 0; k < 3; ++k) sum_.normal[k] += w * n[k];
+    for (std::size_t c = 0; c < attributes_.size(); ++c) attributes_[c] += w * v[kFirstAttribute + c];
+  }
+
+  const Window& window_;
+  BlockCache cache_;
+  std::array<Leaf, 8> leaves_{};
+  std::array<const Projected*, 8> centres_{};
+  int count_ = 0;
+  Sum sum_;
+  std::vector<float> attributes_;
 };
-
-/// Adds a centre's surface as it is seen from the corner: the second-order distance of the osculating sphere.
-void add(const Window& window, const Leaf& leaf, const float* v, int corner_level, const Cell& corner, Mean& mean,
-         float* attributes) {
-  const auto cell = static_cast<float>(window.lattice().cell_size(leaf.level));
-  const auto corner_at = window.lattice().position(corner_level, corner);
-  const auto cell_at = window.lattice().position(leaf.level, leaf.cell);
-  std::array<float, 3> o{};
-  for (int k = 0; k < 3; ++k) o[k] = static_cast<float>(corner_at[k] - cell_at[k]) - 0.5F * cell;
-  const std::array<float, 3> n{v[kNormalX], v[kNormalY], v[kNormalZ]};
-  const float along = n[0] * o[0] + n[1] * o[1] + n[2] * o[2];
-  const float across = o[0] * o[0] + o[1] * o[1] + o[2] * o[2] - along * along;
-  const float w = 1.0F / cell;
-  mean.weight += w;
-  mean.distance += w * (v[kDistance] + along + 0.5F * v[kCurvature] * across);
-  mean.curvature += w * v[kCurvature];
-  mean.offset_from_mean += w * v[kOffsetFromMean];
-  for (int k = 0; k < 3; ++k) mean.normal[k] += w * n[k];
-  for (int c = 0; c < window.attributes(); ++c) attributes[c] += w * v[kFirstAttribute + c];
-}
-
-void diffuse_corner(BlockCache& cache, int level, const Cell& corner, CornerBlock& leaf, int offset, CornerValues& out,
-                    std::uint32_t at, std::vector<float>& attributes) {
-  const Window& window = cache.window();
-  std::array<Leaf, 8> leaves{};
-  std::array<const Projected*, 8> centres{};
-  int count = 0;
-  bool trusted = false;
-  for (int octant = 0; octant < 8; ++octant) {
-    const Leaf l = leaf_in_octant(cache, level, corner, octant);
-    if (l.level < 0 || std::find(leaves.begin(), leaves.begin() + count, l) != leaves.begin() + count) continue;
-    const CornerBlock* block = cache.block(l.level, l.cell);
-    if (block->centres == nullptr || !block->centres->seen.test(offset_in_block(l.cell))) continue;
-    trusted = trusted || block->centres->trusted.test(offset_in_block(l.cell));
-    centres[count] = block->centres.get();
-    leaves[count++] = l;
-  }
-  Mean mean;
-  attributes.assign(static_cast<std::size_t>(window.attributes()), 0.0F);
-  for (int k = 0; k < count; ++k) {
-    const Projected& from = *centres[k];
-    const int o = offset_in_block(leaves[k].cell);
-    if (trusted && !from.trusted.test(o)) continue;
-    const CornerValues& values = from.values[window.slab_in_leaf(leaves[k].level, o >> 6)];
-    add(window, leaves[k], values.of(from.value_index(o, window.slab_layers(leaves[k].level))), level, corner, mean,
-        attributes.data());
-  }
-  const float length =
-      std::sqrt(mean.normal[0] * mean.normal[0] + mean.normal[1] * mean.normal[1] + mean.normal[2] * mean.normal[2]);
-  if (mean.weight <= 0 || !(length > 1e-6F * mean.weight)) return;
-  const float inv = 1.0F / mean.weight;
-  float* const v = out.of(at);
-  v[kDistance] = mean.distance * inv;
-  v[kNormalX] = mean.normal[0] / length;
-  v[kNormalY] = mean.normal[1] / length;
-  v[kNormalZ] = mean.normal[2] / length;
-  v[kCurvature] = mean.curvature * inv;
-  v[kOffsetFromMean] = mean.offset_from_mean * inv;
-  for (int c = 0; c < window.attributes(); ++c) v[kFirstAttribute + c] = attributes[static_cast<std::size_t>(c)] * inv;
-  leaf.seen.set(offset);
-  leaf.outside.assign(offset, mean.distance >= 0);
-  if (trusted) leaf.trusted.set(offset);
-}
 
 }  // namespace
 
@@ -122,23 +140,26 @@ void diffuse_slab(Window& window, std::int32_t slab) {
     const Tiles tiles = window.tiles(level, slab);
     tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
       const Tile& t = tiles[i];
-      const std::int32_t first = window.lattice().first_layer(level, slab) - t.block.z * 8;
-      const int begin = std::max(first, 0);
-      const int end = std::min(8, first + window.lattice().layers(level));
-      if (!allocate_values(window, level, *t.leaf, begin, end)) return;
+      const LeafLayers layers = leaf_layers(window, level, slab, t.block);
+      const auto [begin, end] = layers;
+      if (!allocate_values(window, level, *t.leaf, layers)) return;
       CornerValues& values = t.leaf->values[window.slab_in_leaf(level, begin)];
-      BlockCache cache(window);
-      std::vector<float> attributes;
+      CentresMean mean(window);
       std::uint32_t at = 0;
       for (int z = begin; z < end; ++z) {
         for (std::uint64_t w = t.leaf->active.words[z]; w != 0; w &= w - 1, ++at) {
           const int bit = std::countr_zero(w);
           if (((t.leaf->shared.words[z] >> bit) & 1U) != 0) continue;
           const Cell corner{t.block.x * 8 + (bit & 7), t.block.y * 8 + (bit >> 3), t.block.z * 8 + z};
-          diffuse_corner(cache, level, corner, *t.leaf, z * 64 + bit, values, at, attributes);
+          const CentresMean::Found found = mean.write(level, corner, values.of(at));
+          if (found == CentresMean::Found::nothing) continue;
+          const int offset = z * 64 + bit;
+          t.leaf->seen.set(offset);
+          t.leaf->outside.assign(offset, mean.is_outside());
+          if (found == CentresMean::Found::trusted) t.leaf->trusted.set(offset);
         }
       }
-      copy_shared(window, level, t, begin, end);
+      copy_shared(window, level, t, layers);
     });
   }
 }

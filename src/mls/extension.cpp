@@ -5,159 +5,225 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <cmath>
 
 #include "lattice/bits.h"
-#include "mls/shared_corners.h"
 
 namespace lamina {
 namespace {
-
-void gather_block(const Window& window, int level, const CornerBlock& from, int dx, int dy, int z, int to_z,
-                  CornerField& f) {
-  const int layers = window.slab_layers(level);
-  std::uint64_t w = from.trusted.words[z];
-  if (w == 0) return;
-  if (dx < 0) w &= 0x8080808080808080ULL;
-  if (dx > 0) w &= 0x0101010101010101ULL;
-  if (dy < 0) w &= 0xFF00000000000000ULL;
-  if (dy > 0) w &= 0x00000000000000FFULL;
-  if (w == 0) return;
-  const CornerValues& values = from.values[window.slab_in_leaf(level, z)];
-  if (values.count == 0) return;
-  const std::uint32_t base = from.value_index(z * 64, layers);
-  const std::uint64_t active = from.active.words[z];
-  for (; w != 0; w &= w - 1) {
-    const int bit = std::countr_zero(w);
-    const std::uint32_t i = base + static_cast<std::uint32_t>(std::popcount(active & ((std::uint64_t{1} << bit) - 1)));
-    const float* const v = values.of(i);
-    const int row = (bit >> 3) + dy * 8 + 1;
-    const int at = (to_z + 1) * CornerField::kPlane + row * CornerField::kRow + (bit & 7) + dx * 8 + 1;
-    f.distance[at] = v[kDistance];
-    f.nx[at] = v[kNormalX];
-    f.ny[at] = v[kNormalY];
-    f.nz[at] = v[kNormalZ];
-    f.trusted[at] = 1.0F;
-    f.any[(to_z + 1) * CornerField::kRows + row] = 1;
-  }
-}
-
-/// The trusted corners of a block and of its 26 neighbours.
-bits::Neighbourhood trusted_around(const std::array<CornerBlock*, 27>& around) {
-  bits::Neighbourhood n{};
-  for (int i = 0; i < 27; ++i) n[i / 9][i / 3 % 3][i % 3] = around[i] == nullptr ? nullptr : &around[i]->trusted;
-  return n;
-}
-
-void gather_field(const Window& window, int level, const std::array<CornerBlock*, 27>& around, int begin, int end,
-                  CornerField& f) {
-  for (auto* a : {&f.distance, &f.nx, &f.ny, &f.nz, &f.trusted}) {
-    std::fill(a->begin() + begin * CornerField::kPlane, a->begin() + (end + 2) * CornerField::kPlane, 0.0F);
-  }
-  std::fill(f.any.begin() + begin * CornerField::kRows, f.any.begin() + (end + 2) * CornerField::kRows, 0);
-  for (int dz = -1; dz <= 1; ++dz) {
-    const int from = std::max(begin - 1, dz * 8);
-    const int to = std::min(end + 1, dz * 8 + 8);
-    if (from >= to) continue;
-    for (int dy = -1; dy <= 1; ++dy) {
-      for (int dx = -1; dx <= 1; ++dx) {
-        const CornerBlock* block = around[13 + dx + 3 * dy + 9 * dz];
-        if (block == nullptr) continue;
-        for (int z = from; z < to; ++z) gather_block(window, level, *block, dx, dy, z - dz * 8, z, f);
-      }
-    }
-  }
-}
 
 /// Bits of a layer's corners: their signs, and whether anything speaks for them.
 struct Signs {
   std::uint64_t outside = 0, defined = 0, supported = 0;
 };
 
-/// A corner's own projected point is better than none when it lies no farther from the average of its samples than
-/// this (support radii).
-constexpr float kOwnReach = 0.7F;
-
-/// A corner with trusted neighbours on all sides lies over a small gap between samples, not beyond a boundary: their
-/// mean is this near to it (squared, in cells; that of half of the neighbours in a plane is 0.4 away, of one side's 1).
-constexpr float kSurrounded = 0.3F * 0.3F;
-
-/// Corners of the layer whose own projected point lies beyond the limit.
-std::uint64_t beyond(const Window& window, int level, const CornerBlock& leaf, int z, float boundary) {
-  std::uint64_t out = 0;
-  if (leaf.seen.words[z] == 0) return 0;
-  const CornerValues& values = leaf.values[window.slab_in_leaf(level, z)];
-  std::uint32_t i = leaf.value_index(z * 64, window.slab_layers(level));
-  for (std::uint64_t w = leaf.active.words[z]; w != 0; w &= w - 1, ++i) {
-    if (values.channel(kOffsetFromMean)[i] > boundary) out |= w & (~w + 1);
-  }
-  return out & leaf.seen.words[z];
+TangentPlane<float> plane_of(const float* record) {
+  return {record[kDistance], record[kNormalX], record[kNormalY], record[kNormalZ]};
 }
 
-/// Of the layer's corners that a finer level holds.
-Signs finer_signs(const Window& window, int level, const Tile& t, int z) {
-  Signs out;
-  for (std::uint64_t w = t.leaf->shared.words[z]; w != 0; w &= w - 1) {
-    const FinerCorner from = finer_corner(window, level, t, z, std::countr_zero(w));
-    const std::uint64_t one = w & (~w + 1);
-    if (from.block->outside.test(from.offset)) out.outside |= one;
-    if (from.block->defined.test(from.offset)) out.defined |= one;
-    if (from.block->supported.test(from.offset)) out.supported |= one;
-  }
-  return out;
-}
+/// One tile after the other; one thread's.
+class TileExtender {
+ public:
+  TileExtender(const Window& window, const Kernel& kernel, float boundary, CornerField& scratch)
+      : window_(window), kernel_(kernel), boundary_(boundary), field_(scratch) {}
 
-/// Of the layer's corners in `wanted`, by the planes of their trusted neighbours.
-Signs extended_signs(const Kernel& kernel, const CornerField& field, int z, float cell, std::uint64_t wanted) {
-  Signs out;
-  for (int y = 0; y < 8; ++y) {
-    if (((wanted >> (8 * y)) & 0xFFU) == 0) continue;
-    const Extension e = kernel.extend(field, y, z, cell, kSurrounded);
-    out.outside |= std::uint64_t{e.outside} << (8 * y);
-    out.defined |= std::uint64_t{e.defined} << (8 * y);
-    out.supported |= std::uint64_t{e.surrounded} << (8 * y);
+  void extend(int level, const Tile& t, LeafLayers layers) {
+    level_ = level;
+    leaf_ = t.leaf;
+    layers_ = layers;
+    gathered_ = false;
+    std::array<std::uint64_t, 8> spread{};  // corners beside trusted ones
+    bits::dilate_layers<-1, 1>(trusted_around(), layers.begin, layers.end, &spread[layers.begin]);
+    for (int z = layers.begin; z < layers.end; ++z) {
+      const std::uint64_t corners = leaf_->corners.words[z];
+      if (corners == 0) continue;
+      const Signs signs = signs_of_layer(t, z, spread[z]);
+      leaf_->outside.words[z] = signs.outside & corners;
+      leaf_->defined.words[z] = signs.defined & corners;
+      leaf_->supported.words[z] = signs.supported & corners;
+    }
   }
-  return {out.outside & wanted, out.defined & wanted, out.supported & wanted};
-}
 
-void extend_tile(const Window& window, int level, const Tile& t, int begin, int end, const Kernel& kernel,
-                 float boundary, CornerField& field) {
-  const auto cell = static_cast<float>(window.lattice().cell_size(level));
-  const std::array<CornerBlock*, 27>& around = t.leaf->around;
-  std::array<std::uint64_t, 8> spread{};  // corners beside trusted ones
-  bits::dilate_layers<-1, 1>(trusted_around(around), begin, end, &spread[begin]);
-  bool gathered = false;
-  for (int z = begin; z < end; ++z) {
-    const std::uint64_t corners = t.leaf->corners.words[z];
-    if (corners == 0) continue;
-    const std::uint64_t shared = t.leaf->shared.words[z];
-    const std::uint64_t trusted = t.leaf->trusted.words[z];
-    const std::uint64_t own = t.leaf->outside.words[z];  // as projection left them
+ private:
+  Signs signs_of_layer(const Tile& t, int z, std::uint64_t beside_trusted) {
+    const std::uint64_t shared = leaf_->shared.words[z];
+    const std::uint64_t trusted = leaf_->trusted.words[z];
+    const std::uint64_t own = leaf_->outside.words[z];  // as projection left them
     Signs signs;
-    if (shared != 0) signs = finer_signs(window, level, t, z);
+    if (shared != 0) signs = finer_signs(t, z);
     signs.outside |= own & trusted & ~shared;
     signs.defined |= trusted & ~shared;
-    signs.supported |= t.leaf->seen.words[z] & ~shared;
-    if (const std::uint64_t wanted = corners & ~shared & ~trusted; wanted != 0) {
+    signs.supported |= leaf_->seen.words[z] & ~shared;
+    if (const std::uint64_t wanted = leaf_->corners.words[z] & ~shared & ~trusted; wanted != 0) {
       Signs extended;
-      if (const std::uint64_t beside = wanted & spread[z]; beside != 0) {
-        if (!gathered) gather_field(window, level, around, begin, end, field);
-        gathered = true;
-        extended = extended_signs(kernel, field, z, cell, beside);
-      }
+      if (const std::uint64_t beside = wanted & beside_trusted; beside != 0) extended = extended_signs(z, beside);
       // Nobody to extend from.
       const std::uint64_t lone = wanted & ~extended.defined;
-      std::uint64_t alone = lone & t.leaf->seen.words[z];
-      if (alone != 0) alone &= ~beyond(window, level, *t.leaf, z, kOwnReach);
-      signs.outside |= (extended.outside & extended.defined) | (lone & ~alone);
-      signs.outside |= own & alone;
+      std::uint64_t alone = lone & leaf_->seen.words[z];
+      if (alone != 0) alone &= ~beyond(z, kOwnOffset);
+      signs.outside |= (extended.outside & extended.defined) | (lone & ~alone) | (own & alone);
       signs.defined |= extended.defined | alone;
       signs.supported |= extended.supported;
     }
-    if (boundary > 0) signs.defined &= ~(beyond(window, level, *t.leaf, z, boundary) & ~shared);
-    t.leaf->outside.words[z] = signs.outside & corners;
-    t.leaf->defined.words[z] = signs.defined & corners;
-    t.leaf->supported.words[z] = signs.supported & corners;
+    if (boundary_ > 0) signs.defined &= ~(beyond(z, boundary_) & ~shared);
+    return signs;
   }
+
+  /// Of the layer's corners that a finer level holds.
+  [[nodiscard]] Signs finer_signs(const Tile& t, int z) const {
+    Signs out;
+    for (std::uint64_t w = leaf_->shared.words[z]; w != 0; w &= w - 1) {
+      const FinerCorner from = finer_corner(window_, level_, t, z, std::countr_zero(w));
+      const std::uint64_t one = w & (~w + 1);
+      if (from.block->outside.test(from.offset)) out.outside |= one;
+      if (from.block->defined.test(from.offset)) out.defined |= one;
+      if (from.block->supported.test(from.offset)) out.supported |= one;
+    }
+    return out;
+  }
+
+  /// Of the layer's corners in `wanted`, by the planes of their trusted neighbours.
+  Signs extended_signs(int z, std::uint64_t wanted) {
+    if (!gathered_) gather_field();
+    gathered_ = true;
+    const auto cell = static_cast<float>(window_.lattice().cell_size(level_));
+    Signs out;
+    for (int y = 0; y < 8; ++y) {
+      if (((wanted >> (8 * y)) & 0xFFU) == 0) continue;
+      const Extension e = kernel_.extend(field_, y, z, cell, kSurrounded * kSurrounded);
+      out.outside |= std::uint64_t{e.outside} << (8 * y);
+      out.defined |= std::uint64_t{e.defined} << (8 * y);
+      out.supported |= std::uint64_t{e.surrounded} << (8 * y);
+    }
+    return {out.outside & wanted, out.defined & wanted, out.supported & wanted};
+  }
+
+  /// Corners of the layer whose own projected point lies beyond the limit.
+  [[nodiscard]] std::uint64_t beyond(int z, float limit) const {
+    if (leaf_->seen.words[z] == 0) return 0;
+    std::uint64_t out = 0;
+    const CornerValues& values = leaf_->values[window_.slab_in_leaf(level_, z)];
+    std::uint32_t i = leaf_->value_index(z * 64, window_.slab_layers(level_));
+    for (std::uint64_t w = leaf_->active.words[z]; w != 0; w &= w - 1, ++i) {
+      if (values.channel(kOffsetFromMean)[i] > limit) out |= w & (~w + 1);
+    }
+    return out & leaf_->seen.words[z];
+  }
+
+  /// The trusted corners of the block and of its 26 neighbours.
+  [[nodiscard]] bits::Neighbourhood trusted_around() const {
+    bits::Neighbourhood n{};
+    for (int i = 0; i < 27; ++i) {
+      const CornerBlock* const block = leaf_->around[i];
+      n[i / 9][i / 3 % 3][i % 3] = block == nullptr ? nullptr : &block->trusted;
+    }
+    return n;
+  }
+
+  void gather_field() {
+    field_.clear(layers_.begin, layers_.end);
+    for (int z = layers_.begin - 1; z <= layers_.end; ++z) {
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -1; dx <= 1; ++dx) gather_layer(dx, dy, z);
+      }
+    }
+  }
+
+  /// Layer z, in [-1, 8], of the block's neighbour at (dx, dy) across the sweep axis.
+  void gather_layer(int dx, int dy, int z) {
+    const CornerBlock* const from = leaf_->around[CornerBlock::towards(dx, dy, z >> 3)];
+    if (from == nullptr) return;
+    const int layer = z & 7;
+    std::uint64_t w = from->trusted.words[layer];
+    if (dx < 0) w &= 0x8080808080808080ULL;
+    if (dx > 0) w &= 0x0101010101010101ULL;
+    if (dy < 0) w &= 0xFF00000000000000ULL;
+    if (dy > 0) w &= 0x00000000000000FFULL;
+    if (w == 0) return;
+    const CornerValues& values = from->values[window_.slab_in_leaf(level_, layer)];
+    if (values.count == 0) return;
+    const std::uint32_t base = from->value_index(layer * 64, window_.slab_layers(level_));
+    const std::uint64_t active = from->active.words[layer];
+    for (; w != 0; w &= w - 1) {
+      const int bit = std::countr_zero(w);
+      const std::uint64_t before = active & ((std::uint64_t{1} << bit) - 1);
+      field_.put(dx * 8 + (bit & 7), dy * 8 + (bit >> 3), z,
+                 plane_of(values.of(base + static_cast<std::uint32_t>(std::popcount(before)))));
+    }
+  }
+
+  const Window& window_;
+  const Kernel& kernel_;
+  float boundary_;
+  CornerField& field_;
+  int level_ = 0;
+  CornerBlock* leaf_ = nullptr;
+  LeafLayers layers_{0, 0};
+  bool gathered_ = false;  ///< the tile's field
+};
+
+/// A corner's place in its level.
+struct Place {
+  const CornerBlock* block;
+  int offset;
+
+  /// The place beside it, at most one step away on each axis.
+  [[nodiscard]] Place beside(int dx, int dy, int dz) const {
+    const int x = (offset & 7) + dx;
+    const int y = ((offset >> 3) & 7) + dy;
+    const int z = (offset >> 6) + dz;
+    return {block->around[CornerBlock::towards(x >> 3, y >> 3, z >> 3)], BlockMask::offset(x & 7, y & 7, z & 7)};
+  }
+  /// The record of its own value; null where it has none that is trusted.
+  [[nodiscard]] const float* trusted_record(const Window& window, int level) const {
+    return block != nullptr && block->trusted.test(offset) ? record(window, level) : nullptr;
+  }
+  /// The same of any seen corner.
+  [[nodiscard]] const float* record(const Window& window, int level) const {
+    const CornerValues& values = block->values[window.slab_in_leaf(level, offset >> 6)];
+    return values.count == 0 ? nullptr : values.of(block->value_index(offset, window.slab_layers(level)));
+  }
+};
+
+void read_record(const Window& window, const float* record, CornerValue& out, float* attributes) {
+  out = {record[kDistance],
+         {record[kNormalX], record[kNormalY], record[kNormalZ]},
+         record[kCurvature],
+         record[kOffsetFromMean]};
+  for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] = record[kFirstAttribute + c];
+}
+
+/// Normals whose weighted sum is shorter than this cancel.
+constexpr float kCancelled = 1e-6F;
+
+/// The weighted mean of the trusted neighbours' planes; false where there are none. What Kernel::extend() decides signs
+/// by, neighbour by neighbour in the same order.
+bool extended_value(const Window& window, int level, const Place& here, CornerValue& out, float* attributes) {
+  const auto cell = static_cast<float>(window.lattice().cell_size(level));
+  CornerValue sum;
+  float total = 0;
+  for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] = 0;
+  for_neighbours([&](int dx, int dy, int dz) {
+    const float* const v = here.beside(dx, dy, dz).trusted_record(window, level);
+    if (v == nullptr) return;
+    const float w = neighbour_weight(dx, dy, dz);
+    sum.distance += w * plane_of(v).seen_from(dx, dy, dz, cell);
+    for (int k = 0; k < 3; ++k) sum.normal[k] += w * v[kNormalX + k];
+    sum.curvature += w * v[kCurvature];
+    for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] += w * v[kFirstAttribute + c];
+    total += w;
+  });
+  if (total <= 0) return false;
+  const float inv = 1.0F / total;
+  const float length =
+      std::sqrt(sum.normal[0] * sum.normal[0] + sum.normal[1] * sum.normal[1] + sum.normal[2] * sum.normal[2]);
+  out.distance = sum.distance * inv;
+  for (int k = 0; k < 3; ++k) out.normal[k] = length > kCancelled ? sum.normal[k] / length : 0.0F;
+  out.curvature = sum.curvature * inv;
+  out.offset_from_mean = 0;
+  for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] *= inv;
+  return true;
 }
 
 }  // namespace
@@ -167,11 +233,26 @@ void extend_slab(Window& window, std::int32_t slab, const Kernel& kernel, float 
   for (int level = 0; level < window.levels(); ++level) {
     const Tiles tiles = window.tiles(level, slab);
     tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
-      const std::int32_t first = window.lattice().first_layer(level, slab) - tiles[i].block.z * 8;
-      const int end = std::min(8, first + window.lattice().layers(level));
-      extend_tile(window, level, tiles[i], std::max(first, 0), end, kernel, boundary, fields.local());
+      TileExtender extender(window, kernel, boundary, fields.local());
+      extender.extend(level, tiles[i], leaf_layers(window, level, slab, tiles[i].block));
     });
   }
+}
+
+bool corner_value(const Window& window, int level, const Cell& corner, CornerValue& out, float* attributes) {
+  const Place here{window.probe(level, block_of(corner)), offset_in_block(corner)};
+  if (here.block->shared.test(here.offset)) {
+    const FinerCorner finer = finer_corner(window, level, corner);
+    return corner_value(window, finer.level, finer.corner, out, attributes);
+  }
+  if (const float* const own = here.trusted_record(window, level)) {
+    read_record(window, own, out, attributes);
+    return true;
+  }
+  if (extended_value(window, level, here, out, attributes)) return true;
+  if (!here.block->defined.test(here.offset) || !here.block->seen.test(here.offset)) return false;
+  read_record(window, here.record(window, level), out, attributes);
+  return true;
 }
 
 }  // namespace lamina

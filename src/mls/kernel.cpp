@@ -1,11 +1,11 @@
 #include "mls/kernel.h"
 
+#include <algorithm>
 #include <cstdlib>
 #include <string>
 #include <string_view>
 
 #include "lamina/error.h"
-#include "mls/kernels.h"
 
 namespace lamina {
 
@@ -13,6 +13,24 @@ void TileSamples::resize(std::size_t n, std::size_t attribute_count) {
   for (std::vector<float>* v : {&x, &y, &z, &nx, &ny, &nz, &support, &inv_support2, &inv_band2, &weight}) v->resize(n);
   attributes.resize(attribute_count);
   for (std::vector<float>& a : attributes) a.resize(n);
+}
+
+void CornerField::clear(int begin, int end) {
+  std::fill(any.begin() + begin * kRows, any.begin() + (end + 2) * kRows, 0);
+}
+
+void CornerField::put(int x, int y, int z, const TangentPlane<float>& plane) {
+  const int row = (z + 1) * kRows + y + 1;
+  if (any[row] == 0) {
+    for (auto* a : {&distance, &nx, &ny, &nz, &trusted}) std::fill_n(a->begin() + row * kRow, kRow, 0.0F);
+    any[row] = 1;
+  }
+  const int at = row * kRow + x + 1;
+  distance[at] = plane.distance;
+  nx[at] = plane.nx;
+  ny[at] = plane.ny;
+  nz[at] = plane.nz;
+  trusted[at] = 1.0F;
 }
 
 std::vector<Kernel> available_kernels() {

@@ -1,5 +1,5 @@
 // The kernel of the projection: weighted sums over samples at eight query points at once, and the fit made of them.
-// One source (kernel_body.h), compiled per processor kind; all kinds give the same bits (no fused multiply-add, no
+// One source (kernel_source.h), compiled per processor kind; all kinds give the same bits (no fused multiply-add, no
 // reassociation, every query's sum in the order of the samples).
 #pragma once
 #include <array>
@@ -56,6 +56,9 @@ struct Queries {
   Lanes x, y, z;
 };
 
+/// Where the samples spread less than this (support^2) no curvature is estimated: rounding would make it.
+inline constexpr float kFlatSpread = 1e-3F;
+
 struct FitInput {
   bool sphere = true;
   Queries offset;  ///< corner minus query point
@@ -69,8 +72,37 @@ struct FitOutput {
   Lanes offset_from_mean;  ///< |projected point - weighted average| / local support
 };
 
+/// The rule of extension: a corner that is not trusted takes the mean of what the tangent planes of the trusted among
+/// its 26 neighbours say there, weights 1 / m^2, m the number of axes in which the neighbour differs. Signs (the
+/// kernel, eight corners at once) and values (corner_value(), one corner) add the neighbours up one by one in
+/// for_neighbours()'s order, so that they agree to the bit.
+template <typename F>
+constexpr void for_neighbours(const F& f) {
+  for (int dz = -1; dz <= 1; ++dz) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        if (dx != 0 || dy != 0 || dz != 0) f(dx, dy, dz);
+      }
+    }
+  }
+}
+[[gnu::always_inline]] constexpr float neighbour_weight(int dx, int dy, int dz) {
+  const int m = (dx != 0) + (dy != 0) + (dz != 0);
+  return 1.0F / static_cast<float>(m * m);
+}
+/// Of one corner (float) or of eight side by side (a vector); lengths in steps. Always inlined: an instance of its own
+/// would be one for all kinds of processor.
+template <typename T>
+struct TangentPlane {
+  T distance, nx, ny, nz;
+  /// Its distance at the corner whose neighbour (dx, dy, dz) this one is.
+  [[nodiscard, gnu::always_inline]] T seen_from(int dx, int dy, int dz, float cell) const {
+    return distance - cell * (nx * static_cast<float>(dx) + ny * static_cast<float>(dy) + nz * static_cast<float>(dz));
+  }
+};
+
 /// Trusted corners of a tile and one corner around it, dense: [z + 1][y + 1][x + 1] with rows of kRow floats; zero
-/// where there is none. Lengths in steps.
+/// where there is none, rows without any are not set. Lengths in steps.
 struct CornerField {
   static constexpr int kRow = 16;
   static constexpr int kRows = 10;
@@ -78,12 +110,15 @@ struct CornerField {
   static constexpr int kSize = 10 * kPlane;
   std::array<float, kSize> distance, nx, ny, nz, trusted;
   std::array<std::uint8_t, 10 * kRows> any;  ///< [z + 1][y + 1]: whether the row has trusted corners
+
+  /// Layers [begin - 1, end] have none.
+  void clear(int begin, int end);
+  void put(int x, int y, int z, const TangentPlane<float>& plane);
 };
 
-/// What the trusted ones among 26 neighbours say about eight corners, a bit each. Weights are 1 / m^2, m = L1 offset in
-/// cells.
+/// What the trusted ones among 26 neighbours say about eight corners, a bit each.
 struct Extension {
-  std::uint8_t outside;     ///< the weighted sum of the neighbours' planes' distances is not negative
+  std::uint8_t outside;     ///< the mean distance of the neighbours' planes is not negative
   std::uint8_t defined;     ///< there are trusted neighbours
   std::uint8_t surrounded;  ///< and their weighted mean lies near the corner, measured along the surface
 };
@@ -96,7 +131,7 @@ struct Kernel {
   void (*accumulate_facing)(const TileSamples&, const SampleRange* ranges, int count, const Queries&,
                             const Queries& facing, Lanes* sums);
   void (*fit)(const Lanes* sums, const FitInput&, FitOutput&);
-  /// Extends trusted neighbours' planes to the eight corners of row (y, z) of a tile. `cell` in steps; `active`:
+  /// Extends trusted neighbours' planes to the eight corners of row (y, z) of a tile. `cell` in steps; `surrounded2`:
   /// squared distance in cells up to which a corner is surrounded.
   Extension (*extend)(const CornerField&, int y, int z, float cell, float surrounded2);
 };
@@ -105,5 +140,16 @@ struct Kernel {
 std::vector<Kernel> available_kernels();
 /// The best one, or the one LAMINA_KERNEL names (v2, v3, v4) for tests and measurements.
 Kernel select_kernel();
+
+// The instances, one per processor kind (kernel_v*.cpp); available_kernels() chooses among them.
+namespace kernel_v2 {
+Kernel kernel();
+}
+namespace kernel_v3 {
+Kernel kernel();
+}
+namespace kernel_v4 {
+Kernel kernel();
+}
 
 }  // namespace lamina

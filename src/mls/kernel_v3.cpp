@@ -6,11 +6,10 @@
 #include <vector>
 
 #include "mls/kernel.h"
-#include "mls/kernels.h"
 
 namespace lamina::kernel_v3 {
 namespace {
-#include "mls/kernel_body.h"
+#include "mls/kernel_source.h"
 }  // namespace
 
 Kernel kernel() {

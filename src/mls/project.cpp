@@ -4,34 +4,41 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
 #include <limits>
 #include <map>
 #include <numeric>
 #include <utility>
 
 #include "mls/queries.h"
-#include "mls/tile_samples.h"
 #include "mls/tile_values.h"
 #include "octree/refine.h"
 
 namespace lamina {
+
+using NumberedBuckets = std::vector<std::size_t>;
+
 struct Projector::Scratch {
   struct Local {
     RowSamples rows;
     std::vector<Query> queries;
     TileState state;
     TileFit fit;
+    ProjectCounts counts;  ///< of the slab
   };
   tbb::enumerable_thread_specific<Local> local;
   std::map<std::size_t, std::shared_ptr<const ClusteredBucket>> clustered;  ///< by number of the bucket
 
   /// The buckets of a batch in clusters; kept for the next levels, steps and slabs while they are few.
-  ClusteredBatch load(const std::vector<std::size_t>& batch, SampleFeed& feed, const Lattice& lattice);
+  ClusteredBatch load(const NumberedBuckets& batch, SampleFeed& feed, const Lattice& lattice);
+  /// The sweep goes up: what no batch of a slab wants, none of the next ones will.
+  void forget_below(const std::vector<NumberedBuckets>& batches) {
+    std::size_t lowest = std::numeric_limits<std::size_t>::max();
+    for (const auto& batch : batches) lowest = std::min(lowest, batch.front());
+    clustered.erase(clustered.begin(), clustered.lower_bound(lowest));
+  }
 };
 
-ClusteredBatch Projector::Scratch::load(const std::vector<std::size_t>& batch, SampleFeed& feed,
-                                        const Lattice& lattice) {
+ClusteredBatch Projector::Scratch::load(const NumberedBuckets& batch, SampleFeed& feed, const Lattice& lattice) {
   constexpr std::size_t kKeep = std::size_t{1} << 19;  // samples
   ClusteredBatch out(batch.size());
   std::vector<std::size_t> missing;
@@ -45,7 +52,7 @@ ClusteredBatch Projector::Scratch::load(const std::vector<std::size_t>& batch, S
       out[b] = known->second;
     }
   }
-  std::vector<std::size_t> numbers;
+  NumberedBuckets numbers;
   numbers.reserve(missing.size());
   for (const std::size_t b : missing) numbers.push_back(batch[b]);
   const Batch loaded = feed.load(numbers);
@@ -65,26 +72,153 @@ namespace {
 std::vector<Work> list_work(Window& window, int level, std::int32_t slab, bool centres) {
   std::vector<Work> work;
   for (const Tile& t : window.tiles(level, slab)) {
-    const std::int32_t first = window.lattice().first_layer(level, slab) - t.block.z * 8;
-    Work w{t, t.leaf, std::max(first, 0), std::min(8, first + window.lattice().layers(level))};
+    Work w{t, t.leaf, leaf_layers(window, level, slab, t.block)};
+    const auto [begin, end] = w.layers;
     if (centres) {
       std::uint64_t any = 0;
       std::array<std::uint64_t, 8> close{};
-      close_cells(*t.leaf, w.begin, w.end, &close[w.begin]);
-      for (int z = w.begin; z < w.end; ++z) any |= t.leaf->cells.words[z] & close[z];
+      close_cells(*t.leaf, begin, end, &close[begin]);
+      for (int z = begin; z < end; ++z) any |= t.leaf->cells.words[z] & close[z];
       if (any == 0) continue;
       if (t.leaf->centres == nullptr) t.leaf->centres = std::make_shared<Projected>();
       w.points = t.leaf->centres.get();
-      for (int z = w.begin; z < w.end; ++z) w.points->active.words[z] = t.leaf->cells.words[z] & close[z];
+      for (int z = begin; z < end; ++z) w.points->active.words[z] = t.leaf->cells.words[z] & close[z];
     }
     std::uint64_t active = 0;
-    for (int z = w.begin; z < w.end; ++z) active |= w.points->active.words[z];
+    for (int z = begin; z < end; ++z) active |= w.points->active.words[z];
     if (active != 0) work.push_back(w);
   }
   return work;
 }
 
+std::vector<Block> blocks_of(const std::vector<Work>& work) {
+  std::vector<Block> blocks;
+  blocks.reserve(work.size());
+  for (const Work& w : work) blocks.push_back(w.tile.block);
+  return blocks;
+}
+
 }  // namespace
+
+/// One level of a slab: its tiles, each of which goes through list, start, the steps and finish.
+class Projector::Level {
+ public:
+  Level(Projector& projector, Window& window, std::int32_t slab, int level, SampleFeed& feed)
+      : scratch_(*projector.scratch_),
+        rule_{projector.kernel_, projector.settings_, kSums + static_cast<std::size_t>(window.attributes())},
+        window_(window),
+        lattice_(window.lattice()),
+        level_(level),
+        feed_(feed),
+        work_(list_work(window, level, slab, projector.settings_.centres)) {
+    layers_.level = level;
+    layers_.first = lattice_.first_layer(level, slab);
+    layers_.end = layers_.first + lattice_.layers(level);
+    layers_.shift = rule_.shift();
+  }
+
+  void project(const std::vector<NumberedBuckets>& batches) {
+    if (work_.empty()) return;
+    if (batches.empty()) {
+      // Nothing is seen here.
+      for (const Work& w : work_)
+        std::fill_n(&w.points->active.words[w.layers.begin], w.layers.end - w.layers.begin, 0);
+    } else if (batches.size() == 1) {
+      project_at_once(batches.front());
+    } else {
+      project_in_turns(batches);
+    }
+  }
+
+ private:
+  /// All samples are at hand: a tile does all of its steps before the next one.
+  void project_at_once(const NumberedBuckets& numbers) {
+    const std::vector<Block> blocks = blocks_of(work_);
+    const ClusteredBatch batch = scratch_.load(numbers, feed_, lattice_);
+    layers_.margin = margin();
+    const TileRuns bins = bin_clusters(lattice_, layers_, batch, blocks);
+    tbb::parallel_for(std::size_t{0}, work_.size(), [&](std::size_t t) {
+      Scratch::Local& local = scratch_.local.local();
+      list_queries(work_[t], local.queries);
+      TileSteps steps(rule_, local.queries, local.state);
+      steps.start();
+      local.rows.gather(lattice_, layers_, blocks[t], bins.of(t), rule_.settings.band);
+      steps.accumulate(local.rows);
+      for (int pass = 1; pass < rule_.passes() && steps.advance(pass); ++pass) steps.accumulate(local.rows);
+      finish(work_[t], local, local.state);
+    });
+  }
+
+  /// Sums survive from batch to batch and query points from pass to pass. Later passes are for few tiles.
+  void project_in_turns(const std::vector<NumberedBuckets>& batches) {
+    std::vector<TileState> kept(work_.size());
+    std::vector<std::uint32_t> going(work_.size());
+    std::iota(going.begin(), going.end(), 0U);
+    for (int pass = 0; pass < rule_.passes(); ++pass) {
+      going = begin_pass(pass, going, kept);
+      if (going.empty()) break;
+      layers_.margin = pass > 0 ? margin() : 0.0F;
+      for (const NumberedBuckets& numbers : batches) add_batch(numbers, going, kept);
+    }
+    tbb::parallel_for(std::size_t{0}, work_.size(), [&](std::size_t t) {
+      Scratch::Local& local = scratch_.local.local();
+      list_queries(work_[t], local.queries);
+      finish(work_[t], local, kept[t]);
+    });
+  }
+
+  /// Those of the tiles that go on.
+  std::vector<std::uint32_t> begin_pass(int pass, const std::vector<std::uint32_t>& tiles,
+                                        std::vector<TileState>& kept) {
+    std::vector<std::uint8_t> on(tiles.size());
+    tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t a) {
+      Scratch::Local& local = scratch_.local.local();
+      list_queries(work_[tiles[a]], local.queries);
+      TileSteps steps(rule_, local.queries, kept[tiles[a]]);
+      if (pass == 0) steps.start();
+      on[a] = pass == 0 || steps.advance(pass) ? 1 : 0;
+    });
+    std::vector<std::uint32_t> going;
+    for (std::size_t a = 0; a < tiles.size(); ++a) {
+      if (on[a] != 0) going.push_back(tiles[a]);
+    }
+    return going;
+  }
+
+  void add_batch(const NumberedBuckets& numbers, const std::vector<std::uint32_t>& tiles,
+                 std::vector<TileState>& kept) {
+    std::vector<Block> blocks;
+    for (const std::uint32_t t : tiles) blocks.push_back(work_[t].tile.block);
+    const ClusteredBatch batch = scratch_.load(numbers, feed_, lattice_);
+    const TileRuns bins = bin_clusters(lattice_, layers_, batch, blocks);
+    tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t a) {
+      Scratch::Local& local = scratch_.local.local();
+      local.rows.gather(lattice_, layers_, blocks[a], bins.of(a), rule_.settings.band);
+      TileSteps(rule_, local.queries, kept[tiles[a]]).accumulate(local.rows);
+    });
+  }
+
+  /// `local.queries` are the tile's.
+  void finish(const Work& work, Scratch::Local& local, TileState& state) {
+    TileSteps(rule_, local.queries, state).settle();
+    fit_tile(rule_, state, local.queries, local.fit, local.counts);
+    store_values(window_, level_, work, local.queries, state, local.fit);
+  }
+
+  /// How far points may move from where they start, steps.
+  [[nodiscard]] float margin() const {
+    return rule_.settings.steps > 1 ? kStepLimit * static_cast<float>(lattice_.cell_size(level_)) : 0.0F;
+  }
+
+  Scratch& scratch_;
+  ProjectRule rule_;
+  Window& window_;
+  const Lattice& lattice_;
+  int level_;
+  SampleFeed& feed_;
+  std::vector<Work> work_;
+  QueryLayers layers_;
+};
 
 Projector::Projector(const ProjectSettings& settings, const Kernel& kernel)
     : settings_(settings), kernel_(kernel), scratch_(std::make_unique<Scratch>()) {}
@@ -98,106 +232,26 @@ float Projector::margin(const Lattice& lattice) const {
 void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
   const Lattice& lattice = window.lattice();
   const std::int64_t height = lattice.slab_height();
-  const std::size_t channels = kSums + static_cast<std::size_t>(window.attributes());
   const auto batches = feed.batches(slab * height, (slab + 1) * height, margin(lattice));
-  std::atomic<std::uint64_t> corners = 0;
-  std::atomic<std::uint64_t> seen = 0;
-  std::atomic<std::uint64_t> trusted = 0;
-  std::atomic<std::uint64_t> torn = 0;
-  std::atomic<std::uint64_t> sums = 0;
-  // The sweep goes up: what no batch of this slab wants, none of the next ones will.
-  std::size_t lowest = std::numeric_limits<std::size_t>::max();
-  for (const auto& batch : batches) lowest = std::min(lowest, batch.front());
-  scratch_->clustered.erase(scratch_->clustered.begin(), scratch_->clustered.lower_bound(lowest));
-  for (int level = 0; level < window.levels(); ++level) {
-    const std::vector<Work> work = list_work(window, level, slab, settings_.centres);
-    if (work.empty()) continue;
-    if (batches.empty()) {
-      // Nothing is seen here.
-      for (const Work& w : work) std::fill_n(&w.points->active.words[w.begin], w.end - w.begin, 0);
-      continue;
-    }
-    std::vector<Block> blocks;
-    blocks.reserve(work.size());
-    for (const Work& w : work) blocks.push_back(w.tile.block);
-    const std::int32_t first = lattice.first_layer(level, slab);
-    const std::int32_t end = first + lattice.layers(level);
-    const float level_margin = settings_.steps > 1 ? kStepLimit * static_cast<float>(lattice.cell_size(level)) : 0.0F;
-    const auto finish = [&](std::size_t t, Scratch::Local& local, TileState& state) {
-      settle(kernel_, settings_, state, local.queries, channels);
-      const FitCounts counts = fit_tile(kernel_, settings_, channels, state, local.queries, local.fit);
-      store_values(window, level, work[t], local.queries, state, local.fit);
-      seen.fetch_add(counts.seen, std::memory_order_relaxed);
-      trusted.fetch_add(counts.trusted, std::memory_order_relaxed);
-      sums.fetch_add(state.sums, std::memory_order_relaxed);
-      torn.fetch_add(counts.torn, std::memory_order_relaxed);
-      corners.fetch_add(local.queries.size(), std::memory_order_relaxed);
-    };
-    const int passes = passes_of(settings_);
-    if (batches.size() == 1) {
-      const ClusteredBatch batch = scratch_->load(batches[0], feed, lattice);
-      const QueryLayers layers{level, first, end, level_margin, shift_of(settings_)};
-      const TileRuns bins = bin_clusters(lattice, layers, batch, blocks);
-      tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t t) {
-        Scratch::Local& local = scratch_->local.local();
-        TileState& state = local.state;
-        list_queries(work[t], local.queries);
-        start(state, local.queries, channels, shift_of(settings_));
-        local.rows.gather(lattice, layers, work[t].tile.block, bins.of(t), settings_.band);
-        accumulate(kernel_, local.rows, state, channels);
-        for (int pass = 1; pass < passes; ++pass) {
-          if (!advance(kernel_, settings_, state, local.queries, channels, pass)) break;
-          accumulate(kernel_, local.rows, state, channels);
-        }
-        finish(t, local, state);
-      });
-      continue;
-    }
-    // Sums survive from batch to batch and query points from pass to pass. Later passes are for few tiles.
-    std::vector<TileState> kept(work.size());
-    std::vector<std::uint32_t> active(work.size());
-    std::iota(active.begin(), active.end(), 0U);
-    for (int pass = 0; pass < passes; ++pass) {
-      std::vector<std::uint8_t> on(active.size());
-      tbb::parallel_for(std::size_t{0}, active.size(), [&](std::size_t a) {
-        Scratch::Local& local = scratch_->local.local();
-        TileState& state = kept[active[a]];
-        list_queries(work[active[a]], local.queries);
-        if (pass == 0) start(state, local.queries, channels, shift_of(settings_));
-        on[a] = pass == 0 || advance(kernel_, settings_, state, local.queries, channels, pass) ? 1 : 0;
-      });
-      std::vector<std::uint32_t> going;
-      blocks.clear();
-      for (std::size_t a = 0; a < active.size(); ++a) {
-        if (on[a] == 0) continue;
-        going.push_back(active[a]);
-        blocks.push_back(work[active[a]].tile.block);
-      }
-      active = std::move(going);
-      if (active.empty()) break;
-      const QueryLayers layers{level, first, end, pass > 0 ? level_margin : 0.0F, shift_of(settings_)};
-      for (const std::vector<std::size_t>& numbers : batches) {
-        const ClusteredBatch batch = scratch_->load(numbers, feed, lattice);
-        const TileRuns bins = bin_clusters(lattice, layers, batch, blocks);
-        tbb::parallel_for(std::size_t{0}, active.size(), [&](std::size_t a) {
-          Scratch::Local& local = scratch_->local.local();
-          local.rows.gather(lattice, layers, blocks[a], bins.of(a), settings_.band);
-          accumulate(kernel_, local.rows, kept[active[a]], channels);
-        });
-      }
-    }
-    tbb::parallel_for(std::size_t{0}, work.size(), [&](std::size_t t) {
-      Scratch::Local& local = scratch_->local.local();
-      list_queries(work[t], local.queries);
-      finish(t, local, kept[t]);
-    });
+  scratch_->forget_below(batches);
+  for (int level = 0; level < window.levels(); ++level) Level(*this, window, slab, level, feed).project(batches);
+  add_counts(slab);
+}
+
+void Projector::add_counts(std::int32_t slab) {
+  std::uint64_t seen = 0;
+  std::uint64_t torn = 0;
+  for (Scratch::Local& local : scratch_->local) {
+    const ProjectCounts of = std::exchange(local.counts, {});
+    counts_.corners += of.corners;
+    counts_.seen += of.seen;
+    counts_.trusted += of.trusted;
+    counts_.sums += of.sums;
+    counts_.torn += of.torn;
+    seen += of.seen;
+    torn += of.torn;
   }
-  counts_.corners += corners;
-  counts_.seen += seen;
-  counts_.trusted += trusted;
-  counts_.torn += torn;
-  counts_.sums += sums;
-  constexpr std::uint64_t kEnough = 256;
+  constexpr std::uint64_t kEnough = 256;  // corners of a slab, for a share that tells
   const double share = seen < kEnough ? 0.0 : static_cast<double>(torn) / static_cast<double>(seen);
   if (share > counts_.torn_share) {
     counts_.torn_share = share;

@@ -53,7 +53,9 @@ class Projector {
   [[nodiscard]] float margin(const Lattice& lattice) const;
 
  private:
+  class Level;
   struct Scratch;
+  void add_counts(std::int32_t slab);
   ProjectSettings settings_;
   Kernel kernel_;
   ProjectCounts counts_;

@@ -5,21 +5,34 @@
 
 #include "mls/kernel.h"
 #include "mls/project.h"
-#include "mls/tile_samples.h"
+#include "mls/row_samples.h"
 #include "octree/window.h"
 
 namespace lamina {
 
+/// Corners farther than this (cells) from their surface gain nothing from further steps.
+inline constexpr float kStepLimit = 1.5F;
+/// Query points that a step moves by no more than this (cells) stay where they are, with the sums they have.
+inline constexpr float kStill = 1e-3F;
+/// Two sheets face opposite ways where the cosine between their mean normals is less than this (135 degrees): sheets of
+/// a wall or a slit do, the flanks of an edge do not.
+inline constexpr float kOpposed = -0.7F;
+
 struct Work {
   Tile tile;
   Projected* points = nullptr;  ///< the block's corners, or its cell centres
-  int begin = 0, end = 0;       ///< leaf layers of the slab
+  LeafLayers layers{0, 0};      ///< of the slab
+  [[nodiscard]] bool corners() const { return points == tile.leaf; }
 };
 
 /// A point to project, in the tile's compact order.
 struct Query {
   std::uint8_t x, y, z;
 };
+
+/// The active points of the slab that this level projects itself: not those that a finer level holds too. By groups of
+/// 2^3, so that the eight of a group lie close together and few samples act on any of them.
+void list_queries(const Work& work, std::vector<Query>& out);
 
 /// Query points and their running sums, in lane groups of eight; the last group is filled up with copies of its last
 /// point.
@@ -38,37 +51,52 @@ struct TileState {
   bool stepped = false;               ///< `moved` is the one to add samples to
 };
 
-/// Cell centres lie half a cell above their corner.
-inline float shift_of(const ProjectSettings& settings) {
-  return settings.centres ? 0.5F : 0.0F;
-}
+/// How points are projected.
+struct ProjectRule {
+  const Kernel& kernel;
+  const ProjectSettings& settings;
+  std::size_t channels;  ///< of a group's sums: kSums + attributes
 
-/// Corners farther than this (cells) from their surface gain nothing from further steps.
-inline constexpr float kStepLimit = 1.5F;
-/// Query points that a step moves by no more than this (cells) stay where they are, with the sums they have.
-inline constexpr float kStill = 1e-3F;
+  /// Cell centres lie half a cell above their corner.
+  [[nodiscard]] float shift() const { return settings.centres ? 0.5F : 0.0F; }
+  /// How often the samples are looked at: once a step, and once more for points between two sheets.
+  [[nodiscard]] int passes() const { return settings.steps + (settings.sheets > 0 ? 1 : 0); }
+};
 
-/// the active points of the slab that this level projects itself: not those that a finer level holds too. By groups of
-/// 2^3, so that the eight of a group lie close together and few samples act on any of them.
-void list_queries(const Work& work, std::vector<Query>& out);
-/// Puts the query points on the corners (or centres) and clears the sums.
-void start(TileState& state, const std::vector<Query>& queries, std::size_t channels, float shift);
-/// How often the samples are looked at: once a step, and once more for points between two sheets.
-inline int passes_of(const ProjectSettings& settings) {
-  return settings.steps + (settings.sheets > 0 ? 1 : 0);
-}
-/// Ends a pass and prepares the next one, `pass` (1 is the second). Query points move to the projected points; only
-/// those that move go on. After the first pass those that see two sheets stay where they are and are summed up again
-/// without the samples that face the other way, one pass behind the others from then on. False when none goes on.
-bool advance(const Kernel& kernel, const ProjectSettings& settings, TileState& state, const std::vector<Query>& queries,
-             std::size_t channels, int pass);
-/// Adds the samples to the sums of the points that go on.
-void accumulate(const Kernel& kernel, const RowSamples& rows, TileState& state, std::size_t channels);
-/// Ends the steps: `all` has every query's last point and sums; those between sheets have one sheet's where the two lie
-/// apart and that sheet can be trusted there.
-void settle(const Kernel& kernel, const ProjectSettings& settings, TileState& state, const std::vector<Query>& queries,
-            std::size_t channels);
+/// The steps of one tile's queries; a view of what is kept.
+class TileSteps {
+ public:
+  TileSteps(const ProjectRule& rule, const std::vector<Query>& queries, TileState& state)
+      : rule_(rule), queries_(queries), state_(state) {}
+
+  /// Puts the query points on the corners (or centres) and clears the sums.
+  void start();
+  /// Adds the samples to the sums of the points that go on.
+  void accumulate(const RowSamples& rows);
+  /// Ends a pass and prepares the next one, `pass` (1 is the second). Query points move to the projected points; only
+  /// those that move go on. After the first pass those that see two sheets stay where they are and are summed up again
+  /// without the samples that face the other way, one pass behind the others from then on. False when none goes on.
+  bool advance(int pass);
+  /// Ends the steps: `all` has every query's last point and sums; those between sheets have one sheet's where the two
+  /// lie apart and that sheet can be trusted there.
+  void settle();
+
+ private:
+  struct Next;
+  [[nodiscard]] std::uint32_t query_of(std::size_t i) const {
+    return state_.stepped ? state_.moving[i] : static_cast<std::uint32_t>(i);
+  }
+  void advance_group(std::size_t g, std::size_t count, int pass, Next& next) const;
+  [[nodiscard]] bool sees_two_sheets(const Lanes* sums, int l) const;
+  [[nodiscard]] bool is_apart(const Lanes* all, int lane, const Lanes* own_side, int l) const;
+
+  const ProjectRule& rule_;
+  const std::vector<Query>& queries_;
+  TileState& state_;
+};
+
 /// How the sums of a group of `all` become points.
-FitInput fit_input(const TileState& state, const std::vector<Query>& queries, std::size_t group, Fit fit, float shift);
+FitInput fit_input(const ProjectRule& rule, const TileState& state, const std::vector<Query>& queries,
+                   std::size_t group);
 
 }  // namespace lamina

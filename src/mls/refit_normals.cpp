@@ -6,10 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <tuple>
 
 #include "base/floor_divide.h"
-#include "mls/tile_samples.h"
+#include "mls/row_samples.h"
 
 namespace lamina {
 
@@ -54,43 +55,65 @@ struct Scratch {
   std::array<SampleRange, RowSamples::kRows> ranges{};
 };
 
-/// Eight samples' normals, from `first` on; those without a fit keep their own.
-void fit_eight(const Kernel& kernel, const LocalSamples& s, const std::vector<Placed>& placed, std::size_t first,
-               std::size_t end, float inv, const std::array<std::uint32_t, 3>& origin, Scratch& scratch,
-               UnitNormals& out) {
-  Queries at{};
-  Queries facing{};
-  const auto relative = [&](std::int32_t v, std::size_t axis) {
-    return static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(v) - origin[axis])) * inv;
-  };
-  for (int l = 0; l < kLanes; ++l) {
-    const std::uint32_t i = placed[std::min(first + static_cast<std::size_t>(l), end - 1)].sample;
-    at.x[l] = relative(s.x[i], 0);
-    at.y[l] = relative(s.y[i], 1);
-    at.z[l] = relative(s.z[i], 2);
-    facing.x[l] = s.nx[i];
-    facing.y[l] = s.ny[i];
-    facing.z[l] = s.nz[i];
+/// One tile's fits.
+class TileRefit {
+ public:
+  TileRefit(const Kernel& kernel, const LocalSamples& samples, Scratch& scratch, UnitNormals& out)
+      : kernel_(kernel), s_(samples), scratch_(scratch), out_(out) {}
+
+  /// Of the samples of a block of cells so large.
+  void fit(const Block& block, std::int32_t cell, std::span<const Placed> placed) {
+    const std::uint32_t edge = 8U * static_cast<std::uint32_t>(cell);
+    origin_ = {static_cast<std::uint32_t>(block.x) * edge, static_cast<std::uint32_t>(block.y) * edge,
+               static_cast<std::uint32_t>(block.z) * edge};
+    inv_ = 1.0F / static_cast<float>(cell);
+    for (std::size_t i = 0; i < placed.size(); i += kLanes)
+      fit_eight(placed.subspan(i, std::min<std::size_t>(kLanes, placed.size() - i)));
   }
-  const auto [y_lo, y_hi] = std::minmax_element(at.y.v.begin(), at.y.v.end());
-  const auto [z_lo, z_hi] = std::minmax_element(at.z.v.begin(), at.z.v.end());
-  const int n = scratch.rows.ranges(*y_lo, *y_hi, *z_lo, *z_hi, scratch.ranges.data());
-  std::array<Lanes, kSums> sums{};
-  sums[kNearest].v.fill(1e30F);
-  kernel.accumulate_facing(scratch.rows.samples(), scratch.ranges.data(), n, at, facing, sums.data());
-  FitOutput fit{};
-  kernel.fit(sums.data(), FitInput{}, fit);
-  for (int l = 0; l < kLanes && first + static_cast<std::size_t>(l) < end; ++l) {
-    const std::uint32_t i = placed[first + static_cast<std::size_t>(l)].sample;
-    // A fit that turns a normal around, or has too few samples, is no better than what came.
-    constexpr float kFew = 6;
-    const float along = fit.nx[l] * s.nx[i] + fit.ny[l] * s.ny[i] + fit.nz[l] * s.nz[i];
-    const bool keep = !(along > 0) || sums[kSeen][l] < kFew;
-    out.x[i] = keep ? s.nx[i] : fit.nx[l];
-    out.y[i] = keep ? s.ny[i] : fit.ny[l];
-    out.z[i] = keep ? s.nz[i] : fit.nz[l];
+
+ private:
+  /// Up to eight samples' normals; those without a fit keep their own.
+  void fit_eight(std::span<const Placed> placed) {
+    Queries at{};
+    Queries facing{};
+    for (int l = 0; l < kLanes; ++l) {
+      const std::uint32_t i = placed[std::min(static_cast<std::size_t>(l), placed.size() - 1)].sample;
+      at.x[l] = relative(s_.x[i], 0);
+      at.y[l] = relative(s_.y[i], 1);
+      at.z[l] = relative(s_.z[i], 2);
+      facing.x[l] = s_.nx[i];
+      facing.y[l] = s_.ny[i];
+      facing.z[l] = s_.nz[i];
+    }
+    const auto [y_lo, y_hi] = std::minmax_element(at.y.v.begin(), at.y.v.end());
+    const auto [z_lo, z_hi] = std::minmax_element(at.z.v.begin(), at.z.v.end());
+    const int n = scratch_.rows.ranges(*y_lo, *y_hi, *z_lo, *z_hi, scratch_.ranges.data());
+    std::array<Lanes, kSums> sums{};
+    sums[kNearest].v.fill(1e30F);
+    kernel_.accumulate_facing(scratch_.rows.samples(), scratch_.ranges.data(), n, at, facing, sums.data());
+    FitOutput fit{};
+    kernel_.fit(sums.data(), FitInput{}, fit);
+    for (std::size_t k = 0; k < placed.size(); ++k) {
+      const std::uint32_t i = placed[k].sample;
+      const int l = static_cast<int>(k);
+      const float along = fit.nx[l] * s_.nx[i] + fit.ny[l] * s_.ny[i] + fit.nz[l] * s_.nz[i];
+      const bool keep = !(along > 0) || sums[kSeen][l] < kLeastRefitSamples;
+      out_.x[i] = keep ? s_.nx[i] : fit.nx[l];
+      out_.y[i] = keep ? s_.ny[i] : fit.ny[l];
+      out_.z[i] = keep ? s_.nz[i] : fit.nz[l];
+    }
   }
-}
+  [[nodiscard]] float relative(std::int32_t v, std::size_t axis) const {
+    return static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(v) - origin_[axis])) * inv_;
+  }
+
+  const Kernel& kernel_;
+  const LocalSamples& s_;
+  Scratch& scratch_;
+  UnitNormals& out_;
+  std::array<std::uint32_t, 3> origin_{};
+  float inv_ = 1;
+};
 
 }  // namespace
 
@@ -161,12 +184,8 @@ UnitNormals RefitNormals::find(std::size_t bucket) {
     Scratch& local = scratch.local();
     constexpr float kNoBand = 1e4F;
     local.rows.gather(lattice_, layers, blocks[t], bins.of(t), kNoBand);
-    const std::uint32_t edge = 8U * static_cast<std::uint32_t>(cell);
-    const std::array<std::uint32_t, 3> origin{static_cast<std::uint32_t>(blocks[t].x) * edge,
-                                              static_cast<std::uint32_t>(blocks[t].y) * edge,
-                                              static_cast<std::uint32_t>(blocks[t].z) * edge};
-    for (std::size_t i = tiles[t].begin; i < tiles[t].end; i += kLanes)
-      fit_eight(kernel_, s, placed, i, tiles[t].end, 1.0F / static_cast<float>(cell), origin, local, out);
+    TileRefit(kernel_, s, local, out)
+        .fit(blocks[t], cell, std::span(placed).subspan(tiles[t].begin, tiles[t].end - tiles[t].begin));
   });
   return out;
 }

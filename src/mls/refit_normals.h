@@ -11,6 +11,9 @@
 
 namespace lamina {
 
+/// A fit that turns a normal around, or has fewer samples than this, is no better than what came.
+inline constexpr float kLeastRefitSamples = 6;
+
 struct RefitSettings {
   double support = 0;    ///< radii within which a sample acts; 0: normals stay
   float max_radius = 0;  ///< a longer radius acts as this, steps, > 0: how far is known before streaming

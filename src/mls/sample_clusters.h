@@ -3,8 +3,11 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <memory>
+#include <span>
 #include <vector>
 
+#include "octree/window.h"
 #include "samples/sample_feed.h"
 
 namespace lamina {
@@ -27,5 +30,36 @@ struct ClusteredBucket {
 
 /// Canonical order: clusters by level, then z, y, x; inside a cluster as in the bucket.
 ClusteredBucket cluster_samples(const ActiveBucket& bucket, const Lattice& lattice);
+
+using ClusteredBatch = std::vector<std::shared_ptr<const ClusteredBucket>>;
+
+/// Samples [begin, end) of a bucket.
+struct Run {
+  const ClusteredBucket* from = nullptr;
+  std::uint32_t begin = 0, end = 0;
+};
+
+/// Runs per tile, compressed rows: tile t owns runs[begin[t] .. begin[t + 1]), in the order of the batch.
+struct TileRuns {
+  std::vector<std::uint32_t> begin;
+  std::vector<Run> runs;
+  [[nodiscard]] std::span<const Run> of(std::size_t tile) const {
+    return {runs.data() + begin[tile], runs.data() + begin[tile + 1]};
+  }
+};
+
+/// Points of a level to look for: those of the layers [first, end), `shift` cells above the corners (0: corners, 0.5:
+/// cell centres). Supports are taken `margin` steps longer than they are.
+struct QueryLayers {
+  int level = 0;
+  std::int32_t first = 0, end = 0;
+  float margin = 0;
+  float shift = 0;
+};
+
+/// The clusters that may reach a point of each tile. `tiles` are distinct and in canonical order (z, y, x).
+/// Deterministic for any number of threads.
+TileRuns bin_clusters(const Lattice& lattice, const QueryLayers& layers, const ClusteredBatch& batch,
+                      std::span<const Block> tiles);
 
 }  // namespace lamina

@@ -5,8 +5,6 @@
 #include <bit>
 #include <cmath>
 
-#include "mls/shared_corners.h"
-
 namespace lamina {
 namespace {
 
@@ -14,9 +12,6 @@ namespace {
 bool is_seen(const Lanes* sums, int lane) {
   return sums[kW][lane] > 0 && sums[kNearest][lane] <= 1;
 }
-
-/// Normals contradict each other where their mean is shorter than this.
-constexpr float kTorn = 0.5F;
 
 /// Whether those that a seen point sees do.
 bool is_torn(const Lanes* sums, int lane) {
@@ -31,10 +26,6 @@ bool any_seen(const Lanes* sums) {
   for (int l = 0; l < kLanes; ++l) any = any || is_seen(sums, l);
   return any;
 }
-
-/// A single sample is no surface: what sees no other counts as this far from it (support radii), too far for a corner
-/// to stand on its own. All of one sample's corners lead to the same point, and triangles between them have no area.
-constexpr float kAlone = 1;
 
 /// Makes a corner's projected point the average of its samples, on the side where the fit has it: a fit that reaches
 /// beyond its samples tells no more.
@@ -54,21 +45,43 @@ void keep_to_samples(const Lanes* sums, const FitInput& in, int l, FitOutput& fi
   fit.curvature[l] = 0;
 }
 
+/// Takes over `seen`, `trusted` and the signs of a layer's shared corners that are active.
+void take_shared(const Window& window, int level, const Tile& tile, int z) {
+  CornerBlock& leaf = *tile.leaf;
+  for (std::uint64_t w = leaf.shared.words[z] & leaf.active.words[z]; w != 0; w &= w - 1) {
+    const FinerCorner from = finer_corner(window, level, tile, z, std::countr_zero(w));
+    const std::uint64_t one = w & (~w + 1);
+    if (!from.block->seen.test(from.offset)) continue;
+    leaf.seen.words[z] |= one;
+    if (from.block->trusted.test(from.offset)) leaf.trusted.words[z] |= one;
+    if (from.block->outside.test(from.offset)) leaf.outside.words[z] |= one;
+  }
+}
+
+/// Copies the finer level's values to place `at` of the coarser one's.
+void copy_value(const Window& window, const FinerCorner& from, CornerValues& to, std::uint32_t at) {
+  const CornerValues& source = from.block->values[window.slab_in_leaf(from.level, from.offset >> 6)];
+  const std::uint32_t i = from.block->value_index(from.offset, window.slab_layers(from.level));
+  std::copy_n(source.of(i), window.channels(), to.of(at));
+}
+
 }  // namespace
 
-FitCounts fit_tile(const Kernel& kernel, const ProjectSettings& settings, std::size_t channels, const TileState& state,
-                   const std::vector<Query>& queries, TileFit& out) {
+void fit_tile(const ProjectRule& rule, const TileState& state, const std::vector<Query>& queries, TileFit& out,
+              ProjectCounts& counts) {
+  const ProjectSettings& settings = rule.settings;
   const std::size_t groups = state.all.points.size();
   out.fits.resize(std::max(groups, out.fits.size()));
   out.seen.assign(groups * kLanes, 0);
   out.trusted.assign(groups * kLanes, 0);
-  FitCounts counts;
+  counts.corners += queries.size();
+  counts.sums += state.sums;
   for (std::size_t g = 0; g < groups; ++g) {
-    const Lanes* sums = &state.all.sums[g * channels];
+    const Lanes* sums = &state.all.sums[g * rule.channels];
     if (!any_seen(sums)) continue;
     FitOutput& fit = out.fits[g];
-    const FitInput in = fit_input(state, queries, g, settings.fit, shift_of(settings));
-    kernel.fit(sums, in, fit);
+    const FitInput in = fit_input(rule, state, queries, g);
+    rule.kernel.fit(sums, in, fit);
     const int lanes = static_cast<int>(std::min<std::size_t>(kLanes, queries.size() - g * kLanes));
     for (int l = 0; l < lanes; ++l) {
       const bool has_normal = fit.nx[l] != 0 || fit.ny[l] != 0 || fit.nz[l] != 0;
@@ -83,16 +96,16 @@ FitCounts fit_tile(const Kernel& kernel, const ProjectSettings& settings, std::s
       counts.torn += seen && is_torn(sums, l) ? 1 : 0;
     }
   }
-  return counts;
 }
 
 void store_values(Window& window, int level, const Work& work, const std::vector<Query>& queries,
                   const TileState& state, const TileFit& fit) {
   Projected& points = *work.points;
   CornerBlock& leaf = *work.tile.leaf;
-  const bool corners = work.points == work.tile.leaf;
+  const bool corners = work.corners();
+  const auto [begin, end] = work.layers;
   const std::size_t channels = kSums + static_cast<std::size_t>(window.attributes());
-  for (int z = work.begin; z < work.end; ++z) {
+  for (int z = begin; z < end; ++z) {
     points.seen.words[z] = points.trusted.words[z] = 0;
     if (corners) leaf.outside.words[z] = 0;
   }
@@ -110,16 +123,16 @@ void store_values(Window& window, int level, const Work& work, const std::vector
     numbers[static_cast<std::size_t>(BlockMask::offset(q.x, q.y, q.z))] = static_cast<std::uint16_t>(i);
   }
   std::uint32_t count = 0;
-  for (int z = work.begin; z < work.end; ++z) {
+  for (int z = begin; z < end; ++z) {
     if (corners && level > 0) take_shared(window, level, work.tile, z);
     points.active.words[z] = points.seen.words[z];
     count += static_cast<std::uint32_t>(std::popcount(points.seen.words[z]));
   }
-  CornerValues& values = points.values[window.slab_in_leaf(level, work.begin)];
+  CornerValues& values = points.values[window.slab_in_leaf(level, begin)];
   values.allocate(count, window.channels());
   const auto cell = static_cast<float>(window.lattice().cell_size(level));
   std::uint32_t at = 0;
-  for (int z = work.begin; z < work.end; ++z) {
+  for (int z = begin; z < end; ++z) {
     const std::uint64_t shared = corners ? leaf.shared.words[z] : 0;
     for (std::uint64_t w = points.seen.words[z]; w != 0; w &= w - 1, ++at) {
       const int bit = std::countr_zero(w);
@@ -141,6 +154,30 @@ void store_values(Window& window, int level, const Work& work, const std::vector
       v[kOffsetFromMean] = out.offset_from_mean[l];
       const float inv = 1.0F / sums[kW][l];
       for (int c = 0; c < window.attributes(); ++c) v[kFirstAttribute + c] = sums[kSums + c][l] * inv;
+    }
+  }
+}
+
+bool allocate_values(const Window& window, int level, Projected& points, LeafLayers layers) {
+  std::uint32_t active = 0;
+  for (int z = layers.begin; z < layers.end; ++z)
+    active += static_cast<std::uint32_t>(std::popcount(points.active.words[z]));
+  if (active == 0) return false;
+  CornerValues& values = points.values[window.slab_in_leaf(level, layers.begin)];
+  values.allocate(active, window.channels());
+  std::fill(values.data.begin(), values.data.end(), 0.0F);
+  return true;
+}
+
+void copy_shared(Window& window, int level, const Tile& tile, LeafLayers layers) {
+  CornerBlock& leaf = *tile.leaf;
+  CornerValues& values = leaf.values[window.slab_in_leaf(level, layers.begin)];
+  for (int z = layers.begin; z < layers.end; ++z) {
+    take_shared(window, level, tile, z);
+    for (std::uint64_t w = leaf.shared.words[z] & leaf.seen.words[z]; w != 0; w &= w - 1) {
+      const int bit = std::countr_zero(w);
+      copy_value(window, finer_corner(window, level, tile, z, bit), values,
+                 leaf.value_index(z * 64 + bit, window.slab_layers(level)));
     }
   }
 }

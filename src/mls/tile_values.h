@@ -1,4 +1,4 @@
-// From a tile's sums to the values in its block.
+// From a tile's sums to the values in its block, and what a block takes over from finer levels.
 #pragma once
 #include <cstdint>
 #include <vector>
@@ -7,6 +7,13 @@
 
 namespace lamina {
 
+/// Normals contradict each other where their mean is shorter than this: half of what one surface's is.
+inline constexpr float kTorn = 0.5F;
+
+/// A single sample is no surface: what sees no other counts as this far from it (support radii), too far for a corner
+/// to stand on its own. All of one sample's corners lead to the same point, and triangles between them have no area.
+inline constexpr float kAlone = 1;
+
 /// The fits of a tile's queries, and what they are worth.
 struct TileFit {
   std::vector<FitOutput> fits;        ///< by group of eight queries; those of unseen groups are left as they were
@@ -14,19 +21,20 @@ struct TileFit {
   std::vector<std::uint8_t> trusted;  ///< by query: the fit is trusted
 };
 
-struct FitCounts {
-  std::uint64_t seen = 0, trusted = 0;
-  std::uint64_t torn = 0;  ///< queries that see normals which contradict each other
-};
-
-/// `channels`: kSums + attributes.
-FitCounts fit_tile(const Kernel& kernel, const ProjectSettings& settings, std::size_t channels, const TileState& state,
-                   const std::vector<Query>& queries, TileFit& out);
+/// Fits all queries of a tile and counts what came of them.
+void fit_tile(const ProjectRule& rule, const TileState& state, const std::vector<Query>& queries, TileFit& out,
+              ProjectCounts& counts);
 
 /// Writes what later stages need into the slab's layers of the block: `seen`, `trusted`, the signs of the seen points'
 /// own distances in `outside` (corners only), and the values, for the seen points alone: `active` becomes `seen`.
 /// Corners that a finer level holds take its values: it must be done.
 void store_values(Window& window, int level, const Work& work, const std::vector<Query>& queries,
                   const TileState& state, const TileFit& fit);
+
+/// Makes room for the values of the active points in the layers of a block (one slab's); false when there are none.
+bool allocate_values(const Window& window, int level, Projected& points, LeafLayers layers);
+
+/// Takes over what finer levels have for the tile's shared corners in the layers.
+void copy_shared(Window& window, int level, const Tile& tile, LeafLayers layers);
 
 }  // namespace lamina

@@ -2,23 +2,17 @@
 // section 3.4).
 #pragma once
 #include <cstdint>
-#include <span>
 
 #include "octree/window.h"
 
 namespace lamina {
 
-/// Where a sample lies and the level its radius asks for.
-struct Mark {
-  std::int32_t x, y, z;  ///< fixed-point position
-  std::uint8_t level;    ///< coarsest level whose cells are small enough for the sample
-  float active_radius;   ///< how far it acts on corners, steps, > 0
-};
-
-/// Notes samples' home cells and the corners they act on among those up to two cells away (on each axis the two below
-/// and the two above). Any order, from several threads at once, slabs at will ahead of refine_slab(); quick where one
-/// sample after the other lies in the same block.
-void mark_samples(Window& window, std::span<const Mark> marks);
+/// Cells around a sample's home, of its own level, that are refined to that level. A radius is estimated too small by
+/// up to a fifth and a cell may be less than half of it, so gaps between samples are up to five cells wide: with two,
+/// they came out as holes.
+inline constexpr int kRefinedCells = 3;
+/// Cells around the home that finer samples' cells inherit closeness from, and whose centres are projected.
+inline constexpr int kCloseCells = 1;
 
 /// Fixes the octree of one slab: cells that samples reach, subdivision, taking part. Samples must be marked up to three
 /// slabs further, and the slab below be refined. A cell is split when a sample of a finer level lies within three

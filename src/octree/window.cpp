@@ -11,6 +11,7 @@
 #include "octree/corner_leaf.h"
 
 namespace lamina {
+
 namespace {
 
 openvdb::Coord leaf_origin(const Block& b) {
@@ -277,6 +278,16 @@ std::size_t Window::memory() const {
     }
   }
   return bytes;
+}
+
+FinerCorner finer_corner(const Window& window, int level, Cell corner) {
+  while (level-- > 0) {
+    corner = {corner.x * 2, corner.y * 2, corner.z * 2};
+    const CornerBlock* block = window.probe(level, block_of(corner));
+    const int offset = offset_in_block(corner);
+    if (block != nullptr && block->corners.test(offset)) return {level, corner, block, offset};
+  }
+  return {-1, corner, nullptr, 0};
 }
 
 }  // namespace lamina

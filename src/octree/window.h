@@ -1,9 +1,13 @@
-// The sliding window: one OpenVDB tree per level, filled and retired slab by slab.
+// The sliding window: one OpenVDB tree per level, filled and retired slab by slab; corners that several levels hold,
+// and random access for the few places that leave their tile.
 #pragma once
+#include <algorithm>
+#include <array>
 #include <compare>
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "lattice/extent.h"
@@ -84,6 +88,61 @@ class Window {
   Lattice lattice_;
   int attributes_;
   std::unique_ptr<Trees> trees_;
+};
+
+/// Layers [begin, end) of a leaf that a slab covers.
+struct LeafLayers {
+  int begin, end;
+};
+inline LeafLayers leaf_layers(const Window& window, int level, std::int32_t slab, const Block& b) {
+  const std::int32_t first = window.lattice().first_layer(level, slab) - b.z * 8;
+  return {std::max(first, 0), std::min(8, first + window.lattice().layers(level))};
+}
+
+/// A corner that several levels hold, in a finer one of them.
+struct FinerCorner {
+  int level;
+  Cell corner;
+  const CornerBlock* block;
+  int offset;
+};
+
+/// In the next finer level that holds the corner; the block is null where none does. Levels in between need not hold
+/// it: a leaf cell may lie beside one that is subdivided twice there.
+FinerCorner finer_corner(const Window& window, int level, Cell corner);
+/// The same for the tile's corner at `bit` of layer z.
+inline FinerCorner finer_corner(const Window& window, int level, const Tile& tile, int z, int bit) {
+  return finer_corner(window, level,
+                      {tile.block.x * 8 + (bit & 7), tile.block.y * 8 + (bit >> 3), tile.block.z * 8 + z});
+}
+
+/// Remembers the blocks met last. One thread's; the window must not gain or lose leaves while it is in use. The window
+/// must not gain or lose leaves while it is in use.
+class BlockCache {
+ public:
+  explicit BlockCache(const Window& window) : window_(&window) {}
+
+  [[nodiscard]] const CornerBlock* block(int level, const Cell& c) {
+    const Block b = block_of(c);
+    // Neighbouring blocks differ in a parity, so a walk around a corner keeps all of its eight blocks.
+    Entry& e = entries_[static_cast<std::size_t>(level & 15) * 8 + (b.x & 1) + 2 * (b.y & 1) + 4 * (b.z & 1)];
+    if (!e.known || e.block != b) e = {b, window_->probe(level, b), true};
+    return e.leaf;
+  }
+  [[nodiscard]] bool test(int level, const Cell& c, BlockMask CornerBlock::*mask) {
+    const CornerBlock* b = block(level, c);
+    return b != nullptr && (b->*mask).test(offset_in_block(c));
+  }
+  [[nodiscard]] const Window& window() const { return *window_; }
+
+ private:
+  struct Entry {
+    Block block;
+    const CornerBlock* leaf = nullptr;
+    bool known = false;
+  };
+  const Window* window_;
+  std::array<Entry, 128> entries_{};
 };
 
 }  // namespace lamina

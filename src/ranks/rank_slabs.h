@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/spill_file.h"
-#include "boundary/boundary_finder.h"
+#include "boundary/boundary.h"
 #include "chunks/part_file.h"
 #include "reconstruct/mesh_output.h"
 

@@ -9,7 +9,7 @@
 #include <mutex>
 #include <vector>
 
-#include "boundary/boundary_finder.h"
+#include "boundary/boundary.h"
 #include "boundary/hole_closer.h"
 #include "clustering/clusterer.h"
 #include "isosurface/iso_mesh.h"

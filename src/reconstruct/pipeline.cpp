@@ -9,6 +9,7 @@
 #include "lamina/error.h"
 #include "mls/diffuse.h"
 #include "mls/extension.h"
+#include "octree/mark_samples.h"
 #include "octree/refine.h"
 
 namespace lamina {

@@ -6,7 +6,8 @@
 #include <memory>
 #include <optional>
 
-#include "isosurface/extract.h"
+#include "isosurface/number_edges.h"
+#include "isosurface/triangulate.h"
 #include "levelset/surface_volume.h"
 #include "mls/project.h"
 #include "octree/window.h"

@@ -8,6 +8,7 @@
 
 #include "mls/diffuse.h"
 #include "mls/extension.h"
+#include "octree/mark_samples.h"
 #include "octree/refine.h"
 #include "reconstruct/final_vertices.h"
 #include "reconstruct/stages.h"

@@ -1,5 +1,5 @@
 // Boundary loops of streamed meshes; the truth is the whole mesh in memory.
-#include "boundary/boundary_finder.h"
+#include "boundary/boundary.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "clustering/shape.h"
+#include "clustering/classify.h"
 
 #include <gtest/gtest.h>
 

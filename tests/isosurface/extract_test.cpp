@@ -1,4 +1,5 @@
-#include "isosurface/extract.h"
+#include "isosurface/number_edges.h"
+#include "isosurface/triangulate.h"
 
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>

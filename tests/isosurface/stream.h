@@ -6,7 +6,8 @@
 #include <tuple>
 #include <vector>
 
-#include "isosurface/extract.h"
+#include "isosurface/number_edges.h"
+#include "isosurface/triangulate.h"
 #include "support/mesh_check.h"
 #include "support/octree_window.h"
 

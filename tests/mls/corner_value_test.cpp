@@ -1,4 +1,4 @@
-#include "mls/corner_value.h"
+#include "mls/extension.h"
 
 #include <gtest/gtest.h>
 

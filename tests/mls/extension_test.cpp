@@ -89,6 +89,11 @@ TEST(Extension, SignsAreTheRule) {
                     skipping += level - finer.level > 1 ? 1 : 0;
                     return;
                   }
+                  if (boundary == 0) {  // one rule for signs and values
+                    CornerValue value;
+                    ASSERT_EQ(corner_value(s.window, level, c, value, nullptr), defined);
+                    ASSERT_TRUE(!defined || outside == (value.distance >= 0)) << value.distance;
+                  }
                   const Sign truth = sign_of(values, c, scene.lattice.cell_size(level), boundary);
                   ASSERT_EQ(defined, truth.defined) << "level " << level << " " << c.x << " " << c.y << " " << c.z;
                   if (!truth.edge) {

@@ -150,13 +150,12 @@ TEST(RefitNormals, DoNotDependOnBuckets) {
   }
   std::size_t added = 0;
   for (std::size_t b = 0; b < kBuckets; ++b) {
-    while (added < kBuckets &&
-           bottom(static_cast<int>(added)) <= bottom(static_cast<int>(b) + 1) + refit.offset_from_mean()) {
+    while (added < kBuckets && bottom(static_cast<int>(added)) <= bottom(static_cast<int>(b) + 1) + refit.halo()) {
       refit.add(added, buckets[added], std::vector<float>(buckets[added].size(), radius));
       ++added;
     }
     const UnitNormals n = refit.find(b);
-    refit.forget_below(static_cast<std::int64_t>(bottom(static_cast<int>(b)) - refit.offset_from_mean()) - 1);
+    refit.forget_below(static_cast<std::int64_t>(bottom(static_cast<int>(b)) - refit.halo()) - 1);
     for (std::size_t i = 0; i < numbers[b].size(); ++i) {
       const std::size_t at = numbers[b][i];
       EXPECT_NEAR(n.x[i], whole.x[at], 1e-4);

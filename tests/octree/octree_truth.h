@@ -8,6 +8,7 @@
 #include <set>
 #include <vector>
 
+#include "octree/mark_samples.h"
 #include "octree/refine.h"
 
 namespace lamina::test {

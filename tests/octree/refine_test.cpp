@@ -9,6 +9,7 @@
 #include <numeric>
 #include <random>
 
+#include "octree/mark_samples.h"
 #include "octree/octree_truth.h"
 #include "support/window_contents.h"
 

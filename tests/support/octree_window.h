@@ -125,9 +125,10 @@ class Octree {
       t.leaf->outside.assign(offset, s.distance >= 0);
       t.leaf->defined.assign(offset, s.seen || s.defined);
       t.leaf->supported.assign(offset, s.seen);
-      if (!s.seen) continue;
+      t.leaf->seen.assign(offset, s.seen);
+      if (!t.leaf->defined.test(offset)) continue;
+      // As if extended from elsewhere where it is not seen: the sign and the value are one.
       t.leaf->active.set(offset);
-      t.leaf->seen.set(offset);
       t.leaf->trusted.set(offset);
       samples.push_back(s);
     }

@@ -228,8 +228,7 @@ inline void fit(const Lanes* sums, const FitInput& in, FitOutput& out) {
   const Vec pp = vec(sums[kPP]) * inv;
   const Vec spread = pp - (ax * ax + ay * ay + az * az);
   const Vec co = vec(sums[kPN]) * inv - (mx * ax + my * ay + mz * az);
-  // Where the samples spread less than this (in support^2) no curvature is estimated.
-  const Vec flat = in.sphere ? splat(1e-3F) * support * support : splat(1e30F);
+  const Vec flat = in.sphere ? splat(kFlatSpread) * support * support : splat(1e30F);
   const Vec u4 = spread > flat ? co / (spread > flat ? two * spread : one) : zero;
   const Vec ux = mx - two * u4 * ax;
   const Vec uy = my - two * u4 * ay;
@@ -297,27 +296,31 @@ inline Extension extend(const CornerField& f, int y, int z, float cell, float su
   Vec oz = zero;
   for (int dz = -1; dz <= 1; ++dz) {
     for (int dy = -1; dy <= 1; ++dy) {
-      if (f.any[(z + 1 + dz) * CornerField::kRows + y + 1 + dy] == 0) continue;
-      // Weights of the row's middle and outer corners; nothing is trusted in the field where it is zero.
+      const int row = (z + 1 + dz) * CornerField::kRows + y + 1 + dy;
+      if (f.any[row] == 0) continue;
+      const int at = row * CornerField::kRow + 1;
+      // The sign's sum as for_neighbours() has it; where nothing is trusted the field is zero and adds nothing.
+      const auto add = [&](int dx) {
+        const TangentPlane<Vec> plane{load(&f.distance[at + dx]), load(&f.nx[at + dx]), load(&f.ny[at + dx]),
+                                      load(&f.nz[at + dx])};
+        s += neighbour_weight(dx, dy, dz) * plane.seen_from(dx, dy, dz, cell);
+      };
+      add(-1);
       const int m = (dy != 0) + (dz != 0);
+      if (m != 0) add(0);
+      add(1);
+      // Where the neighbours lie, row by row: weights of the row's middle and outer corners.
       const Vec inner = splat(m == 0 ? 0.0F : 1.0F / static_cast<float>(m * m));
       const Vec outer = splat(1.0F / static_cast<float>((m + 1) * (m + 1)));
-      const int at = (z + 1 + dz) * CornerField::kPlane + (y + 1 + dy) * CornerField::kRow + 1;
       const Triple t = triple(&f.trusted[at]);
-      const Triple d = triple(&f.distance[at]);
       const Triple ax = triple(&f.nx[at]);
       const Triple ay = triple(&f.ny[at]);
       const Triple az = triple(&f.nz[at]);
       const Vec row_t = inner * t.middle + outer * t.sum;
-      const Vec row_y = inner * ay.middle + outer * ay.sum;
-      const Vec row_z = inner * az.middle + outer * az.sum;
-      const Vec along = outer * ax.difference + row_y * static_cast<float>(dy) + row_z * static_cast<float>(dz);
-      // The neighbours' planes at the corner.
-      s += inner * d.middle + outer * d.sum - cell * along;
       w += row_t;
       nx += inner * ax.middle + outer * ax.sum;
-      ny += row_y;
-      nz += row_z;
+      ny += inner * ay.middle + outer * ay.sum;
+      nz += inner * az.middle + outer * az.sum;
       ox += outer * t.difference;
       oy += row_t * static_cast<float>(dy);
       oz += row_t * static_cast<float>(dz);

@@ -1,0 +1,32 @@
+// Isosurface extraction from the window, slab by slab: crack-free on the unconstrained octree (Cuccuru et al. 2009,
+// section 3.5; docs/method.md "Extraction across levels"). First step: isovertices and the corners at their edges'
+// ends.
+#pragma once
+#include <cstdint>
+
+#include "isosurface/iso_mesh.h"
+#include "octree/window.h"
+
+namespace lamina {
+
+/// Isovertices keep this distance from either end of their edge (parts of it), so that they stay distinct points.
+inline constexpr float kEdgeMargin = 0.01F;
+
+/// The projected point of a doubtful corner stays this near to the average of its own samples (cells).
+inline constexpr float kFarthestFromSamples = 0.3F;
+
+/// Calls for consecutive slabs go: number_edges(0), number_edges(1), triangulate(0), separate_fans(0), number_edges(2),
+/// triangulate(1), separate_fans(1), ...; one empty slab beyond the last is numbered too. Slab s - 1 may leave the
+/// window after triangulate(s), and its IsoSlab the hands of the caller after separate_fans(s). Results are the same
+/// for any number of threads; the surface is the same for any height of slabs.
+///
+/// Finds the minimal edges with a sign change whose lower end lies in the slab, numbers those that are valid (both ends
+/// are defined, at least one is supported by samples around it) and the corners at their ends, and fills out.corners,
+/// out.corner_attributes and out.vertices (what `out` held before is gone, its storage used again). The octree up to
+/// this slab, the signs of its corners and of the next one's first plane, and the values of its corners must be final.
+/// `previous` (null before the first slab) is the slab below: its vertical edges that end in this slab are completed
+/// now (`high`, `t`). Order of vertices: level, tile (z, y, x), layer, axis, place in the layer; of corners: level,
+/// tile, layer, place. A corner that several levels hold is listed once, with the finest.
+void number_edges(Window& window, std::int32_t slab, IsoSlab* previous, IsoSlab& out);
+
+}  // namespace lamina

@@ -1,0 +1,136 @@
+#include "octree/mark_samples.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <bit>
+#include <cstring>
+#include <vector>
+
+#include "base/floor_divide.h"
+
+namespace lamina {
+namespace {
+
+/// Threads share words.
+void set_bits(BlockMask& mask, int layer, std::uint64_t bits) {
+  const std::atomic_ref<std::uint64_t> word(mask.words[static_cast<std::size_t>(layer)]);
+  if ((word.load(std::memory_order_relaxed) & bits) != bits) word.fetch_or(bits, std::memory_order_relaxed);
+}
+
+typedef float Four __attribute__((vector_size(16)));             // NOLINT(modernize-use-using): attributes on typedefs
+typedef std::int32_t FourInts __attribute__((vector_size(16)));  // NOLINT(modernize-use-using)
+typedef std::int16_t FourRows __attribute__((vector_size(8)));   // NOLINT(modernize-use-using)
+
+/// Four rows of 16 bits, from the lowest bits up.
+using RowWord = std::uint64_t;
+
+/// Of the 4^3 corners around a cell, from one below its low corner on, those less than `radius` from a point in the
+/// cell (all in cells): rows of x, a word per layer.
+std::array<RowWord, 4> corners_within(const std::array<float, 3>& point, float radius) {
+  const auto squares = [](float at) {
+    const Four d = Four{-1, 0, 1, 2} - at;
+    return d * d;
+  };
+  const Four dx = squares(point[0]);
+  const Four dy = squares(point[1]);
+  const Four dz = squares(point[2]);
+  std::array<RowWord, 4> out;
+  for (int z = 0; z < 4; ++z) {
+    const Four left = (radius * radius - dz[z]) - dy;  // a lane a row
+    FourInts rows{};
+    for (int x = 0; x < 4; ++x) rows |= (left > dx[x] + Four{}) & (1 << x);
+    out[static_cast<std::size_t>(z)] = std::bit_cast<RowWord>(__builtin_convertvector(rows, FourRows));
+  }
+  return out;
+}
+
+/// Marks of one block's samples on their way into the window: without the other blocks' words and without other
+/// threads.
+class BlockMarks {
+ public:
+  void begin(int level, const Block& home) {
+    level_ = level;
+    home_ = home;
+    cells_ = {};
+    corners_ = {};
+  }
+  [[nodiscard]] bool holds(int level, const Block& home) const { return level == level_ && home == home_; }
+
+  void mark_cell(int offset) { cells_[static_cast<std::size_t>(offset >> 6)] |= std::uint64_t{1} << (offset & 63); }
+  /// The corners around a cell of the block, as of corners_within().
+  void mark_corners(int offset, const std::array<RowWord, 4>& layers) {
+    for (int k = 0; k < 4; ++k) {
+      std::uint16_t* const rows =
+          &corners_[static_cast<std::size_t>(((offset >> 6) + k) * kSide + ((offset >> 3) & 7))];
+      RowWord four = 0;
+      std::memcpy(&four, rows, sizeof(four));
+      four |= layers[static_cast<std::size_t>(k)] << (offset & 7);
+      std::memcpy(rows, &four, sizeof(four));
+    }
+  }
+
+  void write_to(Window& window) const {
+    if (level_ < 0) return;
+    CornerBlock& here = window.touch_shared(level_, home_);
+    for (int z = 0; z < 8; ++z) set_bits(here.home, z, cells_[static_cast<std::size_t>(z)]);
+    for (int dz = -1; dz <= 1; ++dz) {
+      for (int dy = -1; dy <= 1; ++dy) {
+        for (int dx = -1; dx <= 1; ++dx) write_to(window, dx, dy, dz);
+      }
+    }
+  }
+
+ private:
+  static constexpr int kSide = 12;  // from one corner below the block to three above its first beyond
+
+  /// The part of the corners that lies in the block (dx, dy, dz) from the samples' own.
+  void write_to(Window& window, int dx, int dy, int dz) const {
+    CornerBlock* to = nullptr;
+    for (int z = std::max(0, -1 - 8 * dz); z < std::min(8, kSide - 1 - 8 * dz); ++z) {
+      std::uint64_t word = 0;
+      for (int y = std::max(0, -1 - 8 * dy); y < std::min(8, kSide - 1 - 8 * dy); ++y) {
+        const unsigned row = corners_[static_cast<std::size_t>((z + 8 * dz + 1) * kSide + y + 8 * dy + 1)];
+        word |= std::uint64_t{(dx < 0 ? row << 7 : row >> (8 * dx + 1)) & 0xFFU} << (8 * y);
+      }
+      if (word == 0) continue;
+      if (to == nullptr) to = &window.touch_shared(level_, {home_.x + dx, home_.y + dy, home_.z + dz});
+      set_bits(to->acted_on, z, word);
+    }
+  }
+
+  int level_ = -1;
+  Block home_;
+  std::array<std::uint64_t, 8> cells_{};
+  /// [z + 1][y + 1], bit x + 1; four rows are marked at once.
+  std::array<std::uint16_t, kSide * kSide> corners_{};
+};
+
+}  // namespace
+
+void mark_samples(Window& window, std::span<const Mark> marks) {
+  std::vector<FloorDivider> cells;  // by level
+  cells.reserve(static_cast<std::size_t>(window.levels()));
+  for (int level = 0; level < window.levels(); ++level) cells.emplace_back(window.lattice().cell_size(level));
+  BlockMarks block;
+  for (const Mark& m : marks) {
+    const std::int32_t a = window.lattice().cell_size(m.level);
+    const FloorDivider& cell_of = cells[m.level];
+    const Cell cell{cell_of(m.x), cell_of(m.y), cell_of(m.z)};
+    if (!block.holds(m.level, block_of(cell))) {
+      block.write_to(window);
+      block.begin(m.level, block_of(cell));
+    }
+    const float inv = 1.0F / static_cast<float>(a);
+    const auto inside = [inv, a](std::int32_t v, std::int32_t low) {
+      return static_cast<float>(std::int64_t{v} - std::int64_t{low} * a) * inv;
+    };
+    block.mark_cell(offset_in_block(cell));
+    block.mark_corners(
+        offset_in_block(cell),
+        corners_within({inside(m.x, cell.x), inside(m.y, cell.y), inside(m.z, cell.z)}, m.active_radius * inv));
+  }
+  block.write_to(window);
+}
+
+}  // namespace lamina
