@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "lattice/bits.h"
+#include "lattice/morphology.h"
 #include "octree/window.h"
 
 namespace lamina {

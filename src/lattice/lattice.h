@@ -1,4 +1,5 @@
-// Integer geometry of the multi-level lattice: levels, cells, corners, slabs (METHOD 3.4; DESIGN "Lattice and levels").
+// Integer geometry of the multi-level lattice: levels, cells, corners, slabs, and where a cloud lies on it (Cuccuru et
+// al. 2009, section 3.4).
 #pragma once
 #include <array>
 #include <cstdint>
@@ -38,6 +39,16 @@ struct Lattice {
     const std::int32_t a = cell_size(level);
     return {c.x * a, c.y * a, c.z * a};
   }
+};
+
+/// Cross-section of the cloud in fixed-point steps, inclusive.
+struct Bounds {
+  std::int32_t x_min = 0, x_max = -1, y_min = 0, y_max = -1;
+};
+
+/// Where the samples lie, fixed-point, inclusive.
+struct Extent : Bounds {
+  std::int32_t z_min = 0, z_max = -1;
 };
 
 }  // namespace lamina

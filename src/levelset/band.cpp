@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "lattice/bits.h"
+#include "lattice/morphology.h"
 #include "mls/extension.h"
 #include "octree/window.h"
 
@@ -25,11 +25,14 @@ float channel_of(const CornerValue& v, const std::vector<float>& attributes, int
 
 }  // namespace
 
-/// A value from another level.
+/// Values from another level, those of the channels one voxel after the other.
 struct Band::Found {
-  Cell at;
-  float distance = 0;
-  std::array<float, 3> normal{};
+  struct Voxel {
+    Cell at;
+    float distance = 0;
+    std::array<float, 3> normal{};
+  };
+  std::vector<Voxel> voxels;
   std::vector<float> extra;
 };
 
@@ -99,15 +102,19 @@ void Band::collect_level(const Window& window, std::int32_t slab) {
   });
 }
 
-void Band::put(const Found& f) {
-  Brick& brick = bricks_.touch(block_of(f.at));
-  const int at = offset_in_block(f.at);
-  if (brick.known[0].test(at)) return;
-  brick.plane[at] = Plane{f.normal[0], f.normal[1], f.normal[2], f.distance};
-  LayerMasks masks(0, growth_of(settings_));
-  masks.add(at & 63, brick.plane[at]);
-  brick.know(at >> 6, masks);
-  for (std::size_t c = 0; c < f.extra.size(); ++c) brick.extra[c * 512 + at] = f.extra[c];
+void Band::put(const Found& found) {
+  const std::size_t channels = settings_.channels.size();
+  for (std::size_t i = 0; i < found.voxels.size(); ++i) {
+    const Found::Voxel& f = found.voxels[i];
+    Brick& brick = bricks_.touch(block_of(f.at));
+    const int at = offset_in_block(f.at);
+    if (brick.known[0].test(at)) continue;
+    brick.plane[at] = Plane{f.normal[0], f.normal[1], f.normal[2], f.distance};
+    LayerMasks masks(0, growth_of(settings_));
+    masks.add(at & 63, brick.plane[at]);
+    brick.know(at >> 6, masks);
+    for (std::size_t c = 0; c < channels; ++c) brick.extra[c * 512 + at] = found.extra[i * channels + c];
+  }
 }
 
 /// Where cells are finer, some of their corners are voxels.
@@ -115,7 +122,7 @@ void Band::collect_finer(const Window& window, std::int32_t slab, int level) {
   const int shift = settings_.level - level;
   const std::int32_t mask = (1 << shift) - 1;
   const auto tiles = window.tiles(level, slab);
-  std::vector<std::vector<Found>> found(tiles.size());
+  std::vector<Found> found(tiles.size());
   const float per_voxel = 1.0F / static_cast<float>(lattice_.cell_size(settings_.level));
   const auto limit = static_cast<float>(settings_.band) + kBeyond;
   tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
@@ -130,90 +137,130 @@ void Band::collect_finer(const Window& window, std::int32_t slab, int level) {
         if (((corner.x | corner.y) & mask) != 0) continue;
         CornerValue v;
         if (!corner_value(window, level, corner, v, attributes.data()) || !v.has_normal()) continue;
-        Found f{{corner.x >> shift, corner.y >> shift, corner.z >> shift}, v.distance * per_voxel, v.normal, {}};
-        if (!(std::abs(f.distance) < limit)) continue;
-        for (const int c : settings_.channels) f.extra.push_back(channel_of(v, attributes, c));
-        found[i].push_back(std::move(f));
+        const float distance = v.distance * per_voxel;
+        if (!(std::abs(distance) < limit)) continue;
+        found[i].voxels.push_back({{corner.x >> shift, corner.y >> shift, corner.z >> shift}, distance, v.normal});
+        for (const int c : settings_.channels) found[i].extra.push_back(channel_of(v, attributes, c));
       }
     }
   });
-  for (const auto& list : found)
-    for (const Found& f : list) put(f);
+  for (const Found& f : found) put(f);
 }
+
+/// A cell of a coarser level, and what its corners say about the voxels inside.
+class Band::CoarseCell {
+ public:
+  CoarseCell(const Band& band, const Window& window, int level)
+      : settings_(band.settings_),
+        window_(window),
+        level_(level),
+        shift_(level - settings_.level),
+        per_voxel_(1.0F / static_cast<float>(band.lattice_.cell_size(settings_.level))),
+        limit_(static_cast<float>(settings_.band) + kBeyond),
+        cache_(window),
+        attributes_(static_cast<std::size_t>(window.attributes())),
+        extra_(8 * settings_.channels.size()) {}
+
+  /// Adds the voxels of the cell that lie in the band, or next to it.
+  void interpolate(const Cell& cell, Found& out) {
+    if (!read_corners(cell)) return;
+    const int side = 1 << shift_;
+    for (int v = 0; v < side * side * side; ++v)
+      add_voxel(cell, {v & (side - 1), v >> shift_ & (side - 1), v >> (2 * shift_)}, out);
+  }
+
+ private:
+  /// Whether the surface crosses the cell, or lies near enough for its voxels to be in the band.
+  bool read_corners(const Cell& cell) {
+    // The surface crosses a cell only between defined corners; far from it none is trusted.
+    int trusted = 0;
+    for (int k = 0; k < 8; ++k)
+      trusted += cache_.test(level_, cell + Cell{k & 1, k >> 1 & 1, k >> 2}, &CornerBlock::trusted);
+    if (trusted == 0) return false;
+    has_ = {};
+    defined_ = 0;
+    const float farthest = limit_ + 1.75F * static_cast<float>(1 << shift_);  // no voxel of the cell lies in the band
+    float nearest = farthest;
+    const std::size_t channels = settings_.channels.size();
+    for (std::size_t k = 0; k < 8; ++k) {
+      const auto corner = static_cast<int>(k);
+      has_[k] = corner_value(window_, level_, cell + Cell{corner & 1, corner >> 1 & 1, corner >> 2}, corners_[k],
+                             attributes_.data()) &&
+                corners_[k].has_normal();
+      if (!has_[k]) continue;
+      nearest = std::min(nearest, std::abs(corners_[k].distance) * per_voxel_);
+      if (nearest >= farthest) return false;
+      ++defined_;
+      for (std::size_t c = 0; c < channels; ++c)
+        extra_[k * channels + c] = channel_of(corners_[k], attributes_, settings_.channels[c]);
+    }
+    return defined_ >= 4;
+  }
+
+  void add_voxel(const Cell& cell, const std::array<int, 3>& in, Found& out) const {
+    const auto side = static_cast<float>(1 << shift_);
+    const std::size_t channels = settings_.channels.size(), first = out.extra.size();
+    Found::Voxel f{{(cell.x << shift_) + in[0], (cell.y << shift_) + in[1], (cell.z << shift_) + in[2]}};
+    out.extra.resize(first + channels, 0);
+    float* const extra = out.extra.data() + first;
+    float total = 0, values = 0, planes = 0;
+    for (std::size_t k = 0; k < 8; ++k) {
+      if (!has_[k]) continue;
+      const CornerValue& corner = corners_[k];
+      float weight = 1, plane = corner.distance * per_voxel_;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const auto x = static_cast<float>(in[a]);
+        const float at_corner = (k >> a & 1) != 0 ? side : 0.0F;
+        weight *= 1 - std::abs(x - at_corner) / side;
+        plane += corner.normal[a] * (x - at_corner);
+      }
+      total += weight;
+      values += weight * corner.distance * per_voxel_;
+      planes += weight * plane;
+      for (std::size_t a = 0; a < 3; ++a) f.normal[a] += weight * corner.normal[a];
+      for (std::size_t c = 0; c < channels; ++c) extra[c] += weight * extra_[k * channels + c];
+    }
+    // Values between corners lie outside of a curved surface's distance by as much as the corners' planes lie
+    // inside; corners without a value have no say in either, which only the planes can bear.
+    f.distance = (defined_ == 8 ? 0.5F * (values + planes) : planes) / total;
+    const float length = std::hypot(f.normal[0], f.normal[1], f.normal[2]);
+    if (!(total > 0) || !(length > 1e-3F) || !(std::abs(f.distance) < limit_)) {
+      out.extra.resize(first);
+      return;
+    }
+    for (std::size_t c = 0; c < channels; ++c) extra[c] /= total;
+    for (float& n : f.normal) n /= length;
+    out.voxels.push_back(f);
+  }
+
+  const BandSettings& settings_;
+  const Window& window_;
+  int level_, shift_;
+  float per_voxel_, limit_;  ///< voxels per step; distances beyond are of no use
+  BlockCache cache_;
+  std::vector<float> attributes_;
+  std::array<bool, 8> has_{};  ///< a value
+  int defined_ = 0;            ///< how many have
+  std::array<CornerValue, 8> corners_;
+  std::vector<float> extra_;  ///< the channels of corner after corner
+};
 
 /// Where cells are coarser, voxels inside them are interpolated between their corners.
 void Band::collect_coarser(const Window& window, std::int32_t slab, int level) {
-  const int shift = level - settings_.level, side = 1 << shift;
   const auto tiles = window.tiles(level, slab);
-  std::vector<std::vector<Found>> found(tiles.size());
-  const float per_voxel = 1.0F / static_cast<float>(lattice_.cell_size(settings_.level));
-  const auto limit = static_cast<float>(settings_.band) + kBeyond;
-  const float farthest = limit + 1.75F * static_cast<float>(side);  // no voxel of the cell lies in the band
-  const std::size_t channels = settings_.channels.size();
+  std::vector<Found> found(tiles.size());
   tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
     const Tile& t = tiles[i];
     const std::int32_t first = lattice_.first_layer(level, slab) - t.block.z * 8;
-    std::vector<float> attributes(static_cast<std::size_t>(window.attributes()));
-    BlockCache cache(window);
-    std::array<CornerValue, 8> corners;
-    std::array<std::vector<float>, 8> extras;
+    CoarseCell coarse(*this, window, level);
     for (int z = std::max(first, 0); z < std::min(8, first + lattice_.layers(level)); ++z) {
       for (std::uint64_t w = t.leaf->cells.words[z]; w != 0; w &= w - 1) {
         const int bit = std::countr_zero(w);
-        const Cell cell{t.block.x * 8 + (bit & 7), t.block.y * 8 + (bit >> 3), t.block.z * 8 + z};
-        // The surface crosses a cell only between defined corners; far from it none is trusted.
-        int trusted = 0, defined = 0;
-        for (int k = 0; k < 8; ++k)
-          trusted += cache.test(level, cell + Cell{k & 1, k >> 1 & 1, k >> 2}, &CornerBlock::trusted);
-        if (trusted == 0) continue;
-        std::array<bool, 8> has{};
-        float nearest = farthest;
-        for (int k = 0; k < 8; ++k) {
-          const Cell corner = cell + Cell{k & 1, k >> 1 & 1, k >> 2};
-          has[k] = corner_value(window, level, corner, corners[k], attributes.data()) && corners[k].has_normal();
-          if (!has[k]) continue;
-          nearest = std::min(nearest, std::abs(corners[k].distance) * per_voxel);
-          if (nearest >= farthest) break;
-          ++defined;
-          extras[k].clear();
-          for (const int c : settings_.channels) extras[k].push_back(channel_of(corners[k], attributes, c));
-        }
-        if (defined < 4 || nearest >= farthest) continue;
-        for (int v = 0; v < side * side * side; ++v) {
-          const std::array<int, 3> in{v & (side - 1), v >> shift & (side - 1), v >> (2 * shift)};
-          Found f{{(cell.x << shift) + in[0], (cell.y << shift) + in[1], (cell.z << shift) + in[2]}, 0, {}, {}};
-          f.extra.assign(channels, 0);
-          float total = 0, values = 0, planes = 0;
-          for (int k = 0; k < 8; ++k) {
-            if (!has[k]) continue;
-            float weight = 1, plane = corners[k].distance * per_voxel;
-            for (int a = 0; a < 3; ++a) {
-              const auto x = static_cast<float>(in[a]);
-              const float at_corner = (k >> a & 1) != 0 ? static_cast<float>(side) : 0.0F;
-              weight *= 1 - std::abs(x - at_corner) / static_cast<float>(side);
-              plane += corners[k].normal[a] * (x - at_corner);
-            }
-            total += weight;
-            values += weight * corners[k].distance * per_voxel;
-            planes += weight * plane;
-            for (std::size_t a = 0; a < 3; ++a) f.normal[a] += weight * corners[k].normal[a];
-            for (std::size_t c = 0; c < channels; ++c) f.extra[c] += weight * extras[k][c];
-          }
-          if (!(total > 0)) continue;
-          // Values between corners lie outside of a curved surface's distance by as much as the corners' planes lie
-          // inside; corners without a value have no say in either, which only the planes can bear.
-          f.distance = (defined == 8 ? 0.5F * (values + planes) : planes) / total;
-          for (float& e : f.extra) e /= total;
-          const float length = std::hypot(f.normal[0], f.normal[1], f.normal[2]);
-          if (!(length > 1e-3F) || !(std::abs(f.distance) < limit)) continue;
-          for (float& n : f.normal) n /= length;
-          found[i].push_back(std::move(f));
-        }
+        coarse.interpolate({t.block.x * 8 + (bit & 7), t.block.y * 8 + (bit >> 3), t.block.z * 8 + z}, found[i]);
       }
     }
   });
-  for (const auto& list : found)
-    for (const Found& f : list) put(f);
+  for (const Found& f : found) put(f);
 }
 
 /// Bricks for what grows out of those that have voxels in the planes.
@@ -221,8 +268,7 @@ void Band::make_room(std::int32_t begin, std::int32_t end) {
   const int r = settings_.rounds;
   if (r == 0) return;
   const std::uint64_t low_x = bits::columns_below(r), high_x = ~bits::columns_below(8 - r);
-  const std::uint64_t low_y = r >= 8 ? ~std::uint64_t{0} : (std::uint64_t{1} << (8 * r)) - 1;
-  const std::uint64_t high_y = r >= 8 ? ~std::uint64_t{0} : ~((std::uint64_t{1} << (8 * (8 - r))) - 1);
+  const std::uint64_t low_y = bits::rows_below(r), high_y = ~bits::rows_below(8 - r);
   std::vector<Block> wanted;
   for (std::int32_t bz = begin >> 3; bz <= (end - 1) >> 3; ++bz) {
     bricks_.for_each(bz, [&](const Brick& brick) {

@@ -41,6 +41,7 @@ class Band {
 
  private:
   struct Found;
+  class CoarseCell;
   void collect_level(const Window& window, std::int32_t slab);
   void collect_finer(const Window& window, std::int32_t slab, int level);
   void collect_coarser(const Window& window, std::int32_t slab, int level);

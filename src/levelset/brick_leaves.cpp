@@ -9,12 +9,40 @@
 
 #include "lamina/error.h"
 #include "lamina/volume_export.h"
-#include "lattice/mask_axes.h"
-#include "levelset/brick_sides.h"
-#include "vdb/full_range.h"
-#include "vdb/pack_leaf.h"
+#include "lattice/morphology.h"
+#include "vdb/vdb_file.h"
 
 namespace lamina::volume {
+
+GridFrame::GridFrame(const Frame& frame, const Lattice& lattice, int level)
+    : voxel(frame.step * lattice.cell_size(level)) {
+  // OpenVDB takes a smaller voxel for a singular transform.
+  constexpr double kSmallest = 1.5e-5;
+  if (voxel < kSmallest) {
+    throw Error(ExitCode::usage, fmt::format("--vdb: a voxel of {:.3g} is smaller than OpenVDB holds ({:g}); give the "
+                                             "points in smaller units (millimetres, not metres), or --vdb-voxelsize",
+                                             voxel, kSmallest));
+  }
+  bool permuted = true;
+  for (int k = 0; k < 3; ++k) {
+    int largest = 0;
+    permuted = permuted && frame.rotation.row(k).maxCoeff(&largest) == 1;
+    axis_of[static_cast<std::size_t>(k)] = largest;
+  }
+  const openvdb::Vec3d origin(frame.origin[0], frame.origin[1], frame.origin[2]);
+  if (permuted) {
+    transform = openvdb::math::Transform::createLinearTransform(voxel);
+    transform->postTranslate(origin);
+    return;
+  }
+  axis_of = {0, 1, 2};
+  openvdb::Mat4d m = openvdb::Mat4d::identity();
+  for (int k = 0; k < 3; ++k)
+    for (int a = 0; a < 3; ++a) m(k, a) = voxel * frame.rotation(k, a);  // OpenVDB multiplies row vectors from the left
+  m.setTranslation(origin);
+  transform = openvdb::math::Transform::createLinearTransform(m);
+}
+
 std::vector<ExtraGrid> resolve_grids(const std::vector<std::string>& names, const AttributeLayout& layout, double step,
                                      std::vector<int>& channels) {
   const auto red = find_attribute(layout, "red"), green = find_attribute(layout, "green"),
@@ -56,14 +84,14 @@ std::vector<ExtraGrid> resolve_grids(const std::vector<std::string>& names, cons
   return out;
 }
 
-LeafMaker::LeafMaker(const Band& b, const GridFrame& g, const std::vector<ExtraGrid>& e, const Eigen::Matrix3d& r,
-                     bool h)
-    : band(b), grid(g), extras(e), rotation(r), half(h) {
+LeafMaker::LeafMaker(const Band& band, const GridFrame& grid, const std::vector<ExtraGrid>& extras,
+                     const Eigen::Matrix3d& rotation, bool as_half)
+    : band_(band), grid_(grid), extras_(extras), rotation_(rotation), half_(as_half) {
   // OpenVDB's z is the fastest.
-  for (std::size_t k = 0; k < 3; ++k) axes[k] = 2 - grid.axis_of[k];
+  for (std::size_t k = 0; k < 3; ++k) axes_[k] = 2 - grid.axis_of[k];
   for (int at = 0; at < 512; ++at) {
-    const int there = (at & 7) << (3 * axes[0]) | (at >> 3 & 7) << (3 * axes[1]) | (at >> 6) << (3 * axes[2]);
-    voxel_at[static_cast<std::size_t>(there)] = static_cast<std::uint16_t>(at);
+    const int there = (at & 7) << (3 * axes_[0]) | (at >> 3 & 7) << (3 * axes_[1]) | (at >> 6) << (3 * axes_[2]);
+    voxel_at_[static_cast<std::size_t>(there)] = static_cast<std::uint16_t>(at);
   }
 }
 
@@ -71,56 +99,60 @@ void LeafMaker::operator()(const Brick& brick, BrickLeaves& out) const {
   out.any = false;
   if (!brick.active.any()) return;
   out.any = true;
-  out.leaves.resize(1 + extras.size());
-  LeafMasks masks{with_axes(brick.active, axes), with_axes(inside_of(brick.negative, band.all(brick)), axes)};
-  // The active voxels of the brick in the leaf's order.
-  std::array<std::uint16_t, 512> order;
+  out.leaves.resize(1 + extras_.size());
+  LeafMasks masks{with_axes(brick.active, axes_), with_axes(bits::fill_sides(brick.negative, band_.all(brick)), axes_)};
+  std::array<std::uint16_t, 512> voxels;
   std::size_t count = 0;
   for (int x = 0; x < 8; ++x) {
     for (std::uint64_t w = masks.active.words[x]; w != 0; w &= w - 1) {
-      order[count] = voxel_at[x * 64 + std::countr_zero(w)];
-      __builtin_prefetch(&brick.plane[order[count++]]);
+      voxels[count] = voxel_at_[x * 64 + std::countr_zero(w)];
+      __builtin_prefetch(&brick.plane[voxels[count++]]);
     }
   }
+  const Order order{voxels.data(), count};
 
-  const openvdb::Coord origin = grid.index({brick.block.x * 8, brick.block.y * 8, brick.block.z * 8});
+  const openvdb::Coord origin = grid_.index({brick.block.x * 8, brick.block.y * 8, brick.block.z * 8});
   std::array<float, 3 * 512> values;
   const std::span<const float> scalars{values.data(), count}, vectors{values.data(), 3 * count};
-  const auto voxel = static_cast<float>(grid.voxel);
+  const auto voxel = static_cast<float>(grid_.voxel);
   for (std::size_t i = 0; i < count; ++i) values[i] = brick.distance(order[i]) * voxel;
-  pack(origin, masks, scalars, 1, half, out.leaves[0]);
+  pack(origin, masks, scalars, 1, half_, out.leaves[0]);
   out.leaves[0].faces = face_votes(masks.active, masks.inside);
 
   masks.inside = {};
-  for (std::size_t e = 0; e < extras.size(); ++e) {
-    const ExtraGrid& extra = extras[e];
-    PackedLeaf& leaf = out.leaves[1 + e];
-    const auto value = [&](std::size_t k, int at) {
-      return extra.scale *
-             brick.extra[static_cast<std::size_t>(extra.channels[k]) * 512 + static_cast<std::size_t>(at)];
-    };
+  for (std::size_t e = 0; e < extras_.size(); ++e) {
+    const ExtraGrid& extra = extras_[e];
     if (extra.kind == ExtraGrid::Kind::scalar || extra.kind == ExtraGrid::Kind::weight) {
-      const bool weight = extra.kind == ExtraGrid::Kind::weight;
-      for (std::size_t i = 0; i < count; ++i) {
-        // Extended beyond what was projected nothing speaks for a voxel but its neighbours.
-        const float own = brick.known[0].test(order[i]) ? std::max(0.0F, 1 - value(0, order[i])) : 0.0F;
-        values[i] = weight ? own : value(0, order[i]);
-      }
-      pack(origin, masks, scalars, 1, half, leaf);
-      continue;
+      fill_scalars(brick, extra, order, values.data());
+      pack(origin, masks, scalars, 1, half_, out.leaves[1 + e]);
+    } else {
+      fill_vectors(brick, extra, order, values.data());
+      pack(origin, masks, vectors, 3, half_, out.leaves[1 + e]);
     }
-    for (std::size_t i = 0; i < count; ++i) {
-      const int at = order[i];
-      float* const v = &values[3 * i];
-      if (extra.kind == ExtraGrid::Kind::vector) {
-        for (std::size_t k = 0; k < 3; ++k) v[k] = value(k, at);
-      } else {
-        const Plane& plane = brick.plane[static_cast<std::size_t>(at)];
-        const Eigen::Vector3d n = rotation.transpose() * Eigen::Vector3d(plane[0], plane[1], plane[2]);
-        for (int k = 0; k < 3; ++k) v[k] = static_cast<float>(n[k]);
-      }
+  }
+}
+
+void LeafMaker::fill_scalars(const Brick& brick, const ExtraGrid& extra, Order order, float* values) const {
+  const float* const channel = &brick.extra[static_cast<std::size_t>(extra.channels[0]) * 512];
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const float value = extra.scale * channel[order[i]];
+    // Extended beyond what was projected nothing speaks for a voxel but its neighbours.
+    const float own = brick.known[0].test(order[i]) ? std::max(0.0F, 1 - value) : 0.0F;
+    values[i] = extra.kind == ExtraGrid::Kind::weight ? own : value;
+  }
+}
+
+void LeafMaker::fill_vectors(const Brick& brick, const ExtraGrid& extra, Order order, float* values) const {
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    float* const v = &values[3 * i];
+    if (extra.kind == ExtraGrid::Kind::vector) {
+      for (std::size_t k = 0; k < 3; ++k)
+        v[k] = extra.scale * brick.extra[static_cast<std::size_t>(extra.channels[k]) * 512 + order[i]];
+    } else {
+      const Plane& plane = brick.plane[order[i]];
+      const Eigen::Vector3d n = rotation_.transpose() * Eigen::Vector3d(plane[0], plane[1], plane[2]);
+      for (int k = 0; k < 3; ++k) v[k] = static_cast<float>(n[k]);
     }
-    pack(origin, masks, vectors, 3, half, leaf);
   }
 }
 

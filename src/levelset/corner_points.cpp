@@ -3,8 +3,6 @@
 #include <utility>
 
 #include "vdb/points_grid.h"
-#include "vdb/sequence.h"
-#include "vdb/vdb_bytes.h"
 #include "vdb/vdb_file.h"
 
 namespace lamina::volume {
@@ -44,8 +42,7 @@ void CornerPoints::add(const IsoSlab& slab) {
 }
 
 void CornerPoints::write_file() {
-  const double voxel = point_voxel(points_.samples, 0);
-  const auto grid = point_grid(points_, point_columns(points_), point_transform(points_, voxel));
+  const auto grid = point_grid(points_);
   label(*grid, "points", false);
   if (shift_) note_shift(*grid, *shift_);
   const std::string bytes = vdb_bytes({grid});

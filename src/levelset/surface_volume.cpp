@@ -9,12 +9,12 @@
 #include <cmath>
 #include <span>
 
-#include "lamina/file_ending.h"
 #include "lamina/error.h"
+#include "lamina/file_ending.h"
 #include "lamina/volume_points.h"
 #include "levelset/brick_leaves.h"
 #include "levelset/corner_points.h"
-#include "vdb/sequence.h"
+#include "vdb/streamed_vdb.h"
 #include "vdb/vdb_file.h"
 
 namespace lamina {

@@ -8,7 +8,7 @@
 #include <bit>
 #include <cmath>
 
-#include "lattice/bits.h"
+#include "lattice/morphology.h"
 
 namespace lamina {
 namespace {

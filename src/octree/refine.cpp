@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "lattice/bits.h"
+#include "lattice/morphology.h"
 #include "octree/window.h"
 
 namespace lamina {

@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "lattice/extent.h"
 #include "lattice/lattice.h"
 #include "octree/corner_block.h"
 

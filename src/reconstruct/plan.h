@@ -9,7 +9,6 @@
 
 #include "boundary/hole_closer.h"
 #include "lamina/surface.h"
-#include "lattice/extent.h"
 #include "lattice/lattice.h"
 #include "meshes/mesh_sink.h"
 #include "mls/project.h"

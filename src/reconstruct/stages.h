@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <string>
 
-#include "lattice/extent.h"
 #include "lattice/lattice.h"
 
 namespace lamina {

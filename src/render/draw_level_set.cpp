@@ -9,7 +9,7 @@
 #include "render/shade.h"
 #include "vdb/grids.h"
 #include "vdb/vdb_file.h"
-#include "volume/level_set_data.h"
+#include "volume/level_set.h"
 
 namespace lamina::render_detail {
 namespace {

@@ -9,7 +9,7 @@
 #include "lamina/frame.h"
 #include "lamina/points.h"
 #include "lamina/run.h"
-#include "lattice/extent.h"
+#include "lattice/lattice.h"
 #include "store/input_survey.h"
 #include "store/slab_store.h"
 

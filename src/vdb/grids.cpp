@@ -1,6 +1,6 @@
 #include "vdb/grids.h"
 
-#include "vdb/point_grids.h"
+#include "vdb/points_grid.h"
 
 namespace openvdb {
 OPENVDB_USE_VERSION_NAMESPACE

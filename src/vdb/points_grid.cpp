@@ -5,14 +5,18 @@
 #include <tbb/parallel_sort.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <numeric>
 #include <set>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "base/run.h"
 #include "base/scalar_type.h"
 #include "lamina/error.h"
-#include "vdb/full_range.h"
+#include "vdb/vdb_file.h"
 
 namespace lamina::volume {
 namespace {
@@ -23,6 +27,16 @@ using points::AttributeWriteHandle;
 using points::PointDataGrid;
 using points::PointDataTree;
 using points::TypedAttributeArray;
+
+/// One array of the points grid, and the arrays of the cloud it is made of.
+struct PointColumn {
+  enum class Kind : std::uint8_t { float32, int32, vector };
+  std::string name;
+  Kind kind = Kind::float32;
+  std::array<const float*, 3> from{};  ///< one for scalars
+  float scale = 1;
+  std::string types;  ///< of the attributes it came from, for the way back
+};
 
 bool is_real(ScalarType type) {
   return type == ScalarType::float32 || type == ScalarType::float64;
@@ -113,8 +127,7 @@ NamePair type_of(PointColumn::Kind kind) {
   return TypedAttributeArray<float>::attributeType();
 }
 
-}  // namespace
-
+/// What the arrays become; P is not among them. Throws Error(usage) for a name given twice.
 std::vector<PointColumn> point_columns(const PointArrays& points) {
   using Kind = PointColumn::Kind;
   const SampleBatch& s = points.samples;
@@ -153,6 +166,8 @@ std::vector<PointColumn> point_columns(const PointArrays& points) {
   return columns;
 }
 
+/// The voxel's edge: a power of two, so that floats stay what they are; with `wanted` 0 some eight points a voxel were
+/// they spread over a surface.
 double point_voxel(const SampleBatch& s, double wanted) {
   // OpenVDB takes smaller voxels for a singular transform.
   constexpr double kSmallest = 0x1p-16;
@@ -167,17 +182,18 @@ double point_voxel(const SampleBatch& s, double wanted) {
   return std::max(kSmallest, std::exp2(std::round(std::log2(edge) - 0.5)));
 }
 
+/// A transform of a power-of-two voxel, offset by whole voxels where the numbers of voxels would not fit.
 math::Transform::Ptr point_transform(const PointArrays& points, double voxel) {
   // Voxels are counted from the origin as long as their numbers stay well inside an int.
   constexpr double kLargest = 1 << 29;
   const SampleBatch& s = points.samples;
-  double reach = 0;
+  double farthest = 0;
   Vec3d offset(0.0);
   const std::array<const std::vector<double>*, 3> axes{&s.x, &s.y, &s.z};
   for (int k = 0; k < 3; ++k) {
     const auto [low, high] =
         std::minmax_element(axes[static_cast<std::size_t>(k)]->begin(), axes[static_cast<std::size_t>(k)]->end());
-    reach = std::max({reach, -*low / voxel, *high / voxel});
+    farthest = std::max({farthest, -*low / voxel, *high / voxel});
     offset[k] = voxel * std::round((*low + 0.5 * (*high - *low)) / voxel);
     if ((*high - *low) / voxel > kLargest) {
       throw Error(ExitCode::usage,
@@ -185,22 +201,76 @@ math::Transform::Ptr point_transform(const PointArrays& points, double voxel) {
     }
   }
   auto transform = math::Transform::createLinearTransform(voxel);
-  if (reach > kLargest) transform->postTranslate(offset);
+  if (farthest > kLargest) transform->postTranslate(offset);
   return transform;
 }
 
-PointDataGrid::Ptr point_grid(const PointArrays& points, const std::vector<PointColumn>& columns,
-                              const math::Transform::Ptr& transform, std::uint64_t most_bytes) {
+/// What the leaves are filled from.
+struct PointSourceArrays {
+  const PointArrays& points;
+  const math::Transform& transform;
+  std::vector<PointColumn> columns;
+  AttributeSet::Descriptor::Ptr descriptor;  ///< of P and the columns
+};
+
+/// Points in the order of their places, attribute by attribute, and where each voxel's points end.
+void fill_leaf(const PointSourceArrays& from, std::span<const Place> places, PointDataTree::LeafNodeType& leaf) {
   using Leaf = PointDataTree::LeafNodeType;
+  const auto count = static_cast<Index>(places.size());
+  leaf.replaceAttributeSet(new AttributeSet(from.descriptor, count), /*allowMismatchingDescriptors=*/true);
+  std::vector<Leaf::ValueType> offsets(Leaf::SIZE);
+  for (Index v = 0, i = 0; v < Leaf::SIZE; ++v) {
+    while (i < count && places[i].voxel == v) ++i;
+    offsets[v] = i;
+  }
+  leaf.setOffsets(offsets);
+  AttributeWriteHandle<Vec3s> position(leaf.attributeArray(0));
+  for (Index i = 0; i < count; ++i) {
+    const Vec3d inside =
+        index_of(from.points, from.transform, places[i].row) - leaf.offsetToGlobalCoord(places[i].voxel).asVec3d();
+    position.set(i, Vec3s(inside));
+  }
+  for (std::size_t c = 0; c < from.columns.size(); ++c)
+    fill_column(leaf.attributeArray(c + 1), from.columns[c], places.data(), count);
+}
+
+[[noreturn]] void wrong_points(const std::string& message) {
+  throw Error(ExitCode::usage, message);
+}
+
+void require_sound(const PointArrays& points, const PointVolumeSettings& settings) {
+  const SampleBatch& s = points.samples;
+  if (settings.name.empty()) wrong_points("--name must be a word");
+  if (!(settings.voxel >= 0 && std::isfinite(settings.voxel)))
+    wrong_points("--voxelsize must be a positive length, or 0");
+  if (s.size() == 0) throw Error(ExitCode::empty, "there are no points to write");
+  bool equal = s.y.size() == s.size() && s.z.size() == s.size() && s.attributes.size() == points.layout.size() &&
+               s.ny.size() == s.nx.size() && s.nz.size() == s.nx.size();
+  for (const auto* a : {&s.nx, &s.radius, &s.quality}) equal = equal && (a->empty() || a->size() == s.size());
+  for (const auto& a : s.attributes) equal = equal && a.size() == s.size();
+  if (!equal) wrong_points("the points' arrays differ in length");
+  for (std::size_t i = 0; i < s.size(); ++i) {
+    if (std::isfinite(s.x[i]) && std::isfinite(s.y[i]) && std::isfinite(s.z[i])) continue;
+    throw Error(ExitCode::unreadable,
+                fmt::format("row {} (counted from 0) has a coordinate that is not finite; remove it first", i));
+  }
+}
+
+}  // namespace
+
+PointDataGrid::Ptr point_grid(const PointArrays& points, double voxel, std::uint64_t most_bytes) {
+  std::vector<PointColumn> columns = point_columns(points);
+  const math::Transform::Ptr transform = point_transform(points, point_voxel(points.samples, voxel));
   AttributeSet::Descriptor::Ptr descriptor =
       AttributeSet::Descriptor::create(TypedAttributeArray<Vec3s>::attributeType());
   for (const PointColumn& c : columns) descriptor = descriptor->duplicateAppend(c.name, type_of(c.kind));
+  const PointSourceArrays from{points, *transform, std::move(columns), std::move(descriptor)};
 
   const std::vector<Place> places = sorted_places(points, *transform);
-  check_memory(places, columns.size(), transform->voxelSize()[0], point_voxel(points.samples, 0),
+  check_memory(places, from.columns.size(), transform->voxelSize()[0], point_voxel(points.samples, 0),
                most_bytes > 0 ? most_bytes : machine_memory());
   struct Run {
-    Leaf* leaf;
+    PointDataTree::LeafNodeType* leaf;
     std::size_t begin, end;
   };
   auto grid = PointDataGrid::create();
@@ -210,28 +280,32 @@ PointDataGrid::Ptr point_grid(const PointArrays& points, const std::vector<Point
     runs.push_back({grid->tree().touchLeaf(places[begin].leaf), begin, end});
   }
   tbb::parallel_for(std::size_t{0}, runs.size(), [&](std::size_t r) {
-    const auto [leaf, begin, end] = runs[r];
-    const auto count = static_cast<Index>(end - begin);
-    const Place* const first = &places[begin];
-    leaf->replaceAttributeSet(new AttributeSet(descriptor, count), /*allowMismatchingDescriptors=*/true);
-    std::vector<Leaf::ValueType> offsets(Leaf::SIZE);
-    for (Index v = 0, i = 0; v < Leaf::SIZE; ++v) {
-      while (i < count && first[i].voxel == v) ++i;
-      offsets[v] = i;
-    }
-    leaf->setOffsets(offsets);
-    AttributeWriteHandle<Vec3s> position(leaf->attributeArray(0));
-    for (Index i = 0; i < count; ++i) {
-      const Vec3d inside =
-          index_of(points, *transform, first[i].row) - leaf->offsetToGlobalCoord(first[i].voxel).asVec3d();
-      position.set(i, Vec3s(inside));
-    }
-    for (std::size_t c = 0; c < columns.size(); ++c) fill_column(leaf->attributeArray(c + 1), columns[c], first, count);
+    fill_leaf(from, {&places[runs[r].begin], runs[r].end - runs[r].begin}, *runs[r].leaf);
   });
   grid->setTransform(transform);
-  for (const PointColumn& c : columns)
+  for (const PointColumn& c : from.columns)
     if (!c.types.empty()) grid->insertMeta(kTypeMetadata + c.name, StringMetadata(c.types));
   return grid;
 }
 
 }  // namespace lamina::volume
+
+namespace lamina {
+
+PointVolumeStats write_point_volume(const PointArrays& points, const PointVolumeSettings& settings,
+                                    const std::string& path, const RunContext& run) {
+  volume::require_sound(points, settings);
+  openvdb::initialize();
+  PointVolumeStats stats;
+  with_threads(run.threads, [&] {
+    const auto grid = volume::point_grid(points, settings.voxel, run.max_memory);
+    stats.voxel = grid->voxelSize()[0];
+    volume::label(*grid, settings.name, false);
+    stats.points = points.samples.size();
+    stats.voxels = grid->activeVoxelCount();
+    stats.bytes = volume::write_vdb({grid}, path);
+  });
+  return stats;
+}
+
+}  // namespace lamina

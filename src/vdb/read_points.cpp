@@ -6,8 +6,6 @@
 
 #include "base/scalar_type.h"
 #include "lamina/error.h"
-#include "vdb/full_range.h"
-#include "vdb/point_grids.h"
 #include "vdb/points_grid.h"
 #include "vdb/vdb_file.h"
 

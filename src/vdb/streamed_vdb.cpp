@@ -6,18 +6,17 @@
 #include <openvdb/io/GridDescriptor.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <memory>
 #include <numeric>
-#include <sstream>
 #include <string_view>
-#include <tuple>
 
 #include "lamina/error.h"
-#include "vdb/content_tag.h"
+#include "vdb/vdb_file.h"
 
 namespace lamina::volume {
 namespace {
@@ -38,20 +37,6 @@ void put(std::ostream& os, const T& value) {
   os.write(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
-template <class Leaf, class Value>
-PackedLeaf pack_any(const Leaf& leaf, const Value& background, bool half) {
-  PackedLeaf out;
-  out.origin = leaf.origin();
-  out.active = static_cast<std::uint32_t>(leaf.onVoxelCount());
-  leaf.evalActiveBoundingBox(out.box);
-  std::ostringstream os(std::ios::binary);
-  io::setDataCompression(os, kCompression);
-  io::setGridBackgroundValuePtr(os, &background);
-  leaf.writeBuffers(os, half);
-  out.bytes = std::move(os).str();
-  return out;
-}
-
 /// The tree's own order: nodes by place, and inside a node by x, y, z.
 using Key = std::array<std::int32_t, 9>;
 Key key_of(const LeafVotes& v) {
@@ -64,40 +49,28 @@ Key key_of(const LeafVotes& v) {
   return key;
 }
 
-template <class Mask, int kSide>
-Index slot_in(const Coord& local) {
-  return static_cast<Index>((local[0] * kSide + local[1]) * kSide + local[2]);
+/// A leaf's slot in its lower node, or a lower node's in its upper one: x slowest, z fastest.
+constexpr Index slot_in(const std::array<std::int32_t, 3>& place, std::int32_t side) {
+  return static_cast<Index>(((place[0] & (side - 1)) * side + (place[1] & (side - 1))) * side +
+                            (place[2] & (side - 1)));
+}
+
+using LeafPlace = TileSigns::Place;
+LeafPlace node_of(const LeafPlace& leaf, int shift) {
+  return {leaf[0] >> shift, leaf[1] >> shift, leaf[2] >> shift};
+}
+constexpr int kLowerShift = 4, kUpperShift = 9;  ///< from a leaf's place to its nodes'
+
+/// The first records, as many as lie in one node.
+template <class Record>
+std::span<const Record> first_node(std::span<const Record> records, int shift) {
+  const LeafPlace node = node_of(records.front().place.leaf, shift);
+  std::size_t count = 1;
+  while (count < records.size() && node_of(records[count].place.leaf, shift) == node) ++count;
+  return records.first(count);
 }
 
 }  // namespace
-
-std::array<std::int8_t, 6> face_votes(const FloatTree::LeafNodeType& leaf) {
-  // An active voxel's neighbour beyond the leaf must be on its side; the others only guess.
-  std::array<int, 6> votes{};
-  const auto count = [&](std::size_t face, Index at) {
-    votes[face] += (leaf.isValueOn(at) ? 8 : 1) * (leaf.getValue(at) < 0 ? -1 : 1);
-  };
-  for (Index a = 0; a < 8; ++a) {
-    for (Index b = 0; b < 8; ++b) {
-      count(0, a << 3 | b), count(1, 7 << 6 | a << 3 | b);
-      count(2, a << 6 | b), count(3, a << 6 | 7 << 3 | b);
-      count(4, a << 6 | b << 3), count(5, a << 6 | b << 3 | 7);
-    }
-  }
-  std::array<std::int8_t, 6> out{};
-  for (std::size_t f = 0; f < 6; ++f) out[f] = static_cast<std::int8_t>(std::clamp(votes[f] / 4, -16, 16));
-  return out;
-}
-
-PackedLeaf pack(const FloatTree::LeafNodeType& leaf, float background, bool half) {
-  PackedLeaf out = pack_any(leaf, background, half);
-  out.faces = face_votes(leaf);
-  return out;
-}
-
-PackedLeaf pack(const Vec3STree::LeafNodeType& leaf, bool half) {
-  return pack_any(leaf, Vec3s(0), half);
-}
 
 StreamedVdb::StreamedVdb(std::string path, const std::string& tmp_dir) : path_(std::move(path)), spool_(tmp_dir) {
   std::error_code ec;
@@ -136,19 +109,6 @@ std::uint64_t StreamedVdb::leaves() const {
   return n;
 }
 
-/// Where the records of the lower node (or with shift 9 of the upper node) end that begins at `begin`.
-std::size_t StreamedVdb::end_of_node(const Grid& grid, std::size_t begin, int shift) {
-  const auto& first = grid.leaves[begin].place.leaf;
-  std::size_t end = begin;
-  const auto same = [&](const LeafVotes& place) {
-    for (std::size_t k = 0; k < 3; ++k)
-      if (place.leaf[k] >> shift != first[k] >> shift) return false;
-    return true;
-  };
-  while (end < grid.leaves.size() && same(grid.leaves[end].place)) ++end;
-  return end;
-}
-
 /// Records in the file's order, out of a spool that holds runs of them in the order they came.
 template <class Visit>
 void StreamedVdb::visit_records(std::span<const Record> records, const Visit& visit) const {
@@ -174,86 +134,134 @@ void StreamedVdb::visit_records(std::span<const Record> records, const Visit& vi
 
 /// A tree's skeleton: background, nodes with the masks of their children and the values of their tiles, leaf masks.
 template <class Tree>
-void StreamedVdb::write_topology(std::ostream& os, const Grid& grid) const {
+class StreamedVdb::Topology {
+ public:
+  Topology(const StreamedVdb& file, const Grid& grid)
+      : file_(file),
+        records_(grid.leaves),
+        half_(grid.empty->saveFloatAsHalf()),
+        background_(static_cast<const openvdb::Grid<Tree>&>(*grid.empty).background()),
+        inside_(background_),
+        signs_(voting(grid)) {
+    if (is_level_set(grid)) inside_ = Value(-background_);
+  }
+
+  void write(std::ostream& os) const {
+    Index uppers = 0;
+    for (auto rest = records_; !rest.empty(); rest = rest.subspan(first_node(rest, kUpperShift).size())) ++uppers;
+    put(os, std::int32_t{1});  // buffers
+    put(os, half_ ? Value(io::truncateRealToHalf(background_)) : background_);
+    io::setGridBackgroundValuePtr(os, &background_);
+    put(os, Index{0});  // tiles of the root
+    put(os, uppers);
+    for (auto rest = records_; !rest.empty();) {
+      const auto node = first_node(rest, kUpperShift);
+      write_upper(os, node);
+      rest = rest.subspan(node.size());
+    }
+    io::setGridBackgroundValuePtr(os, nullptr);
+  }
+
+ private:
   using Value = typename Tree::ValueType;
   using Upper = typename Tree::RootNodeType::ChildNodeType;
   using Lower = typename Upper::ChildNodeType;
-  const bool half = grid.empty->saveFloatAsHalf();
-  const Value background = static_cast<const openvdb::Grid<Tree>&>(*grid.empty).background();
-  const bool has_signs = grid.empty->getGridClass() == GRID_LEVEL_SET;
-  std::vector<LeafVotes> places;
-  if (has_signs) {
+
+  static bool is_level_set(const Grid& grid) { return grid.empty->getGridClass() == GRID_LEVEL_SET; }
+  static std::vector<LeafVotes> voting(const Grid& grid) {
+    std::vector<LeafVotes> places;
+    if (!is_level_set(grid)) return places;
     places.reserve(grid.leaves.size());
     for (const Record& r : grid.leaves) places.push_back(r.place);
+    return places;
   }
-  const TileSigns signs(places);
-  const Value inside = has_signs ? Value(-background) : background;
 
-  Index uppers = 0;
-  for (std::size_t i = 0; i < grid.leaves.size(); i = end_of_node(grid, i, 9)) ++uppers;
-
-  put(os, std::int32_t{1});  // buffers
-  put(os, half ? Value(io::truncateRealToHalf(background)) : background);
-  io::setGridBackgroundValuePtr(os, &background);
-  put(os, Index{0});  // tiles of the root
-  put(os, uppers);
-  for (std::size_t begin = 0; begin < grid.leaves.size();) {
-    const std::size_t end = end_of_node(grid, begin, 9);
-    const auto& first = grid.leaves[begin].place.leaf;
-    const Coord upper(first[0] >> 9, first[1] >> 9, first[2] >> 9);
-    for (int k = 0; k < 3; ++k) put(os, Int32{upper[k] * kUpper * kLower * 8});
+  void write_upper(std::ostream& os, std::span<const Record> leaves) const {
+    const LeafPlace upper = node_of(leaves.front().place.leaf, kUpperShift);
+    for (const std::int32_t k : upper) put(os, Int32{k * kUpper * kLower * 8});
     typename Upper::NodeMaskType children;
-    for (std::size_t i = begin; i < end; i = end_of_node(grid, i, 4)) {
-      const auto& l = grid.leaves[i].place.leaf;
-      children.setOn(slot_in<Upper, kUpper>(Coord((l[0] >> 4) & 31, (l[1] >> 4) & 31, (l[2] >> 4) & 31)));
+    for (const Record& r : leaves) children.setOn(slot_in(node_of(r.place.leaf, kLowerShift), kUpper));
+    std::vector<Value> tiles(Upper::NUM_VALUES, zeroVal<Value>());
+    for (Index slot = 0; slot < Upper::NUM_VALUES; ++slot) {
+      if (children.isOn(slot)) continue;
+      const auto n = static_cast<std::int32_t>(slot);
+      const LeafPlace lower{upper[0] * kUpper + n / (kUpper * kUpper), upper[1] * kUpper + n / kUpper % kUpper,
+                            upper[2] * kUpper + n % kUpper};
+      tiles[slot] = signs_.inside(lower) ? inside_ : background_;
     }
-    std::vector<Value> values(Upper::NUM_VALUES, zeroVal<Value>());
-    for (Index v = 0; v < Upper::NUM_VALUES; ++v) {
-      if (children.isOn(v)) continue;
-      const auto n = static_cast<std::int32_t>(v);
-      values[v] =
-          signs.inside({upper[0] * kUpper + n / 1024, upper[1] * kUpper + n / 32 % 32, upper[2] * kUpper + n % 32})
-              ? inside
-              : background;
+    write_node<Upper>(os, children, tiles);
+    for (auto rest = leaves; !rest.empty();) {
+      const auto node = first_node(rest, kLowerShift);
+      write_lower(os, node);
+      rest = rest.subspan(node.size());
     }
-    const typename Upper::NodeMaskType none;
-    children.save(os);
-    none.save(os);
-    io::writeCompressedValues(os, values.data(), Upper::NUM_VALUES, none, children, half);
-    for (std::size_t i = begin; i < end;) {
-      const std::size_t last = end_of_node(grid, i, 4);
-      const auto& l = grid.leaves[i].place.leaf;
-      const std::uint8_t* const tiles = signs.inside_tiles({l[0] >> 4, l[1] >> 4, l[2] >> 4});
-      typename Lower::NodeMaskType leaves;
-      const typename Lower::NodeMaskType no_tiles;
-      for (std::size_t j = i; j < last; ++j) {
-        const auto& p = grid.leaves[j].place.leaf;
-        leaves.setOn(slot_in<Lower, kLower>(Coord(p[0] & 15, p[1] & 15, p[2] & 15)));
-      }
-      std::vector<Value> slots(Lower::NUM_VALUES, zeroVal<Value>());
-      for (Index v = 0; v < Lower::NUM_VALUES; ++v)
-        if (leaves.isOff(v)) slots[v] = tiles != nullptr && tiles[v] != 0 ? inside : background;
-      leaves.save(os);
-      no_tiles.save(os);
-      io::writeCompressedValues(os, slots.data(), Lower::NUM_VALUES, no_tiles, leaves, half);
-      constexpr std::size_t kMaskBytes = 64;  // a leaf's record begins with its mask
-      visit_records({&grid.leaves[i], last - i}, [&](std::string_view leaf) { os << leaf.substr(0, kMaskBytes); });
-      i = last;
-    }
-    begin = end;
   }
-  io::setGridBackgroundValuePtr(os, nullptr);
-}
+
+  void write_lower(std::ostream& os, std::span<const Record> leaves) const {
+    typename Lower::NodeMaskType children;
+    for (const Record& r : leaves) children.setOn(slot_in(r.place.leaf, kLower));
+    const std::uint8_t* const inside = signs_.inside_tiles(node_of(leaves.front().place.leaf, kLowerShift));
+    std::vector<Value> tiles(Lower::NUM_VALUES, zeroVal<Value>());
+    for (Index slot = 0; slot < Lower::NUM_VALUES; ++slot)
+      if (children.isOff(slot)) tiles[slot] = inside != nullptr && inside[slot] != 0 ? inside_ : background_;
+    write_node<Lower>(os, children, tiles);
+    constexpr std::size_t kMaskBytes = 64;  // a leaf's record begins with its mask
+    file_.visit_records(leaves, [&](std::string_view leaf) { os << leaf.substr(0, kMaskBytes); });
+  }
+
+  template <class Node>
+  void write_node(std::ostream& os, const typename Node::NodeMaskType& children, std::vector<Value>& tiles) const {
+    const typename Node::NodeMaskType active_tiles;
+    children.save(os);
+    active_tiles.save(os);
+    io::writeCompressedValues(os, tiles.data(), Node::NUM_VALUES, active_tiles, children, half_);
+  }
+
+  const StreamedVdb& file_;
+  std::span<const Record> records_;
+  bool half_;
+  Value background_, inside_;  ///< of tiles
+  TileSigns signs_;
+};
 
 void StreamedVdb::write_buffers(std::ostream& os, const Grid& grid) const {
   std::string piece;  // small writes cost the stream and the kernel more
-  for (std::size_t i = 0; i < grid.leaves.size();) {
-    const std::size_t end = end_of_node(grid, i, 4);
+  for (std::span<const Record> rest = grid.leaves; !rest.empty();) {
+    const auto node = first_node(rest, kLowerShift);
     piece.clear();
-    visit_records({&grid.leaves[i], end - i}, [&](std::string_view leaf) { piece += leaf; });
+    visit_records(node, [&](std::string_view leaf) { piece += leaf; });
     os << piece;
-    i = end;
+    rest = rest.subspan(node.size());
   }
+}
+
+void StreamedVdb::write_grid(std::ostream& os, const Grid& g) const {
+  const GridBase::Ptr grid = g.empty->copyGrid();
+  grid->insertMeta(GridBase::META_FILE_VOXEL_COUNT, Int64Metadata(static_cast<Int64>(g.active)));
+  if (!g.box.empty()) {
+    grid->insertMeta(GridBase::META_FILE_BBOX_MIN, Vec3IMetadata(g.box.min().asVec3i()));
+    grid->insertMeta(GridBase::META_FILE_BBOX_MAX, Vec3IMetadata(g.box.max().asVec3i()));
+  }
+  io::GridDescriptor descriptor(grid->getName(), grid->type(), grid->saveFloatAsHalf());
+  descriptor.writeHeader(os);
+  const auto positions = os.tellp();
+  descriptor.writeStreamPos(os);
+  descriptor.setGridPos(os.tellp());
+  Archive archive;
+  archive.setCompression(kCompression);
+  archive.setGridCompression(os, *grid);
+  grid->writeMeta(os);
+  grid->writeTransform(os);
+  if (grid->isType<FloatGrid>())
+    Topology<FloatTree>(*this, g).write(os);
+  else
+    Topology<Vec3STree>(*this, g).write(os);
+  descriptor.setBlockPos(os.tellp());
+  write_buffers(os, g);
+  descriptor.setEndPos(os.tellp());
+  os.seekp(positions);
+  descriptor.writeStreamPos(os);
+  os.seekp(descriptor.getEndPos());
 }
 
 void StreamedVdb::write(std::ostream& os) {
@@ -265,30 +273,7 @@ void StreamedVdb::write(std::ostream& os) {
   for (Grid& g : grids_) {
     std::sort(g.leaves.begin(), g.leaves.end(),
               [](const Record& a, const Record& b) { return key_of(a.place) < key_of(b.place); });
-    const GridBase::Ptr grid = g.empty->copyGrid();
-    grid->insertMeta(GridBase::META_FILE_VOXEL_COUNT, Int64Metadata(static_cast<Int64>(g.active)));
-    if (!g.box.empty()) {
-      grid->insertMeta(GridBase::META_FILE_BBOX_MIN, Vec3IMetadata(g.box.min().asVec3i()));
-      grid->insertMeta(GridBase::META_FILE_BBOX_MAX, Vec3IMetadata(g.box.max().asVec3i()));
-    }
-    io::GridDescriptor descriptor(grid->getName(), grid->type(), grid->saveFloatAsHalf());
-    descriptor.writeHeader(os);
-    const auto positions = os.tellp();
-    descriptor.writeStreamPos(os);
-    descriptor.setGridPos(os.tellp());
-    archive.setGridCompression(os, *grid);
-    grid->writeMeta(os);
-    grid->writeTransform(os);
-    if (grid->isType<FloatGrid>())
-      write_topology<FloatTree>(os, g);
-    else
-      write_topology<Vec3STree>(os, g);
-    descriptor.setBlockPos(os.tellp());
-    write_buffers(os, g);
-    descriptor.setEndPos(os.tellp());
-    os.seekp(positions);
-    descriptor.writeStreamPos(os);
-    os.seekp(descriptor.getEndPos());
+    write_grid(os, g);
   }
   bytes_ = static_cast<std::uint64_t>(os.tellp());
 }

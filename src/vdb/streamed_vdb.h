@@ -6,28 +6,13 @@
 #include <string>
 #include <vector>
 
-#include "base/spill_file.h"
 #include "base/output_file.h"
+#include "base/spill_file.h"
 #include "vdb/grids.h"
+#include "vdb/packed_leaf.h"
 #include "vdb/tile_signs.h"
 
 namespace lamina::volume {
-
-/// A leaf as it will stand in the file.
-struct PackedLeaf {
-  openvdb::Coord origin;
-  std::array<std::int8_t, 6> faces{};  ///< LeafVotes::faces
-  std::uint32_t active = 0;
-  openvdb::CoordBBox box;  ///< of the active voxels
-  std::string bytes;
-};
-
-/// How a leaf's faces vote for the tiles beside them (LeafVotes::faces).
-std::array<std::int8_t, 6> face_votes(const openvdb::FloatTree::LeafNodeType& leaf);
-
-/// Packs a leaf (its values outside of the mask are +- the background, or 0 where that is). Safe from several threads.
-PackedLeaf pack(const openvdb::FloatTree::LeafNodeType& leaf, float background, bool half);
-PackedLeaf pack(const openvdb::Vec3STree::LeafNodeType& leaf, bool half);
 
 /// Leaves wait, compressed, in an unnamed temporary file; memory holds some forty bytes for each. finish() puts the
 /// file together, commit() gives it its name. Without commit() nothing is left.
@@ -46,7 +31,6 @@ class StreamedVdb {
   /// Writes everything, with a tag made from the contents. Throws Error(budget) when the disk does not take it.
   void finish();
   void commit(const std::string& final_name);
-  [[nodiscard]] std::uint64_t active_voxels(std::size_t grid) const { return grids_[grid].active; }
   [[nodiscard]] std::uint64_t bytes() const { return bytes_; }
   [[nodiscard]] openvdb::GridBase& grid(std::size_t number) { return *grids_[number].empty; }
 
@@ -63,11 +47,11 @@ class StreamedVdb {
     std::uint64_t active = 0;
     openvdb::CoordBBox box;
   };
-  void write(std::ostream& os);
-  void write_buffers(std::ostream& os, const Grid& grid) const;
   template <class Tree>
-  void write_topology(std::ostream& os, const Grid& grid) const;
-  static std::size_t end_of_node(const Grid& grid, std::size_t begin, int shift);
+  class Topology;
+  void write(std::ostream& os);
+  void write_grid(std::ostream& os, const Grid& grid) const;
+  void write_buffers(std::ostream& os, const Grid& grid) const;
   template <class Visit>
   void visit_records(std::span<const Record> records, const Visit& visit) const;
   [[noreturn]] void fail(const char* what) const;

@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <limits>
+#include <vector>
+
+#include "vdb/packed_leaf.h"
 
 namespace lamina::volume {
+
 namespace {
 
 constexpr std::int32_t kSide = 16;
@@ -202,6 +206,28 @@ const std::uint8_t* TileSigns::inside_tiles(const Place& node) const {
 bool TileSigns::inside(const Place& node) const {
   const std::uint32_t cell = cell_of(node);
   return cell < empty_.size() && empty_[cell] == kInside;
+}
+
+void sign_tiles(openvdb::FloatGrid& grid) {
+  std::vector<LeafVotes> votes;
+  for (auto leaf = grid.tree().cbeginLeaf(); leaf; ++leaf) {
+    const openvdb::Coord o = leaf->origin();
+    votes.push_back({{o[0] >> 3, o[1] >> 3, o[2] >> 3}, face_votes(*leaf)});
+  }
+  const TileSigns signs(votes);
+  auto tile = grid.tree().beginValueOff();
+  tile.setMaxDepth(openvdb::FloatTree::ValueOffIter::LEAF_DEPTH - 1);
+  for (; tile; ++tile) {
+    const openvdb::Coord o = tile.getCoord();
+    const TileSigns::Place node{o[0] >> 7, o[1] >> 7, o[2] >> 7};
+    bool inside = signs.inside(node);
+    if (tile.getLevel() == 1) {
+      const std::uint8_t* const tiles = signs.inside_tiles(node);
+      const int slot = ((o[0] >> 3 & 15) * 16 + (o[1] >> 3 & 15)) * 16 + (o[2] >> 3 & 15);
+      inside = tiles != nullptr && tiles[slot] != 0;
+    }
+    tile.setValue(inside ? -grid.background() : grid.background());
+  }
 }
 
 }  // namespace lamina::volume

@@ -5,6 +5,8 @@
 #include <map>
 #include <vector>
 
+#include "vdb/grids.h"
+
 namespace lamina::volume {
 
 /// A leaf's place in units of leaves (8 voxels), and how its faces vote: negative when the voxels there are inside.
@@ -52,5 +54,8 @@ class TileSigns {
   std::map<std::uint32_t, std::int32_t> empty_votes_;
   std::vector<Node> nodes_;
 };
+
+/// Decides anew which tiles of a grid lie inside, from the leaves beside them.
+void sign_tiles(openvdb::FloatGrid& grid);
 
 }  // namespace lamina::volume

@@ -1,23 +1,41 @@
 #include "vdb/vdb_file.h"
 
 #include <fmt/format.h>
+#include <openvdb/io/Archive.h>
 #include <openvdb/io/Stream.h>
 
 #include <algorithm>
+#include <bit>
 #include <cerrno>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
+#include <utility>
 
 #include "base/output_file.h"
 #include "lamina/error.h"
 #include "lamina/run.h"
-#include "vdb/point_grids.h"
-#include "vdb/vdb_bytes.h"
+#include "vdb/points_grid.h"
 #include "vdb/vdb_check.h"
 
 namespace lamina::volume {
+
 namespace {
+
+/// io::File opens files by name and does not notice a full disk; the archive behind it writes to any stream.
+struct WholeArchive : openvdb::io::Archive {
+  using openvdb::io::Archive::write;
+};
+
+void tag_by_contents(std::string& bytes) {
+  char* const at = bytes.data() + kTagAt;
+  std::fill_n(at, kTagSize, '0');
+  ContentTag tag;
+  tag.add(bytes);
+  const std::string text = tag.text();
+  std::copy(text.begin(), text.end(), at);
+}
 
 [[noreturn]] void refuse(const std::string& path, const std::string& what) {
   std::string line = what;  // it may quote the file
@@ -146,6 +164,57 @@ void label(openvdb::GridBase& grid, const std::string& name, bool half) {
 
 void note_shift(openvdb::GridBase& grid, const std::array<double, 3>& shift) {
   grid.insertMeta("shift", openvdb::Vec3DMetadata(openvdb::Vec3d(shift[0], shift[1], shift[2])));
+}
+
+std::string vdb_bytes(const openvdb::GridCPtrVec& grids) {
+  std::ostringstream stream(std::ios::binary);
+  WholeArchive archive;
+  archive.setCompression(openvdb::io::COMPRESS_BLOSC | openvdb::io::COMPRESS_ACTIVE_MASK);
+  archive.write(stream, grids, /*seekable=*/true);
+  std::string bytes = std::move(stream).str();
+  tag_by_contents(bytes);
+  return bytes;
+}
+
+void ContentTag::mix(std::uint64_t word) {
+  // Two sums in the manner of FNV-1a, of eight bytes at a time; turning brings high bits to where they count.
+  constexpr std::uint64_t kPrime = 0x100000001b3ULL, kOther = 0x9e3779b97f4a7c15ULL;
+  a_ = std::rotl((a_ ^ word) * kPrime, 29);
+  b_ = std::rotl((b_ ^ ~word) * kOther, 31);
+}
+
+void ContentTag::add(std::string_view bytes) {
+  std::size_t i = 0;
+  const auto add_byte = [&] {
+    const std::uint64_t place = length_++ % 8;
+    word_ |= std::uint64_t{static_cast<std::uint8_t>(bytes[i++])} << (8 * place);
+    if (place < 7) return;
+    mix(word_);
+    word_ = 0;
+  };
+  while (i < bytes.size() && length_ % 8 != 0) add_byte();
+  for (; i + 8 <= bytes.size(); i += 8, length_ += 8) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, bytes.data() + i, sizeof word);
+    mix(word);
+  }
+  while (i < bytes.size()) add_byte();
+}
+
+std::string ContentTag::text() const {
+  ContentTag end = *this;
+  end.mix(word_);
+  end.mix(length_);
+  const std::uint64_t a = end.a_, b = end.b_;
+  // Version 8 of RFC 9562: the maker's own scheme.
+  return fmt::format("{:08x}-{:04x}-8{:03x}-a{:03x}-{:012x}", a >> 32, (a >> 16) & 0xFFFF, a & 0xFFF, b >> 52,
+                     b & 0xFFFFFFFFFFFFULL);
+}
+
+std::string numbered(const std::string& path, std::size_t number) {
+  const std::filesystem::path p(path);
+  const std::string name = fmt::format("{}.{:04}{}", p.stem().string(), number, p.extension().string());
+  return (p.parent_path() / name).string();
 }
 
 std::uint64_t write_vdb(const openvdb::GridCPtrVec& grids, const std::string& path) {

@@ -1,10 +1,13 @@
-// Whole .vdb files in memory.
+// Whole .vdb files in memory: read, chosen from, made and written, with what their grids say of themselves.
 #pragma once
-
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <string>
+#include <string_view>
 
+#include "lamina/attributes.h"
 #include "vdb/grids.h"
 
 namespace lamina::volume {
@@ -39,6 +42,11 @@ openvdb::FloatGrid::Ptr as_float(const openvdb::GridBase::Ptr& grid);
 /// The colours among the grids, `Cd`; null where there are none.
 openvdb::Vec3SGrid::ConstPtr colours_of(const openvdb::GridPtrVec& grids);
 
+/// Colours of this type are divided by it to be 0..1, as `Cd` holds them.
+constexpr float full_range(ScalarType type) {
+  return type == ScalarType::uint8 ? 255.0F : type == ScalarType::uint16 ? 65535.0F : 1.0F;
+}
+
 /// The metadata that says where a level set is known.
 inline constexpr const char* kOpenMetadata = "open";
 bool is_open(const openvdb::GridBase& grid);
@@ -50,5 +58,30 @@ void note_shift(openvdb::GridBase& grid, const std::array<double, 3>& shift);
 
 /// Writes the grids beside `path`, then renames; "-" is standard output. Returns the size in bytes.
 std::uint64_t write_vdb(const openvdb::GridCPtrVec& grids, const std::string& path);
+
+/// A .vdb file of the grids, Blosc-compressed. Unlike OpenVDB's own writer, which draws a random tag for each file, the
+/// tag is made from the contents: equal grids give equal bytes.
+std::string vdb_bytes(const openvdb::GridCPtrVec& grids);
+
+/// A file's tag, a UUID in text, stands behind magic number, three version numbers and a flag.
+inline constexpr std::size_t kTagAt = 8 + 3 * 4 + 1;
+inline constexpr std::size_t kTagSize = 36;
+
+/// The tag made from the contents. Takes the file in pieces of any size, its tag as zeros.
+class ContentTag {
+ public:
+  void add(std::string_view bytes);
+  [[nodiscard]] std::string text() const;
+
+ private:
+  void mix(std::uint64_t word);
+
+  std::uint64_t a_ = 0xcbf29ce484222325ULL, b_ = 0x84222325cbf29ce4ULL;
+  std::uint64_t word_ = 0;    ///< bytes that make no eight yet
+  std::uint64_t length_ = 0;  ///< of all pieces
+};
+
+/// Names of files that load as the frames of a sequence: out.vdb, 3 -> out.0003.vdb
+std::string numbered(const std::string& path, std::size_t number);
 
 }  // namespace lamina::volume

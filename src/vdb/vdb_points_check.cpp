@@ -1,4 +1,4 @@
-#include "vdb/vdb_points_check.h"
+#include "vdb/vdb_check.h"
 
 #include <fmt/format.h>
 #include <openvdb/points/AttributeArray.h>

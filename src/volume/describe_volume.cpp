@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <map>
 
-#include "vdb/point_grids.h"
+#include "vdb/points_grid.h"
 #include "vdb/vdb_file.h"
 
 namespace lamina {

@@ -1,22 +1,16 @@
-// The band of distances around a mesh, and the colours in it.
+// What a LevelSet (volume.h) holds.
 #pragma once
-
-#include "lamina/mesh.h"
-#include "lamina/run.h"
-#include "measure/triangle_bvh.h"
+#include "lamina/volume.h"
 #include "vdb/grids.h"
 
-namespace lamina::volume {
+namespace lamina {
 
-/// Distances in mesh units, active nearer than `band` voxels; negative inside where `has_sign`. Throws
-/// Error(internal) when cancelled.
-openvdb::FloatGrid::Ptr distance_grid(const TriangleMesh& mesh, const measure::TriangleBvh& triangles,
-                                      const openvdb::math::Transform& transform, double band, bool has_sign,
-                                      const RunContext& run);
+struct LevelSet::Data {
+  openvdb::FloatGrid::ConstPtr grid;
+  openvdb::Vec3SGrid::ConstPtr colours;  ///< the file's grid Cd, sRGB in 0..1; null where there is none
+  std::string name;
+  std::string path;  ///< it came from, for messages; may be empty
+  bool open = false;
+};
 
-/// The colour of the nearest point of the mesh for every active voxel of `distances`, in 0..1; null when the mesh has
-/// no colours.
-openvdb::Vec3SGrid::Ptr colour_grid(const TriangleMesh& mesh, const measure::TriangleBvh& triangles,
-                                    const openvdb::FloatGrid& distances);
-
-}  // namespace lamina::volume
+}  // namespace lamina

@@ -10,9 +10,8 @@
 #include "base/run.h"
 #include "lamina/error.h"
 #include "lamina/volume_points.h"
-#include "vdb/point_grids.h"
 #include "vdb/points_grid.h"
-#include "vdb/sign_tiles.h"
+#include "vdb/tile_signs.h"
 #include "vdb/vdb_file.h"
 
 namespace lamina {
@@ -130,8 +129,7 @@ void append(PointArrays& to, const PointArrays& from, const std::string& path, c
 GridBase::Ptr merge_points(const std::vector<Source>& sources, const std::string& name, const RunContext& run) {
   PointArrays all;
   for (const Source& s : sources) append(all, read_point_volume(s.path, name).points, s.path, run);
-  const double voxel = volume::point_voxel(all.samples, 0);
-  return volume::point_grid(all, volume::point_columns(all), volume::point_transform(all, voxel));
+  return volume::point_grid(all);
 }
 
 VolumeMergeStats merge(const std::vector<std::string>& inputs, const std::string& output, const RunContext& run) {

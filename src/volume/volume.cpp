@@ -5,14 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/run.h"
 #include "base/output_file.h"
+#include "base/run.h"
 #include "lamina/error.h"
 #include "measure/edge_table.h"
 #include "meshes/vec3.h"
-#include "vdb/vdb_bytes.h"
 #include "vdb/vdb_file.h"
-#include "volume/level_set.h"
+#include "volume/distance_grid.h"
 
 namespace lamina {
 namespace {

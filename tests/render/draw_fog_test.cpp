@@ -12,7 +12,7 @@
 #include "support/program.h"
 #include "vdb/grids.h"
 #include "vdb/vdb_file.h"
-#include "volume/fog_data.h"
+#include "volume/fog.h"
 
 namespace lamina {
 namespace {

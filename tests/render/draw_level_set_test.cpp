@@ -8,7 +8,7 @@
 #include "lamina/render.h"
 #include "render/draw.h"
 #include "vdb/grids.h"
-#include "volume/level_set_data.h"
+#include "volume/level_set.h"
 
 namespace lamina {
 namespace {

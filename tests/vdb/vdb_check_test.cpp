@@ -14,7 +14,6 @@
 #include "lamina/error.h"
 #include "lamina/volume_points.h"
 #include "support/program.h"
-#include "vdb/vdb_bytes.h"
 #include "vdb/vdb_file.h"
 
 namespace lamina::volume {

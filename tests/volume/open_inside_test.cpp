@@ -1,4 +1,4 @@
-#include "volume/open_inside.h"
+#include "volume/fog.h"
 
 #include <gtest/gtest.h>
 #include <openvdb/tools/LevelSetSphere.h>

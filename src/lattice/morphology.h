@@ -1,8 +1,11 @@
-// Morphology on 8^3 bit blocks, a 64-bit word (8 x 8) at a time.
+// Morphology of block masks, a 64-bit word (8 x 8) at a time.
 #pragma once
+#include <algorithm>
 #include <array>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
+#include <utility>
 
 #include "lattice/block_mask.h"
 
@@ -11,6 +14,11 @@ namespace lamina::bits {
 /// Columns x < n of every row.
 constexpr std::uint64_t columns_below(int n) {
   return n >= 8 ? ~std::uint64_t{0} : 0x0101010101010101ULL * ((1ULL << n) - 1);
+}
+
+/// Rows y < n.
+constexpr std::uint64_t rows_below(int n) {
+  return n >= 8 ? ~std::uint64_t{0} : (std::uint64_t{1} << (8 * n)) - 1;
 }
 
 /// Row shift: result row y is the source's row y - d; rows come in from the neighbouring words below (y - 1) and above.
@@ -139,6 +147,89 @@ void dilate_layers(const Neighbourhood& n, int begin, int end, std::uint64_t* ou
         dilate_some<kLo, kHi, 8>(n, begin, out);
     }
   }
+}
+
+/// dilate_layers<-1, 1>() of the whole block: what shares a corner, an edge or a face with the mask, and the mask
+/// itself.
+inline BlockMask dilate(const Neighbourhood& n) {
+  BlockMask out;
+  dilate_layers<-1, 1>(n, 0, 8, out.words.data());
+  return out;
+}
+
+/// The same of a mask with nothing around it: its ten layers, those of the blocks below and above included.
+inline std::array<std::uint64_t, 10> dilate_alone(const BlockMask& mask) {
+  std::array<std::uint64_t, 12> w{};
+  std::copy(mask.words.begin(), mask.words.end(), w.begin() + 2);
+  std::array<std::uint64_t, 10> out;
+  for (std::size_t z = 0; z < 10; ++z)
+    out[z] = spread_x<-1, 1>(0, spread_y<-1, 1>(0, w[z] | w[z + 1] | w[z + 2], 0), 0);
+  return out;
+}
+
+/// What shares a face with the mask, and the mask itself.
+inline BlockMask dilate_by_faces(const Neighbourhood& n) {
+  const auto layer = [&n](int z, int y, int x) { return word(n, z, y, x); };
+  BlockMask out;
+  for (int z = 0; z < 8; ++z) {
+    const std::uint64_t here = layer(z, 1, 1);
+    out.words[z] = layer(z - 1, 1, 1) | layer(z + 1, 1, 1) | spread_x<-1, 1>(layer(z, 1, 0), here, layer(z, 1, 2)) |
+                   spread_y<-1, 1>(layer(z, 0, 1), here, layer(z, 2, 1));
+  }
+  return out;
+}
+inline BlockMask dilate_by_faces(const BlockMask& alone) {
+  BlockMask out = alone;
+  for (std::size_t z = 0; z < 8; ++z) {
+    const std::uint64_t here = alone.words[z];
+    out.words[z] |= spread_x<-1, 1>(0, here, 0) | spread_y<-1, 1>(0, here, 0);
+    if (z > 0) out.words[z] |= alone.words[z - 1];
+    if (z < 7) out.words[z] |= alone.words[z + 1];
+  }
+  return out;
+}
+
+/// All of `within` that is connected with `seeds` there, through faces.
+inline BlockMask connected(BlockMask seeds, const BlockMask& within) {
+  for (BlockMask before = seeds;; before = seeds) {
+    seeds |= dilate_by_faces(seeds) & within;
+    if (seeds == before) return seeds;
+  }
+}
+
+/// Bits that are not `known` take the side of the nearest that are, outside first. `inside`: of `known`.
+inline BlockMask fill_sides(BlockMask inside, const BlockMask& known) {
+  BlockMask outside = known & ~inside;
+  if (!inside.any()) return inside;
+  for (BlockMask rest = ~known; rest.any(); rest = ~(inside | outside)) {
+    const BlockMask more = dilate_by_faces(outside) & rest;
+    inside |= dilate_by_faces(inside) & rest & ~more;
+    outside |= more;
+  }
+  return inside;
+}
+
+/// The bits at the lower or upper end of an axis, 0 for x.
+constexpr BlockMask face(int axis, bool upper) {
+  BlockMask out;
+  for (int z = 0; z < 8; ++z) {
+    if (axis == 0) out.words[z] = columns_below(1) << (upper ? 7 : 0);
+    if (axis == 1) out.words[z] = std::uint64_t{0xFF} << (upper ? 56 : 0);
+    if (axis == 2) out.words[z] = z == (upper ? 7 : 0) ? ~std::uint64_t{0} : 0;
+  }
+  return out;
+}
+
+/// Those of a mask's bits, as the block beyond sees them: at its own other end.
+inline BlockMask across(const BlockMask& mask, int axis, bool upper) {
+  BlockMask out = mask & face(axis, upper);
+  if (axis == 2) {
+    std::swap(out.words[0], out.words[7]);
+    return out;
+  }
+  const int by = axis == 0 ? 7 : 56;
+  for (std::uint64_t& w : out.words) w = upper ? w >> by : w << by;
+  return out;
 }
 
 /// Spreads a 4 x 4 quarter of a word (columns qx*4.., rows qy*4..) to 8 x 8, each bit to 2 x 2.

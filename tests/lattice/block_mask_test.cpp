@@ -1,14 +1,14 @@
-#include "lattice/mask_axes.h"
+#include "lattice/block_mask.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
 
-namespace lamina::volume {
+namespace lamina {
 namespace {
 
-RC_GTEST_PROP(MaskAxes, GoWhereTheyAreSent, ()) {
+RC_GTEST_PROP(BlockMask, AxesGoWhereTheyAreSent, ()) {
   BlockMask mask;
   for (auto& w : mask.words) w = *rc::gen::arbitrary<std::uint64_t>();
   std::array<int, 3> to{0, 1, 2};
@@ -24,4 +24,4 @@ RC_GTEST_PROP(MaskAxes, GoWhereTheyAreSent, ()) {
 }
 
 }  // namespace
-}  // namespace lamina::volume
+}  // namespace lamina

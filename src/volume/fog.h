@@ -1,7 +1,17 @@
-// What lies behind an open surface, where nothing is known.
+// What a FogVolume (volume.h) holds, and how the inside of an open level set is told before it becomes one.
 #pragma once
+#include "lamina/volume.h"
 #include "vdb/grids.h"
 
+namespace lamina {
+
+struct FogVolume::Data {
+  openvdb::FloatGrid::ConstPtr grid;
+  openvdb::Vec3SGrid::ConstPtr colours;  ///< the file's grid Cd, sRGB in 0..1; null where there is none
+  std::string name;
+};
+
+}  // namespace lamina
 namespace lamina::volume {
 
 /// Gives the voxels and tiles beyond the band that count as inside, and are connected there with the outside, the

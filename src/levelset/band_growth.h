@@ -1,4 +1,5 @@
-// Which of the voxels around it a voxel of the band gives a value, and which of them want one.
+// How the band grows: which of the voxels around it a known voxel gives a value, which of them want one, and the sums
+// of what they get.
 #pragma once
 #include <xmmintrin.h>
 
@@ -6,6 +7,8 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "levelset/brick.h"
 #include "octree/corner_block.h"
@@ -17,7 +20,7 @@ struct Offset {
   float squared;  ///< length
 };
 
-/// Rows along y, then x, then z. The middle is one of them, and out of everybody's reach.
+/// Rows along y, then x, then z. The middle is one of them, and gives itself nothing.
 constexpr std::array<Offset, 27> make_offsets() {
   std::array<Offset, 27> out{};
   for (int i = 0; i < 27; ++i) {
@@ -44,11 +47,11 @@ struct PairBits {
   [[nodiscard]] bool any() const { return (behind | before) != 0; }
 };
 
-/// A voxel reaches another as far as the way to it leads along its normal: squared sideways distance below this. The
-/// best of 26 directions is off by 0.35 at most; a whole voxel sideways would let the band grow over a rim.
+/// A voxel gives another a value where the way to it leads along its normal: squared sideways distance below this. The
+/// best of 26 directions is off by 0.35 at most; a whole voxel sideways would let the band grow over a boundary.
 inline constexpr float kSideways = 0.75F;
 
-/// The pairs four at a time. What fills the last four is out of reach.
+/// The pairs four at a time. What fills the last four lies too far sideways.
 inline constexpr int kFours = 4;
 struct FourPairs {
   Plane x, y, z, room;  ///< `room`: what is left of kSideways
@@ -73,15 +76,15 @@ inline float weight_of(float near) {
   return near * near * near * near;
 }
 
-/// What a voxel says to those around it.
-struct QueryLayers {
-  /// The pairs of which one is reached, and whether it is the one behind.
+/// The neighbours to which a voxel gives the distance of its tangent plane.
+struct Stencil {
+  /// The pairs of which one gets a value, and whether it is the one behind.
   std::uint32_t pairs = 0, behind = 0;
   /// By pair: the way to the one behind along the normal, and what kSideways leaves.
   alignas(16) std::array<float, std::size_t{4} * kFours> up, near;
 
   /// Away from the surface only: what lies towards it is a hole in the data, not a part of the band.
-  explicit QueryLayers(const Plane& plane) {
+  explicit Stencil(const Plane& plane) {
     const auto signs = [](const Plane& four) {
       return static_cast<std::uint32_t>(_mm_movemask_ps(std::bit_cast<__m128>(four)));
     };
@@ -134,7 +137,7 @@ class Targets {
     }
   }
   /// The voxel may lie one beside the brick.
-  [[nodiscard]] PairBits beside(int x, int y, int z) const {
+  [[nodiscard]] PairBits around(int x, int y, int z) const {
     const int shift = 3 * (x + 1);
     const auto nine = [&](int layer) { return static_cast<std::uint32_t>(rows_[at(layer, y)] >> shift) & 0x1FF; };
     const std::uint32_t low = nine(z - 1), middle = nine(z), high = nine(z + 1);
@@ -148,5 +151,33 @@ class Targets {
   /// Three bits, those of the rows y - 1, y, y + 1, for each x from -2 on.
   std::array<std::uint64_t, std::size_t{kRows} * kLayers> rows_{};
 };
+
+/// Weighted sums at the voxels of a brick.
+struct Sums {
+  std::array<float, 512> weight;
+  std::array<Plane, 512> total;  ///< normal and distance
+  std::vector<float> extra;      ///< 512 for each channel
+
+  void clear(int at, std::size_t channels) {
+    weight[at] = 0;
+    total[at] = Plane{};
+    for (std::size_t c = 0; c < channels; ++c) extra[c * 512 + at] = 0;
+  }
+  void add(int at, float w, const Plane& plane, const Brick& from, int from_at, std::size_t channels) {
+    weight[at] += w;
+    total[at] += w * plane;
+    for (std::size_t c = 0; c < channels; ++c) extra[c * 512 + at] += w * from.extra[c * 512 + from_at];
+  }
+};
+
+/// A known voxel that others get values from.
+struct Source {
+  const Brick* from;
+  PairBits wanted;        ///< who of those around wants one
+  std::int16_t at, here;  ///< its place in its own brick, and as seen from the one of the sums
+};
+
+/// Adds what the sources' tangent planes say to the sums of the voxels around them.
+void extrapolate(std::span<const Source> sources, std::size_t channels, Sums& sums);
 
 }  // namespace lamina::volume

@@ -1,4 +1,5 @@
-// The band grows: a known voxel gives those that lie beyond it along its normal the distance of its tangent plane.
+#include "levelset/band_growth.h"
+
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -6,18 +7,26 @@
 #include <cmath>
 #include <optional>
 
-#include "lattice/beside.h"
-#include "lattice/bits.h"
+#include "lattice/morphology.h"
 #include "levelset/band.h"
-#include "levelset/band_push.h"
-#include "levelset/band_reach.h"
-#include "levelset/brick_sides.h"
 
 namespace lamina::volume {
 namespace {
 
 /// Repaired corners count within this distance of the surface, voxels.
 constexpr float kRepaired = 1;
+
+void add_pairs(const Source& source, const Plane& plane, std::size_t channels, Sums& sums) {
+  const Stencil stencil(plane);
+  const std::uint32_t behind = stencil.pairs & stencil.behind & source.wanted.behind;
+  const std::uint32_t before = stencil.pairs & ~stencil.behind & source.wanted.before;
+  for (std::uint32_t list = behind | before; list != 0; list &= list - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(list));
+    const int way = (behind >> i & 1) != 0 ? 1 : -1;
+    sums.add(source.here + way * kPairSteps[i], weight_of(stencil.near[i]),
+             plane + Plane{0, 0, 0, static_cast<float>(way) * stencil.up[i]}, *source.from, source.at, channels);
+  }
+}
 
 /// What the sums at a voxel say, or nothing where neighbours of two sheets that face each other say
 /// nothing together.
@@ -38,14 +47,13 @@ std::optional<Plane> store(const Sums& sums, int at, float least, std::size_t ch
 /// are not. What older voxels reach is known already, but for places between two sheets that face each other.
 class Step {
  public:
-  Step(Brick& brick, int round, int begin, int end, const BandSettings& settings, Push way, Sums& sums)
+  Step(Brick& brick, int round, int begin, int end, const BandSettings& settings, Sums& sums)
       : brick_(brick),
         round_(round),
         begin_(begin),
         end_(end),
         channels_(settings.channels.size()),
         growth_(growth_of(settings)),
-        push_(way),
         sums_(sums) {
     sums_.extra.resize(std::max(sums_.extra.size(), 512 * channels_));
   }
@@ -68,8 +76,8 @@ class Step {
       sums_.clear(at, channels_);
       __builtin_prefetch(&brick_.plane[at], 1);
     });
-    push(round_ - 1, wanted);
-    for (int r = 0; contested.any() && r < round_ - 1; ++r) push(r, contested);
+    gather(round_ - 1, wanted);
+    for (int r = 0; contested.any() && r < round_ - 1; ++r) gather(r, contested);
     for (int z = begin_; z < end_; ++z) {
       LayerMasks masks(round_, growth_);
       for (std::uint64_t w = wanted.words[z]; w != 0; w &= w - 1) {
@@ -92,16 +100,14 @@ class Step {
 
   /// A mask of the bricks around.
   template <class Of>
-  [[nodiscard]] Around around(const Of& of) const {
-    Around out;
-    for (std::size_t i = 0; i < 27; ++i) {
-      const Brick* const brick = brick_.around[i];
-      out[i] = brick == nullptr ? &bits::kNoBits : &of(*brick);
-    }
+  [[nodiscard]] bits::Neighbourhood around(const Of& of) const {
+    bits::Neighbourhood out{};
+    for (std::size_t i = 0; i < 27; ++i)
+      if (const Brick* const brick = brick_.around[i]) out[i / 9][i / 3 % 3][i % 3] = &of(*brick);
     return out;
   }
   [[nodiscard]] BlockMask beside_sources(std::size_t side) const {
-    return beside(around([&](const Brick& b) -> const BlockMask& { return b.source[before()][side]; }));
+    return bits::dilate(around([&](const Brick& b) -> const BlockMask& { return b.source[before()][side]; }));
   }
   [[nodiscard]] std::size_t before() const { return static_cast<std::size_t>(round_ - 1); }
 
@@ -117,8 +123,9 @@ class Step {
   /// it; of the rest the side is that of the voxels beside.
   void learn_last() {
     const BlockMask outside = beside_sources(0), inside = beside_sources(1);
-    const BlockMask oblique = beside(around([](const Brick& b) -> const BlockMask& { return b.oblique; }));
-    const BlockMask straight = facing(around([](const Brick& b) -> const BlockMask& { return b.straight; }));
+    const BlockMask oblique = bits::dilate(around([](const Brick& b) -> const BlockMask& { return b.oblique; }));
+    const BlockMask straight =
+        bits::dilate_by_faces(around([](const Brick& b) -> const BlockMask& { return b.straight; }));
     BlockMask wanted, beyond, beyond_inside;
     for (int z = begin_; z < end_; ++z) {
       const std::uint64_t all = (outside.words[z] | inside.words[z]) & ~brick_.known[round_].words[z];
@@ -148,21 +155,22 @@ class Step {
       more_negative.words[z] |= beyond_inside.words[z];
       more_known.words[z] |= beyond.words[z];
     }
-    return inside_of(more_negative, more_known).words != inside_of(brick_.negative, known).words;
+    return bits::fill_sides(more_negative, more_known) != bits::fill_sides(brick_.negative, known);
   }
 
-  void push(int round, const BlockMask& wanted) {
+  /// Sums what the sources of a round say to the voxels wanted.
+  void gather(int round, const BlockMask& wanted) {
     const Targets targets(wanted, begin_, end_);
     // Where one of them may be beside, a layer beyond the brick included. Of the bricks around only what touches this
     // one counts.
-    const std::array<std::uint64_t, 10> reached = beside_alone(wanted);
-    const auto touching = [&reached](int dx, int dy, int z) {
-      std::uint64_t w = reached[static_cast<std::size_t>(z + 1)];
+    const std::array<std::uint64_t, 10> beside = bits::dilate_alone(wanted);
+    const auto touching = [&beside](int dx, int dy, int z) {
+      std::uint64_t w = beside[static_cast<std::size_t>(z + 1)];
       if (dx != 0) w = dx < 0 ? (w & bits::columns_below(1)) << 7 : w >> 7 & bits::columns_below(1);
       return dy == 0 ? w : dy < 0 ? w << 56 : w >> 56;
     };
     // Their values are on the way from memory while the next are looked for.
-    std::array<Pusher, 32> waiting;
+    std::array<Source, 32> waiting;
     std::size_t count = 0;
     for (int i = 0; i < 27; ++i) {
       const Brick* const from = brick_.around[i];
@@ -173,19 +181,19 @@ class Step {
         for (std::uint64_t w = (sources[0].words[z & 7] | sources[1].words[z & 7]) & touching(dx, dy, z); w != 0;
              w &= w - 1) {
           const int bit = std::countr_zero(w), x = (bit & 7) + 8 * dx, y = (bit >> 3) + 8 * dy;
-          const PairBits beside = targets.beside(x, y, z);
-          if (!beside.any()) continue;
+          const PairBits pairs = targets.around(x, y, z);
+          if (!pairs.any()) continue;
           const int at = (z & 7) * 64 + bit;
           __builtin_prefetch(&from->plane[at]);
-          waiting[count++] = {from, beside, static_cast<std::int16_t>(at),
+          waiting[count++] = {from, pairs, static_cast<std::int16_t>(at),
                               static_cast<std::int16_t>(x + 8 * y + 64 * z)};
           if (count < waiting.size()) continue;
-          push_({waiting.data(), count}, channels_, sums_);
+          extrapolate({waiting.data(), count}, channels_, sums_);
           count = 0;
         }
       }
     }
-    push_({waiting.data(), count}, channels_, sums_);
+    extrapolate({waiting.data(), count}, channels_, sums_);
   }
 
   void repair_gaps() {
@@ -222,11 +230,14 @@ class Step {
   int round_, begin_, end_;
   std::size_t channels_;
   Growth growth_;
-  Push push_;
   Sums& sums_;
 };
 
 }  // namespace
+
+void extrapolate(std::span<const Source> sources, std::size_t channels, Sums& sums) {
+  for (const Source& source : sources) add_pairs(source, source.from->plane[source.at], channels, sums);
+}
 
 void Band::grow(int round, std::int32_t begin, std::int32_t end) {
   struct Job {
@@ -239,10 +250,9 @@ void Band::grow(int round, std::int32_t begin, std::int32_t end) {
       jobs.push_back({&brick, std::max(0, begin - bz * 8), std::min(8, end - bz * 8)});
     });
   }
-  static const Push way = available_pushes().back();
   tbb::parallel_for(std::size_t{0}, jobs.size(), [&](std::size_t j) {
     static thread_local Sums sums;
-    Step(*jobs[j].brick, round, jobs[j].begin, jobs[j].end, settings_, way, sums).run();
+    Step(*jobs[j].brick, round, jobs[j].begin, jobs[j].end, settings_, sums).run();
   });
 }
 

@@ -1,12 +1,13 @@
-#include "vdb/pack_leaf.h"
+#include "vdb/packed_leaf.h"
 
 #include <blosc.h>
-#include <immintrin.h>
 #include <openvdb/io/Compression.h>
 
 #include <algorithm>
 #include <array>
 #include <bit>
+
+#include "lattice/morphology.h"
 
 namespace lamina::volume {
 namespace {
@@ -26,29 +27,6 @@ void put_compressed(std::string& to, const void* data, std::size_t bytes, std::s
   if (!smaller) size = -static_cast<std::int64_t>(bytes);
   put(to, &size, sizeof size);
   put(to, smaller ? packed.data() : data, stored);
-}
-
-/// OpenVDB's own, sixteen bits to the nearest, by a table; and the processor's, which gives the same.
-void halve(std::span<const float> values, std::uint16_t* out) {
-  std::transform(values.begin(), values.end(), out, [](float v) { return openvdb::math::half(v).bits(); });
-}
-#ifndef __clang__  // which cannot ask for f16c before its version 19
-[[gnu::target("avx,f16c")]] void halve_wide(std::span<const float> values, std::uint16_t* out) {
-  std::size_t i = 0;
-  for (; i + 8 <= values.size(); i += 8) {
-    const __m128i eight = _mm256_cvtps_ph(_mm256_loadu_ps(&values[i]), _MM_FROUND_TO_NEAREST_INT);
-    _mm_storeu_si128(reinterpret_cast<__m128i*>(out + i), eight);
-  }
-  halve(values.subspan(i), out + i);
-}
-#endif
-using Halve = void (*)(std::span<const float> values, std::uint16_t* out);
-Halve fastest_halve() {
-  __builtin_cpu_init();
-#ifndef __clang__
-  if (__builtin_cpu_supports("avx") && __builtin_cpu_supports("f16c")) return &halve_wide;
-#endif
-  return &halve;
 }
 
 openvdb::CoordBBox box_of(const openvdb::Coord& origin, const BlockMask& active) {
@@ -73,20 +51,25 @@ openvdb::CoordBBox box_of(const openvdb::Coord& origin, const BlockMask& active)
 
 std::array<std::int8_t, 6> face_votes(const BlockMask& active, const BlockMask& negative) {
   // An active voxel's neighbour beyond the leaf must be on its side; the others only guess.
-  std::array<int, 6> votes{};
-  const auto count = [&](std::size_t face, std::size_t x, std::uint64_t of) {
-    const std::uint64_t a = active.words[x], n = negative.words[x];
-    votes[face] += 8 * (std::popcount(of & a & ~n) - std::popcount(of & a & n)) + std::popcount(of & ~a & ~n) -
-                   std::popcount(of & ~a & n);
-  };
-  count(0, 0, ~std::uint64_t{0}), count(1, 7, ~std::uint64_t{0});
-  for (std::size_t x = 0; x < 8; ++x) {
-    count(2, x, 0x00000000000000FFULL), count(3, x, 0xFF00000000000000ULL);
-    count(4, x, 0x0101010101010101ULL), count(5, x, 0x8080808080808080ULL);
-  }
   std::array<std::int8_t, 6> out{};
-  for (std::size_t f = 0; f < 6; ++f) out[f] = static_cast<std::int8_t>(std::clamp(votes[f] / 4, -16, 16));
+  for (int f = 0; f < 6; ++f) {
+    const BlockMask on_face = bits::face(2 - f / 2, f % 2 != 0);  // OpenVDB's last axis is the masks' first
+    const BlockMask sure = active & on_face, guessed = on_face & ~active;
+    const int votes =
+        8 * (sure.count() - 2 * (sure & negative).count()) + guessed.count() - 2 * (guessed & negative).count();
+    out[static_cast<std::size_t>(f)] = static_cast<std::int8_t>(std::clamp(votes / 4, -16, 16));
+  }
   return out;
+}
+
+std::array<std::int8_t, 6> face_votes(const openvdb::FloatTree::LeafNodeType& leaf) {
+  BlockMask active, negative;
+  for (int at = 0; at < 512; ++at) {
+    const auto voxel = static_cast<openvdb::Index>(at);
+    active.assign(at, leaf.isValueOn(voxel));
+    negative.assign(at, leaf.getValue(voxel) < 0);
+  }
+  return face_votes(active, negative);
 }
 
 void pack(const openvdb::Coord& origin, const LeafMasks& masks, std::span<const float> values, int width, bool half,
@@ -96,11 +79,7 @@ void pack(const openvdb::Coord& origin, const LeafMasks& masks, std::span<const 
   out.origin = origin;
   out.active = static_cast<std::uint32_t>(values.size() / static_cast<std::size_t>(width));
   out.box = box_of(origin, masks.active);
-  BlockMask inside, outside;  // of what is not active
-  for (std::size_t x = 0; x < 8; ++x) {
-    inside.words[x] = masks.inside.words[x] & ~masks.active.words[x];
-    outside.words[x] = ~masks.inside.words[x] & ~masks.active.words[x];
-  }
+  const BlockMask inside = masks.inside & ~masks.active, outside = ~masks.inside & ~masks.active;
   put(out.bytes, masks.active.words.data(), sizeof masks.active.words);
   const char kind = !inside.any()   ? openvdb::io::NO_MASK_OR_INACTIVE_VALS
                     : outside.any() ? openvdb::io::MASK_AND_NO_INACTIVE_VALS
@@ -111,9 +90,8 @@ void pack(const openvdb::Coord& origin, const LeafMasks& masks, std::span<const 
     put_compressed(out.bytes, values.data(), values.size_bytes(), sizeof(float));
     return;
   }
-  static const Halve halve_fast = fastest_halve();
   std::array<std::uint16_t, 3 * 512> halves;
-  halve_fast(values, halves.data());
+  std::transform(values.begin(), values.end(), halves.begin(), [](float v) { return openvdb::math::half(v).bits(); });
   put_compressed(out.bytes, halves.data(), values.size() * sizeof halves[0], sizeof halves[0]);
 }
 

@@ -1,19 +1,81 @@
 #include <fmt/format.h>
+#include <openvdb/tools/ValueTransformer.h>
+#include <openvdb/tools/VectorTransformer.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <atomic>
+#include <cmath>
+#include <functional>
+#include <string>
+#include <utility>
 #include <vector>
 
+#include "base/run.h"
 #include "lamina/error.h"
-#include "vdb/sign_tiles.h"
+#include "lamina/sample.h"
+#include "lamina/transform.h"
+#include "lamina/volume_points.h"
+#include "lamina/volume_tools.h"
+#include "vdb/points_grid.h"
+#include "vdb/tile_signs.h"
 #include "vdb/vdb_file.h"
-#include "volume/edited_grids.h"
 
 namespace lamina {
 namespace {
 
 using namespace openvdb;
+
+/// What to do with a file's grids.
+struct GridEdit {
+  std::function<void(GridBase&)> grid;  ///< any but points
+  std::function<void(SampleBatch&)> points;
+};
+
+/// Null when no point is left.
+GridBase::Ptr edited_points(const std::string& path, const std::string& name, const GridEdit& edit,
+                            VolumeEditStats& stats, const RunContext& run) {
+  PointVolume cloud = read_point_volume(path, name);
+  for (const std::string& skipped : cloud.skipped)
+    run.warn(fmt::format("{}: attribute {} of grid {} is no number and left out", path, skipped, name));
+  edit.points(cloud.points.samples);
+  if (cloud.points.samples.size() == 0) return nullptr;
+  stats.points += cloud.points.samples.size();
+  return volume::point_grid(cloud.points);
+}
+
+VolumeEditStats edit_all(const std::string& input, const GridEdit& edit, const std::string& output,
+                         const RunContext& run) {
+  VolumeEditStats stats;
+  GridCPtrVec grids;
+  for (GridBase::Ptr grid : volume::read_vdb(input).grids) {
+    if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+    const std::string name = grid->getName();
+    const bool half = grid->saveFloatAsHalf();
+    if (grid->isType<points::PointDataGrid>()) {
+      grid = edited_points(input, name, edit, stats, run);
+      if (grid == nullptr) continue;
+      volume::label(*grid, name, half);
+    } else {
+      edit.grid(*grid);
+      if (grid->empty() || grid->activeVoxelCount() == 0) continue;
+      volume::label(*grid, name, grid->saveFloatAsHalf());
+    }
+    stats.voxels += grid->activeVoxelCount();
+    grids.push_back(grid);
+  }
+  stats.grids = grids.size();
+  if (grids.empty()) throw Error(ExitCode::empty, fmt::format("{}: nothing of its grids is left", input));
+  stats.bytes = volume::write_vdb(grids, output);
+  return stats;
+}
+
+/// Reads, edits and writes: grids in, grids out, points by themselves. Grids of which nothing is left are left out.
+VolumeEditStats edit_grids(const std::string& input, const GridEdit& edit, const std::string& output,
+                           const RunContext& run) {
+  VolumeEditStats stats;
+  with_threads(run.threads, [&] { stats = edit_all(input, edit, output, run); });
+  return stats;
+}
 
 /// The region as a grid sees it.
 class VoxelRegion {
@@ -145,12 +207,49 @@ bool clip_grid(Grid& grid, const VoxelRegion& region) {
 
 using Grids = TypeList<FloatGrid, DoubleGrid, Vec3SGrid, Vec3DGrid, Int32Grid, Int64Grid, BoolGrid, MaskGrid>;
 
+/// OpenVDB multiplies rows from the left.
+Mat4d to_vdb(const Eigen::Affine3d& transform) {
+  Mat4d out;
+  for (int i = 0; i < 4; ++i)
+    for (int j = 0; j < 4; ++j) out(j, i) = transform.matrix()(i, j);
+  return out;
+}
+
+/// The one scale of all lengths, or 0 where there is none.
+double scale_of(const Eigen::Affine3d& transform) {
+  const Eigen::Matrix3d m = transform.linear();
+  const double scale = std::cbrt(std::abs(m.determinant()));
+  const Eigen::Matrix3d off = m.transpose() * m / (scale * scale) - Eigen::Matrix3d::Identity();
+  constexpr double kRounding = 1e-9;
+  return off.cwiseAbs().maxCoeff() < kRounding ? scale : 0;
+}
+
+template <class Grid>
+bool scale_values(GridBase& base, double scale) {
+  if (!base.isType<Grid>()) return false;
+  auto& grid = static_cast<Grid&>(base);
+  using Value = typename Grid::ValueType;
+  const auto by = static_cast<Value>(scale);
+  if (by == 1) return true;
+  tools::foreach (grid.beginValueAll(), [by](const auto& at) { at.setValue(*at * by); });
+  grid.tree().root().setBackground(grid.background() * by, false);
+  // 16-bit floats end at 65504, and have steps of 2^-24 near zero.
+  const double voxel = grid.voxelSize()[0], band = static_cast<double>(grid.background());
+  if (!(band * scale < 65504 && voxel * scale > 1000 * 0x1p-24)) grid.setSaveFloatAsHalf(false);
+  return true;
+}
+
+template <class Grid>
+void turn_vectors(GridBase& grid, const Mat4d& matrix) {
+  if (grid.isType<Grid>()) tools::transformVectors(static_cast<Grid&>(grid), matrix);
+}
+
 }  // namespace
 
 VolumeEditStats clip_volume(const std::string& input, const ClipRegion& region, Keep keep, const std::string& output,
                             const RunContext& run) {
   require_sane(region);
-  volume::GridEdit edit;
+  GridEdit edit;
   edit.points = [&](SampleBatch& points) { clip_rows(points, region, keep); };
   edit.grid = [&](GridBase& grid) {
     const VoxelRegion voxels(region, keep, grid.transform());
@@ -163,7 +262,38 @@ VolumeEditStats clip_volume(const std::string& input, const ClipRegion& region, 
     grid.insertMeta(volume::kOpenMetadata, BoolMetadata(true));
     volume::sign_tiles(static_cast<FloatGrid&>(grid));
   };
-  return volume::edit_grids(input, edit, output, run);
+  return edit_grids(input, edit, output, run);
+}
+
+VolumeEditStats transform_volume(const std::string& input, const Eigen::Affine3d& transform, const std::string& output,
+                                 const RunContext& run) {
+  require_invertible(transform.matrix());
+  const Mat4d matrix = to_vdb(transform);
+  const double scale = scale_of(transform);
+  GridEdit edit;
+  edit.points = [&](SampleBatch& points) { transform_rows(points, transform); };
+  edit.grid = [&](GridBase& grid) {
+    if (!grid.transform().isLinear()) {
+      throw Error(ExitCode::unreadable,
+                  fmt::format("{}: grid {} has a frustum (perspective) transform; resample it to cubic voxels first",
+                              input, grid.getName()));
+    }
+    if (grid.getGridClass() == GRID_LEVEL_SET) {
+      if (!(scale > 0)) {
+        throw Error(ExitCode::usage,
+                    fmt::format("{}: grid {} is a level set: stretched or sheared its values would be no distances; "
+                                "convert it to a mesh, transform that, and convert it back",
+                                input, grid.getName()));
+      }
+      if (!scale_values<FloatGrid>(grid, scale)) scale_values<DoubleGrid>(grid, scale);
+    }
+    turn_vectors<Vec3SGrid>(grid, matrix);
+    turn_vectors<Vec3DGrid>(grid, matrix);
+    // A transform may serve several grids of the file.
+    grid.setTransform(grid.transform().copy());
+    grid.transform().postMult(matrix);
+  };
+  return edit_grids(input, edit, output, run);
 }
 
 }  // namespace lamina
