@@ -77,14 +77,14 @@ openvdb::math::Transform::Ptr choose_transform(const Bounds& bounds, double voxe
   constexpr double kFromOrigin = 1 << 20, kLargest = 1 << 30;
   const auto& [low, high] = bounds;
   const double extent = bounds.extent();
-  double reach = 0;
-  for (std::size_t k = 0; k < 3; ++k) reach = std::max({reach, -low[k], high[k]});
+  double farthest = 0;
+  for (std::size_t k = 0; k < 3; ++k) farthest = std::max({farthest, -low[k], high[k]});
   if (voxel > bounds.diagonal())
     wrong_usage(
         fmt::format("--voxelsize {:g}: larger than the whole mesh, which spans {:g}", voxel, bounds.diagonal()));
-  if (0.5 * extent / voxel + band > kLargest || reach / voxel > kLargest * kFromOrigin)
+  if (0.5 * extent / voxel + band > kLargest || farthest / voxel > kLargest * kFromOrigin)
     wrong_usage(fmt::format("--voxelsize {:g}: too small for a mesh of this size ({:g}, coordinates up to {:g})", voxel,
-                            extent, reach));
+                            extent, farthest));
   // OpenVDB takes a smaller voxel for a singular transform.
   constexpr double kSmallest = 1.5e-5;
   if (voxel < kSmallest) {
@@ -92,7 +92,7 @@ openvdb::math::Transform::Ptr choose_transform(const Bounds& bounds, double voxe
                             voxel, kSmallest));
   }
   auto transform = openvdb::math::Transform::createLinearTransform(voxel);
-  if (reach / voxel <= kFromOrigin) return transform;
+  if (farthest / voxel <= kFromOrigin) return transform;
   openvdb::Vec3d middle;
   for (int k = 0; k < 3; ++k) {
     const auto i = static_cast<std::size_t>(k);

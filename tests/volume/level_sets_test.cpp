@@ -174,7 +174,10 @@ TEST_F(LevelSets, AreFoundAmongOtherGrids) {
   EXPECT_THAT(refusal("Cd"), HasSubstr("grid Cd is no level set"));
   EXPECT_THAT(refusal("none"),
               HasSubstr("no grid called none; it holds Cd (vec3s values), a_smaller_one (a level set)"));
-  auto doubles = openvdb::DoubleGrid::create(0.6);
+  // Made by the library, as a file's are (grids.h).
+  const auto doubles =
+      openvdb::gridPtrCast<openvdb::DoubleGrid>(openvdb::GridBase::createGrid(openvdb::DoubleGrid::gridType()));
+  doubles->tree().root().setBackground(0.6, false);
   doubles->setName("d");
   doubles->tree().setValueOn({1, 2, 3}, 0.25);
   EXPECT_EQ(through_file({doubles}).name(), "d");

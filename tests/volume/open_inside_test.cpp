@@ -15,7 +15,7 @@ using openvdb::FloatGrid;
 constexpr float kBand = 3;
 const openvdb::CoordBBox kSheet(Coord(0, 0, -8), Coord(23, 39, 7));
 
-/// A square sheet in the middle of two layers of leaves, inside below; nothing is known beyond its rim.
+/// A square sheet in the middle of two layers of leaves, inside below; nothing is known beyond its edge.
 FloatGrid::Ptr sheet() {
   openvdb::initialize();
   auto grid = FloatGrid::create(kBand);
