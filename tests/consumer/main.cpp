@@ -1,7 +1,9 @@
 // Points to a mesh in a dozen lines; the README shows this file.
 #include <iostream>
+#include <string_view>
 
 #include "lamina/error.h"
+#include "lamina/run.h"
 #include "lamina/surface.h"
 
 int main(int argc, char** argv) {
