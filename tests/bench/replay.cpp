@@ -6,6 +6,7 @@
 #include <cstdio>
 #include <limits>
 
+#include "isosurface/number_edges.h"
 #include "mls/diffuse.h"
 #include "mls/extension.h"
 #include "octree/mark_samples.h"
