@@ -97,14 +97,14 @@ std::optional<Mean> mean_at(const std::vector<Centre>& centres, const std::array
   return mean;
 }
 
-struct Scene {
+struct DiffuseScene {
   CloudSettings cloud;
   Lattice lattice;
 };
-std::vector<Scene> scenes() {
-  std::vector<Scene> out{{{Shape::sphere, 400, {-300, 700, 50}, 600, 70, 350}, {64, 3}},
-                         {{Shape::torus, 400, {5000, 0, -5000}, 700, 60, 400}, {50, 4}},
-                         {{Shape::scatter, 150, {0, 0, 0}, 500, 70, 300}, {61, 3}}};
+std::vector<DiffuseScene> diffuse_scenes() {
+  std::vector<DiffuseScene> out{{{Shape::sphere, 400, {-300, 700, 50}, 600, 70, 350}, {64, 3}},
+                                {{Shape::torus, 400, {5000, 0, -5000}, 700, 60, 400}, {50, 4}},
+                                {{Shape::scatter, 150, {0, 0, 0}, 500, 70, 300}, {61, 3}}};
   out[0].cloud.attributes = 2;
   out[1].cloud.noise = 0.1;
   out[2].cloud.radius_spread = 2;
@@ -122,7 +122,7 @@ void diffuse_all(StreamedCloud& s) {
 }
 
 TEST(Diffuse, CornersTakeTheMeanOfTheCellsThatTouchThem) {
-  for (const Scene& scene : scenes()) {
+  for (const DiffuseScene& scene : diffuse_scenes()) {
     StreamedCloud s(random_cloud(scene.cloud, 11), scene.lattice, {}, 83);
     diffuse_all(s);
     const std::vector<Centre> centres = centres_of(s.window, s.first, s.end);
@@ -160,7 +160,7 @@ TEST(Diffuse, CornersTakeTheMeanOfTheCellsThatTouchThem) {
 }
 
 TEST(Diffuse, ThreadsGiveTheSameBits) {
-  for (const Scene& scene : scenes()) {
+  for (const DiffuseScene& scene : diffuse_scenes()) {
     std::vector<std::uint64_t> bits;
     for (const std::size_t n : {1U, 2U, 4U}) {
       const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, n);

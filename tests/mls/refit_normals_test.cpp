@@ -15,7 +15,7 @@ using Vector = std::array<double, 3>;
 
 constexpr double kUnit = 1e7;  ///< steps
 
-struct Scene {
+struct RefitScene {
   LocalSamples samples;
   std::vector<Vector> truth;
   double radius = 0;  ///< two spacings, steps
@@ -40,10 +40,10 @@ struct Scene {
   }
 };
 
-Scene sphere(std::size_t count) {
+RefitScene sphere(std::size_t count) {
   std::mt19937 random(3);
   std::normal_distribution<> normal;
-  Scene scene;
+  RefitScene scene;
   scene.radius = 2 * kUnit * std::sqrt(4 * std::numbers::pi / static_cast<double>(count));
   for (std::size_t i = 0; i < count; ++i) {
     Vector v{normal(random), normal(random), normal(random)};
@@ -54,7 +54,7 @@ Scene sphere(std::size_t count) {
   return scene;
 }
 
-UnitNormals refitted(const Scene& scene, float support) {
+UnitNormals refitted(const RefitScene& scene, float support) {
   const auto radius = static_cast<float>(scene.radius);
   RefitNormals refit({support, radius, 0}, {static_cast<std::int32_t>(radius), 4}, select_kernel());
   refit.add(0, scene.samples, std::vector<float>(scene.samples.size(), radius));
@@ -76,7 +76,7 @@ double error_of(const std::vector<Vector>& truth, const std::vector<float>& x, c
 }
 
 TEST(RefitNormals, OfASphereComeNearTheTruth) {
-  Scene scene = sphere(6000);
+  RefitScene scene = sphere(6000);
   scene.perturb(0.5);
   const double before = error_of(scene.truth, scene.samples.nx, scene.samples.ny, scene.samples.nz);
   EXPECT_GT(before, 0.3);
@@ -91,7 +91,7 @@ TEST(RefitNormals, OfASphereComeNearTheTruth) {
 }
 
 TEST(RefitNormals, OfAnExactSphereStayExact) {
-  Scene scene = sphere(6000);
+  RefitScene scene = sphere(6000);
   scene.perturb(0);
   for (const float support : {2.0F, 4.0F}) {
     const UnitNormals n = refitted(scene, support);
@@ -103,7 +103,7 @@ TEST(RefitNormals, OfAnExactSphereStayExact) {
 TEST(RefitNormals, OfTwoSidesOfASheet) {
   std::mt19937 random(5);
   std::uniform_real_distribution<> u(-1, 1);
-  Scene scene;
+  RefitScene scene;
   const std::size_t count = 4000;
   scene.radius = 2 * kUnit * std::sqrt(4.0 / (count / 2.0));
   for (std::size_t i = 0; i < count; ++i) {
@@ -118,7 +118,7 @@ TEST(RefitNormals, OfTwoSidesOfASheet) {
 }
 
 TEST(RefitNormals, StayWhereTooFewSamplesAreNear) {
-  Scene scene;
+  RefitScene scene;
   scene.radius = 0.01 * kUnit;
   for (int i = 0; i < 40; ++i) scene.add({0.1 * i, 0, 0.05 * (i % 3)}, {0, 1, 0});
   scene.perturb(0.3);
@@ -130,7 +130,7 @@ TEST(RefitNormals, StayWhereTooFewSamplesAreNear) {
 
 /// Buckets that come and go give the normals that all together give, up to the order of sums.
 TEST(RefitNormals, DoNotDependOnBuckets) {
-  Scene scene = sphere(6000);
+  RefitScene scene = sphere(6000);
   scene.perturb(0.5);
   const UnitNormals whole = refitted(scene, 3);
   const auto radius = static_cast<float>(scene.radius);
