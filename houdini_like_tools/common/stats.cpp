@@ -97,7 +97,7 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
   j["blend"] = s.plan.blend;
   j["refit"] = s.plan.refit;
   j["cell"] = to_string(s.plan.cell);
-  j["thin_cells"] = s.plan.thin_cells;
+  j["sheet_refinement"] = s.plan.refine_sheets;
   j["watertight"] = s.plan.watertight;
   j["finest_cell"] = s.plan.finest_cell;
   j["slab_height"] = s.plan.slab_height;

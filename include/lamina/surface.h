@@ -86,8 +86,8 @@ struct SurfacePlan {
   double noise = 0;             ///< median distance of samples from the surface their neighbours suggest, in radii
   double blend = 0, refit = 0;  ///< as given or chosen
   Length cell;
-  bool thin_cells = false;  ///< half of it where things are thin
-  bool watertight = false;  ///< as given or chosen
+  bool refine_sheets = false;  ///< half of it where things are thin
+  bool watertight = false;     ///< as given or chosen
   double finest_cell = 0;
   int levels = 0;
   double slab_height = 0;

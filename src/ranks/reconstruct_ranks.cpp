@@ -91,7 +91,7 @@ void check_job(const SurfaceSettings& settings, const RunContext& run, bool firs
 BucketSpan buckets_for(const ReconstructionPlan& plan, const SlabStore& store, const SlabSpan& span) {
   const ZRead z = z_read(plan, span);
   const double filter = plan.refit.support > 0 ? RefitNormals(plan.refit, plan.lattice, select_kernel()).halo() : 0;
-  return buckets_read(store, plan.radii, plan.given_radii, z.from, z.to, filter);
+  return buckets_read(store, feed_halo(plan.feed, plan.lattice, plan.radii, plan.given_radii, filter), z.from, z.to);
 }
 
 /// A run that ends when another rank's has, and speaks on rank 0 alone; warnings of the others are kept for it.

@@ -30,7 +30,7 @@ void choose_for_even(bool cell_given, StageSettings& out) {
   out.projection.trusted_samples = kEvenTrustedSamples;
   out.holes.watertight = true;
   if (cell_given) return;
-  out.feed.thin_cells = true;
+  out.feed.refine_sheets = true;
   out.projection.band = kSheetBand;
 }
 
@@ -63,7 +63,7 @@ StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& surve
 std::string describe_choice(const SurfaceSettings& settings, const SurfacePlan& plan) {
   if (settings.blend) return "";
   return fmt::format("noise {:.2g} r: chosen --blend {:g} --cell {}{} --refit {:g}{}", plan.noise, plan.blend,
-                     to_string(plan.cell), plan.thin_cells ? " (half of it where things are thin)" : "", plan.refit,
+                     to_string(plan.cell), plan.refine_sheets ? " (half of it where things are thin)" : "", plan.refit,
                      plan.watertight ? " --watertight yes" : "");
 }
 

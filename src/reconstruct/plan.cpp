@@ -47,7 +47,7 @@ Levels choose_levels(int asked, const FeedSettings& feed, const RadiusSurvey& ra
   const double ratio = cell_per_radius(feed);
   const double main = kMainCell * ratio * radii.median;
   const int finer = std::max(0, static_cast<int>(std::ceil(std::log2(main / (ratio * radii.low)) - 1e-9))) +
-                    (feed.thin_cells ? 1 : 0);
+                    (feed.refine_sheets ? 1 : 0);
   const int coarser = std::max(0, static_cast<int>(std::floor(std::log2(ratio * radii.high / main))));
   const int count = asked > 0 ? asked : std::clamp(finer + coarser + 1, kDefaultLevels, kMaxLevels);
   return {std::ldexp(main, -std::min(finer, count - 1)), count};
@@ -92,7 +92,8 @@ RadiiSettings counting_cells(const SurfaceSettings& s, const ReconstructionPlan&
   } else {
     const double blend = plan.feed.cell_follows_support() ? plan.feed.blend : 1.0;
     // Counting cells follow the radii, which know nothing of sheets.
-    finest_radius = (plan.feed.thin_cells ? 2.0 : 1.0) * plan.lattice.cell / (kMainCell * plan.feed.cell.value * blend);
+    finest_radius =
+        (plan.feed.refine_sheets ? 2.0 : 1.0) * plan.lattice.cell / (kMainCell * plan.feed.cell.value * blend);
   }
   const double half = kCountingHalfWidth * std::sqrt(s.density / 16.0) * finest_radius / s.radius_scale;
   out.finest_cell = static_cast<std::int32_t>(2 * std::clamp(std::lrint(half), 1L, 1L << 24));
@@ -169,7 +170,7 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
   // Cells follow the radii, so most cells tell the median radius and larger ones as much more. Cells that are smaller
   // between sheets tell nothing.
   plan.vertices.radii = {influence / static_cast<double>(plan.lattice.cell_size(plan.main_level)),
-                         plan.feed.thin_cells ? influence : 0};
+                         plan.feed.refine_sheets ? influence : 0};
   plan.pruning = {s.prune_triangles, resolve(s.prune_size, median, plan.feed.blend)};
   plan.mesh_attributes = plan.attributes;
   if (s.vertex_levels) plan.mesh_attributes.push_back({"level", ScalarType::uint8});
@@ -285,7 +286,7 @@ SurfacePlan summary_of(const ReconstructionPlan& p) {
   out.blend = p.feed.blend;
   out.refit = p.refit.support;
   out.cell = p.feed.cell;
-  out.thin_cells = p.feed.thin_cells;
+  out.refine_sheets = p.feed.refine_sheets;
   out.watertight = p.holes.watertight;
   out.finest_cell = p.lattice.cell * step;
   out.levels = p.lattice.levels;

@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/resize_anew.h"
-#include "samples/thin_cells.h"
 
 namespace lamina {
 namespace {
@@ -16,29 +16,27 @@ constexpr int kReadAhead = 2;
 /// Buckets beyond them that the system is told of.
 constexpr int kAnnounceAhead = 6;
 
-/// Side of the coarsest counting cells, steps.
-std::int64_t counting_height(const RadiiSettings& radii) {
-  return std::int64_t{radii.finest_cell} << (radii.levels - 1);
-}
-
 std::int64_t cell_of(std::int64_t z, std::int64_t height) {
   return z / height - (z % height < 0 ? 1 : 0);
 }
 
-/// The first bucket that a feed beginning at z reads; `counting`: side of the coarsest counting cells, 0 where there
-/// are none; `filter_halo`: of the filter of normals.
-std::size_t first_bucket(const SlabStore& store, std::int64_t z, std::int64_t counting, double filter_halo) {
+/// The first bucket that a feed beginning at z reads.
+std::size_t first_bucket(const SlabStore& store, std::int64_t z, const FeedHalo& halo) {
   const auto first_reaching = [&](std::int64_t from) {
     std::size_t bucket = 0;
     while (bucket < store.buckets() && (store.count(bucket) == 0 || store.z_upper(bucket) < from)) ++bucket;
     return bucket;
   };
   std::size_t first = first_reaching(z);
-  if (filter_halo > 0 && first < store.buckets())
-    first = first_reaching(store.z_lower(first) - static_cast<std::int64_t>(filter_halo));
-  if (counting == 0 || first == store.buckets()) return first;
-  // A radius depends on the counting cells above and below the sample's own.
-  return first_reaching((cell_of(store.z_lower(first), counting) - 1) * counting);
+  // What the first one's samples depend on, last things first: levels on normals, these on radii.
+  const auto widen_to_cell_below = [&](std::int64_t cell) {
+    if (cell > 0 && first < store.buckets()) first = first_reaching((cell_of(store.z_lower(first), cell) - 1) * cell);
+  };
+  widen_to_cell_below(halo.sheet_cell);
+  if (halo.normal_filter > 0 && first < store.buckets())
+    first = first_reaching(store.z_lower(first) - static_cast<std::int64_t>(halo.normal_filter));
+  widen_to_cell_below(halo.counting_cell);
+  return first;
 }
 
 /// H as the samples' arithmetic has it.
@@ -65,14 +63,24 @@ float support_limit(const FeedSettings& settings, const Lattice& lattice) {
   return radius_limit(settings, lattice) * blend_of(settings);
 }
 
+FeedHalo feed_halo(const FeedSettings& settings, const Lattice& lattice, const RadiiSettings& radii, bool given_radii,
+                   double filter_halo) {
+  FeedHalo halo;
+  if (!given_radii) halo.counting_cell = std::int64_t{radii.finest_cell} << (radii.levels - 1);
+  halo.normal_filter = filter_halo;
+  if (settings.refines_sheets()) halo.sheet_cell = lattice.cell_size(lattice.levels - 1);
+  return halo;
+}
+
 SampleFeed::SampleFeed(SlabStore& store, const Lattice& lattice, const FeedSettings& settings,
                        const RadiiSettings& radii, bool given_radii)
     : store_(store),
       lattice_(lattice),
       settings_(settings),
-      counting_height_(counting_height(radii)),
+      radii_(radii),
       cache_(store, lattice, settings.cache_bytes) {
   if (!given_radii) estimator_ = std::make_unique<RadiusEstimator>(radii);
+  if (settings.refines_sheets()) sheets_ = std::make_unique<SheetRefinement>(lattice);
   radius_limit_ = radius_limit(settings, lattice);
   support_limit_ = lamina::support_limit(settings, lattice);
 }
@@ -89,15 +97,14 @@ std::size_t SampleFeed::next_filled(std::size_t bucket) const {
 }
 
 void SampleFeed::begin_at(std::int64_t z) {
-  const std::size_t first =
-      first_bucket(store_, z, estimator_ == nullptr ? 0 : counting_height_, filter_ == nullptr ? 0 : filter_->halo());
-  pushed_ = announced_ = measured_ = ready_ = first_ = first;
+  const FeedHalo halo =
+      feed_halo(settings_, lattice_, radii_, estimator_ == nullptr, filter_ == nullptr ? 0 : filter_->halo());
+  pushed_ = announced_ = measured_ = oriented_ = ready_ = first_ = first_bucket(store_, z, halo);
 }
 
-BucketSpan buckets_read(const SlabStore& store, const RadiiSettings& radii, bool given_radii,
-                        std::optional<std::int64_t> from, std::int64_t to, double filter_halo) {
-  const std::int64_t height = given_radii ? 0 : counting_height(radii);
-  BucketSpan span{from ? first_bucket(store, *from, height, filter_halo) : 0, 0};
+BucketSpan buckets_read(const SlabStore& store, const FeedHalo& halo, std::optional<std::int64_t> from,
+                        std::int64_t to) {
+  BucketSpan span{from ? first_bucket(store, *from, halo) : 0, 0};
   std::int64_t known = to;  // below this all samples are asked for
   span.end = span.begin;
   const auto ask_below = [&](std::int64_t limit) {
@@ -106,47 +113,48 @@ BucketSpan buckets_read(const SlabStore& store, const RadiiSettings& radii, bool
       ++span.end;
     }
   };
+  const auto above_next_cell = [&](std::int64_t cell) { return (cell_of(known - 1, cell) + 2) * cell; };
   ask_below(to);
-  if (filter_halo > 0) ask_below(known + static_cast<std::int64_t>(filter_halo) + 1);
-  if (given_radii) return span;
+  if (halo.sheet_cell > 0) ask_below(above_next_cell(halo.sheet_cell));
+  if (halo.normal_filter > 0) ask_below(known + static_cast<std::int64_t>(halo.normal_filter) + 1);
+  if (halo.counting_cell == 0) return span;
   // The last one's radii are final when a sample lies beyond the counting cells above its own.
-  const std::int64_t beyond = (cell_of(known - 1, height) + 2) * height;
+  const std::int64_t beyond = above_next_cell(halo.counting_cell);
   while (span.end < store.buckets() && store.z_upper(span.end) < beyond) ++span.end;
   span.end = std::min(span.end + 1, store.buckets());
   return span;
 }
 
 void SampleFeed::prepare(std::int64_t z_limit, const OnReady& on_ready) {
-  std::size_t& front = estimator_ == nullptr ? measured_ : pushed_;  // next to be read for the first time
-  const auto read_ahead = [&] {
-    std::size_t next = front;
-    for (int i = 0; i < kReadAhead && (next = next_filled(next)) < store_.buckets(); ++i) cache_.prefetch(next++);
-    announced_ = std::max(announced_, next);
-    for (int i = 0; i < kAnnounceAhead && (next = next_filled(next)) < store_.buckets(); ++i, ++next) {
-      if (next < announced_) continue;
-      store_.will_read(next);
-      announced_ = next + 1;
-    }
-  };
   while (ready_ < store_.buckets()) {
     // Buckets are ascending and disjoint in z: the next one decides.
     const std::size_t next = next_filled(ready_);
     if (next == store_.buckets() || store_.z_lower(next) >= z_limit) break;
-    if (ready_ < measured_ && is_surrounded(ready_)) {
-      make_ready(on_ready);
-      continue;
-    }
-    std::vector<float> radii;
-    if (estimator_ == nullptr) {
-      read_ahead();
-      if (store_.count(measured_) > 0) radii = cache_.get(measured_)->samples.radius;
-      learn(std::move(radii));
-      continue;
-    }
-    if (estimator_->pop(radii)) {
-      learn(std::move(radii));
-      continue;
-    }
+    if (!hand_over_next(on_ready) && !orient_next()) measure_next();
+  }
+  read_ahead();
+}
+
+void SampleFeed::read_ahead() {
+  std::size_t next = estimator_ == nullptr ? measured_ : pushed_;  // to be read for the first time
+  for (int i = 0; i < kReadAhead && (next = next_filled(next)) < store_.buckets(); ++i) cache_.prefetch(next++);
+  announced_ = std::max(announced_, next);
+  for (int i = 0; i < kAnnounceAhead && (next = next_filled(next)) < store_.buckets(); ++i, ++next) {
+    if (next < announced_) continue;
+    store_.will_read(next);
+    announced_ = next + 1;
+  }
+}
+
+void SampleFeed::measure_next() {
+  std::vector<float> radii;
+  if (estimator_ == nullptr) {
+    read_ahead();
+    if (store_.count(measured_) > 0) radii = cache_.get(measured_)->samples.radius;
+    learn_radii(std::move(radii));
+  } else if (estimator_->pop(radii)) {
+    learn_radii(std::move(radii));
+  } else {
     read_ahead();
     if (store_.count(pushed_) > 0) {
       estimator_->push(cache_.get(pushed_)->samples);
@@ -155,29 +163,9 @@ void SampleFeed::prepare(std::int64_t z_limit, const OnReady& on_ready) {
     }
     if (++pushed_ == store_.buckets()) estimator_->finish();
   }
-  read_ahead();
 }
 
-bool SampleFeed::is_surrounded(std::size_t bucket) const {
-  if (filter_ == nullptr || store_.count(bucket) == 0 || measured_ == store_.buckets()) return true;
-  const std::size_t next = next_filled(measured_);
-  return next == store_.buckets() ||
-         static_cast<double>(store_.z_lower(next)) > static_cast<double>(store_.z_upper(bucket)) + filter_->halo();
-}
-
-void SampleFeed::make_ready(const OnReady& on_ready) {
-  if (store_.count(ready_) > 0) {
-    if (filter_ != nullptr) {
-      known_[ready_].normals = filter_->find(ready_);
-      filter_->forget_below(static_cast<std::int64_t>(store_.z_lower(ready_)) -
-                            static_cast<std::int64_t>(filter_->halo()) - 1);
-    }
-    on_ready(*fetch(ready_));
-  }
-  ++ready_;
-}
-
-void SampleFeed::learn(std::vector<float> radii) {
+void SampleFeed::learn_radii(std::vector<float> radii) {
   Known& known = known_[measured_];
   for (float& r : radii) {
     ++counts_.samples;
@@ -194,6 +182,43 @@ void SampleFeed::learn(std::vector<float> radii) {
   if (filter_ != nullptr && !radii.empty()) filter_->add(measured_, cache_.get(measured_)->samples, radii);
   known.radius = std::move(radii);
   ++measured_;
+}
+
+std::int64_t SampleFeed::first_from(std::size_t bucket) const {
+  const std::size_t next = next_filled(bucket);
+  return next == store_.buckets() ? std::numeric_limits<std::int64_t>::max() : std::int64_t{store_.z_lower(next)};
+}
+
+bool SampleFeed::orient_next() {
+  if (oriented_ == measured_) return false;
+  if (store_.count(oriented_) > 0) {
+    if (filter_ != nullptr) {
+      const double halo = filter_->halo();
+      if (static_cast<double>(first_from(measured_)) <= static_cast<double>(store_.z_upper(oriented_)) + halo)
+        return false;
+      known_[oriented_].normals = filter_->find(oriented_);
+      filter_->forget_below(std::int64_t{store_.z_lower(oriented_)} - static_cast<std::int64_t>(halo) - 1);
+    }
+    if (sheets_ != nullptr) {
+      const auto bucket = fetch(oriented_);
+      sheets_->push(bucket->samples, bucket->level, bucket->support);
+    }
+  }
+  ++oriented_;
+  return true;
+}
+
+bool SampleFeed::hand_over_next(const OnReady& on_ready) {
+  if (ready_ == oriented_) return false;
+  if (store_.count(ready_) > 0) {
+    if (sheets_ != nullptr) {
+      if (!sheets_->pop(first_from(oriented_), known_[ready_].finer)) return false;
+      annotate(ready_, *cache_.get(ready_));
+    }
+    on_ready(*fetch(ready_));
+  }
+  ++ready_;
+  return true;
 }
 
 void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
@@ -221,9 +246,9 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
       const float q = r > 0 ? finest / r : 0.0F;
       out.weight[i] = q * q * (has_quality ? out.samples.quality[i] : 1.0F);
       out.level[i] = fixed ? std::uint8_t{0} : level_for(static_cast<double>(r) * ratio, lattice_);
+      if (!known.finer.empty() && known.finer[i]) --out.level[i];
     }
   });
-  if (settings_.thin_cells && !fixed) refine_thin(lattice_, out.samples, known.radius, out.level);
 }
 
 std::shared_ptr<const ActiveBucket> SampleFeed::fetch(std::size_t bucket) {

@@ -14,6 +14,7 @@
 #include "lattice/lattice.h"
 #include "samples/bucket_cache.h"
 #include "samples/radius_estimator.h"
+#include "samples/sheet_refinement.h"
 #include "store/slab_store.h"
 
 namespace lamina {
@@ -47,7 +48,7 @@ struct FeedSettings {
   double blend = 1;        ///< H: a sample's support radius R_i is H r_i
   /// Largest leaf cell that a sample allows: a length, the same for all, or a multiple of its r_i or R_i.
   Length cell{0.9, Length::Unit::influence_radius};
-  bool thin_cells = false;              ///< a level less where normals cancel (samples/thin_cells.h)
+  bool refine_sheets = false;           ///< a level less where sheets lie close together (SheetRefinement)
   float max_radius = 0;                 ///< samples with a larger r_i are left out, steps; 0: none
   std::size_t cache_bytes = 64u << 20;  ///< memory for samples kept between uses
   /// Samples looked at together: large enough to keep every thread busy, small enough to stay in memory whatever H is.
@@ -55,6 +56,7 @@ struct FeedSettings {
 
   /// Every sample asks for the finest level.
   [[nodiscard]] bool fixed_cell() const { return cell.unit == Length::Unit::world; }
+  [[nodiscard]] bool refines_sheets() const { return refine_sheets && !fixed_cell(); }
   /// The largest leaf cell in units of R_i (or, in units of r_i, where cells do not follow the support).
   [[nodiscard]] double cell_ratio() const { return fixed_cell() ? 1.0 : cell.value; }
   [[nodiscard]] bool cell_follows_support() const { return cell.unit != Length::Unit::sample_radius; }
@@ -75,10 +77,21 @@ struct BucketSpan {
   std::size_t begin = 0, end = 0;
 };
 
+/// How far along z what a sample gets depends on others; heights of cells lying on multiples of theirs, 0 where nothing
+/// of the kind is done. In steps.
+struct FeedHalo {
+  std::int64_t counting_cell = 0;  ///< radii depend on the coarsest counting cells above and below the sample's
+  double normal_filter = 0;        ///< normals on samples as far as NormalFilter::halo()
+  std::int64_t sheet_cell = 0;     ///< levels on the coarsest cells above and below the sample's
+};
+/// `filter_halo`: NormalFilter::halo(), 0 without one.
+FeedHalo feed_halo(const FeedSettings& settings, const Lattice& lattice, const RadiiSettings& radii, bool given_radii,
+                   double filter_halo = 0);
+
 /// The buckets that a feed reads which begins at `from` (begin_at(); nothing: at the bottom) and prepares all below
-/// `to`: it may look for two more, but does without them. `filter_halo`: NormalFilter::halo(), 0 without one.
-BucketSpan buckets_read(const SlabStore& store, const RadiiSettings& radii, bool given_radii,
-                        std::optional<std::int64_t> from, std::int64_t to, double filter_halo = 0);
+/// `to`: it may look for two more, but does without them.
+BucketSpan buckets_read(const SlabStore& store, const FeedHalo& halo, std::optional<std::int64_t> from,
+                        std::int64_t to);
 
 /// Buckets go by ascending z: prepare() runs ahead, release() follows behind. Inside a bucket samples are sorted by
 /// blocks of cells (feed/block_order.h): successive ones lie close to each other, which the stages may rely on for
@@ -116,28 +129,35 @@ class SampleFeed {
   struct Known {
     std::vector<float> radius;  ///< r_i, steps
     float max_support = 0;
-    UnitNormals normals;  ///< where they are filtered
+    UnitNormals normals;      ///< where they are filtered
+    std::vector<bool> finer;  ///< which samples take a level less; empty: none
   };
   void annotate(std::size_t bucket, ActiveBucket& out) const;
   /// The next bucket with samples from `bucket` on, the number of buckets when there is none.
   [[nodiscard]] std::size_t next_filled(std::size_t bucket) const;
   std::shared_ptr<const ActiveBucket> fetch(std::size_t bucket);
-  void learn(std::vector<float> radii);
-  /// Whether the filter knows all that acts on a bucket with radii.
-  [[nodiscard]] bool is_surrounded(std::size_t bucket) const;
-  void make_ready(const OnReady& on_ready);
+  // A bucket passes these steps, each when the buckets around have passed the one before; false: not yet.
+  void measure_next();
+  void learn_radii(std::vector<float> radii);
+  bool orient_next();
+  bool hand_over_next(const OnReady& on_ready);
+  /// Least z of the samples from a bucket on, beyond all z when there are none.
+  [[nodiscard]] std::int64_t first_from(std::size_t bucket) const;
+  void read_ahead();
 
   SlabStore& store_;
   Lattice lattice_;
   FeedSettings settings_;
-  std::int64_t counting_height_;                ///< of the coarsest counting cells, steps
+  RadiiSettings radii_;
   std::unique_ptr<RadiusEstimator> estimator_;  ///< null when the input gave radii
+  std::unique_ptr<SheetRefinement> sheets_;     ///< null where sheets are not refined
   float support_limit_;
   float radius_limit_;
   std::size_t pushed_ = 0;     ///< buckets handed to the estimator
   std::size_t announced_ = 0;  ///< buckets the store knows are wanted
   std::size_t measured_ = 0;   ///< buckets with known radii
-  std::size_t ready_ = 0;      ///< of these, with their final normals
+  std::size_t oriented_ = 0;   ///< of these, with their final normals
+  std::size_t ready_ = 0;      ///< of these, with their final levels
   std::size_t first_ = 0;      ///< first bucket not released
   NormalFilter* filter_ = nullptr;
   std::unordered_map<std::size_t, Known> known_;

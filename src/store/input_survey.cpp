@@ -195,7 +195,7 @@ Defect defect_of(const SampleBatch& b, std::size_t i) {
   const double ny = b.ny[i];
   const double nz = b.nz[i];
   const double n2 = nx * nx + ny * ny + nz * nz;
-  if (!std::isfinite(n2) || n2 < 1e-24) return Defect::normal;
+  if (!std::isfinite(n2) || n2 < kLeastNormalSquared) return Defect::normal;
   if (!b.radius.empty() && !(b.radius[i] > 0 && std::isfinite(b.radius[i]))) return Defect::radius;
   if (!b.quality.empty() && !(b.quality[i] >= 0 && std::isfinite(b.quality[i]))) return Defect::quality;
   return Defect::none;

@@ -25,6 +25,9 @@ const char* describe(Defect defect);
 /// The defect of sample i of a batch.
 Defect defect_of(const SampleBatch& batch, std::size_t i);
 
+/// Squared length that a normal must have to tell a direction.
+inline constexpr double kLeastNormalSquared = 1e-24;
+
 /// Largest attribute value a run takes: weighted sums of greater ones would overflow float.
 inline constexpr float kLargestAttribute = 1e18F;
 /// An attribute's value as a run takes it: NaN (what other programs write for "no value") is 0.

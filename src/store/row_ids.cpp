@@ -4,16 +4,17 @@
 
 #include <cmath>
 
+#include "store/input_survey.h"
+
 namespace lamina {
 namespace {
 
 constexpr std::size_t kDigits = RowIdSource::kDigits;
 constexpr std::uint64_t kGiven = 1ULL << 47;  ///< no file has so many rows
-constexpr double kShortest = 1e-24;           ///< squared length; a reconstruction takes no shorter normals either
 
 bool is_usable(float x, float y, float z) {
   const double squared = double{x} * double{x} + double{y} * double{y} + double{z} * double{z};
-  return std::isfinite(squared) && squared >= kShortest;
+  return std::isfinite(squared) && squared >= kLeastNormalSquared;
 }
 
 std::uint64_t id_of(const LocalSamples& samples, std::size_t i) {

@@ -29,8 +29,8 @@ TEST(ChooseSupport, EvenCleanCloudsGetTheNarrowestSupport) {
   EXPECT_EQ(even.feed.cell.unit, Length::Unit::sample_radius);
   EXPECT_EQ(varying.feed.blend, 1.2);
   EXPECT_EQ(even.refit.support + varying.refit.support, 0);
-  EXPECT_TRUE(even.feed.thin_cells && even.holes.watertight);
-  EXPECT_FALSE(varying.feed.thin_cells || varying.holes.watertight);
+  EXPECT_TRUE(even.feed.refine_sheets && even.holes.watertight);
+  EXPECT_FALSE(varying.feed.refine_sheets || varying.holes.watertight);
 }
 
 TEST(ChooseSupport, ClosedMeshesAreMadeWhereAskedFor) {
@@ -67,7 +67,7 @@ TEST(ChooseSupport, GivenNumbersStand) {
   EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).refit.support, 0);
   EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).feed.cell, *settings.cell);
   EXPECT_GT(choose_support(settings, survey(0.2F, 2)).feed.blend, 2);
-  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2)).feed.thin_cells);
+  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2)).feed.refine_sheets);
 }
 
 }  // namespace

@@ -1,0 +1,64 @@
+// Finer cells where two sheets of a surface lie closer than a cell, by what the samples' normals say.
+#pragma once
+#include <cstdint>
+#include <deque>
+#include <limits>
+#include <vector>
+
+#include "base/floor_divide.h"
+#include "lattice/lattice.h"
+#include "store/slab_store.h"
+
+namespace lamina {
+
+/// Normals cancel where their sum is shorter than this share of their number. One sheet that turns by a right angle has
+/// 0.7, two that face each other next to none, or what one of them has more.
+inline constexpr double kCancelledShare = 0.5;
+
+/// A sample takes a level less where the normals in the 27 cells of its level around it cancel: two sheets lie there
+/// closer than a cell, or one turns sharply, and neither comes out well in cells of that size. Cells hold the samples
+/// of their own level; those of the finest level and those left out count nowhere.
+///
+/// Slides along z: buckets are pushed as they ascend and popped once all samples around theirs are known. The result is
+/// a function of the samples and their levels alone, not of how they are cut into buckets or ordered. Keeps four bytes
+/// for each sample not popped, and the cells around.
+class SheetRefinement {
+ public:
+  explicit SheetRefinement(const Lattice& lattice);
+  /// The next bucket's samples with the levels they ask for; `support` 0: left out.
+  void push(const LocalSamples& samples, const std::vector<std::uint8_t>& level, const std::vector<float>& support);
+  /// Which samples of the next pushed bucket take a level less. False while samples around them may be missing: all
+  /// those below `pushed_below` have been pushed.
+  bool pop(std::int64_t pushed_below, std::vector<bool>& finer);
+
+ private:
+  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+  enum class Verdict : std::uint8_t { open, pending, stays, finer };
+  /// The samples in a cell. Sums of integers do not depend on their order.
+  struct CellNormals {
+    Cell cell;
+    std::uint8_t level = 0;
+    Verdict verdict = Verdict::open;
+    std::uint32_t samples = 0;
+    std::int64_t x = 0, y = 0, z = 0;  ///< sum of the normals, in units of 1 / kUnit
+  };
+  struct WaitingBucket {
+    std::vector<std::uint32_t> cell_of;                            ///< of each sample; kNone: does not count
+    std::int64_t low = std::numeric_limits<std::int64_t>::max();   ///< least z of the samples that count
+    std::int64_t high = std::numeric_limits<std::int64_t>::min();  ///< upper end of the cells around them
+  };
+  [[nodiscard]] std::size_t slot_of(const Cell& cell, std::uint8_t level) const;  ///< where it is or would be
+  std::uint32_t touch(const Cell& cell, std::uint8_t level);
+  void rehash();
+  [[nodiscard]] bool cancels_around(const CellNormals& middle) const;
+
+  Lattice lattice_;
+  std::vector<FloorDivider> to_cell_;  ///< by level
+  std::vector<CellNormals> cells_;     ///< a cell keeps its index until it is forgotten
+  std::vector<std::uint32_t> free_;    ///< indices of forgotten ones
+  std::vector<std::uint32_t> slots_ = std::vector<std::uint32_t>(64, kNone);  ///< a power of two, at most half full
+  std::int64_t needed_from_ = std::numeric_limits<std::int64_t>::min();       ///< z of samples still to be judged
+  std::deque<WaitingBucket> waiting_;
+};
+
+}  // namespace lamina
