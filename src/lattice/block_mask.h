@@ -38,11 +38,13 @@ struct alignas(64) BlockMask {
     for (std::size_t z = 0; z < 8; ++z) words[z] &= o.words[z];
     return *this;
   }
-  friend BlockMask operator|(BlockMask a, const BlockMask& b) { return a |= b; }
-  friend BlockMask operator&(BlockMask a, const BlockMask& b) { return a &= b; }
-  friend BlockMask operator~(BlockMask a) {
-    for (std::uint64_t& w : a.words) w = ~w;
-    return a;
+  // By reference: values this large come with a remark of GCC's on its calling conventions.
+  friend BlockMask operator|(const BlockMask& a, const BlockMask& b) { return BlockMask(a) |= b; }
+  friend BlockMask operator&(const BlockMask& a, const BlockMask& b) { return BlockMask(a) &= b; }
+  friend BlockMask operator~(const BlockMask& a) {
+    BlockMask out;
+    for (std::size_t z = 0; z < 8; ++z) out.words[z] = ~a.words[z];
+    return out;
   }
 };
 

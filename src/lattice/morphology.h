@@ -190,16 +190,17 @@ inline BlockMask dilate_by_faces(const BlockMask& alone) {
 }
 
 /// All of `within` that is connected with `seeds` there, through faces.
-inline BlockMask connected(BlockMask seeds, const BlockMask& within) {
-  for (BlockMask before = seeds;; before = seeds) {
-    seeds |= dilate_by_faces(seeds) & within;
-    if (seeds == before) return seeds;
+inline BlockMask connected(const BlockMask& seeds, const BlockMask& within) {
+  BlockMask out = seeds;
+  for (BlockMask before = out;; before = out) {
+    out |= dilate_by_faces(out) & within;
+    if (out == before) return out;
   }
 }
 
-/// Bits that are not `known` take the side of the nearest that are, outside first. `inside`: of `known`.
-inline BlockMask fill_sides(BlockMask inside, const BlockMask& known) {
-  BlockMask outside = known & ~inside;
+/// Bits that are not `known` take the side of the nearest that are, outside first. `negative`: the inside of `known`.
+inline BlockMask fill_sides(const BlockMask& negative, const BlockMask& known) {
+  BlockMask inside = negative, outside = known & ~inside;
   if (!inside.any()) return inside;
   for (BlockMask rest = ~known; rest.any(); rest = ~(inside | outside)) {
     const BlockMask more = dilate_by_faces(outside) & rest;

@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "base/cell_hash.h"
+#include "base/hashing.h"
 
 namespace lamina {
 namespace {
