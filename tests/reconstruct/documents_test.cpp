@@ -8,6 +8,7 @@
 #include <iterator>
 #include <map>
 #include <regex>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -24,7 +25,7 @@ std::string text_of(const fs::path& path) {
 }
 
 fs::path in_sources(const std::string& path) {
-  return fs::path(LAMINA_SOURCE_DIR) / "src" / path;
+  return fs::path(LAMINA_SOURCE_DIR) / (path.starts_with("lamina/") ? "include" : "src") / path;
 }
 
 /// Source and name, as in "mls/project.h" and "band".
@@ -72,15 +73,17 @@ TEST(Constants, TheTableSaysWhatTheCodeHas) {
 // What is tuned is a number with a fraction; of these none is missing from the table.
 TEST(Constants, TheTableHasAllOfTheCore) {
   const auto rows = documented();
+  // Definitions, powers of two, and the cost model, whose coefficients are in docs/performance.md.
+  const std::set<std::string> not_tuned{"kLow", "kMedianDeviation", "kPositive", "kPlaces", "kEfficiency"};
   const std::regex fraction(R"(constexpr (?:float|double) (\w+) = -?[0-9]*\.[0-9]+F?)");
   for (const char* room : {"octree", "mls", "isosurface", "boundary", "clustering", "samples", "reconstruct"}) {
     for (const auto& entry : fs::directory_iterator(in_sources(room))) {
       const std::string text = text_of(entry.path());
       const std::string source = std::string(room) + "/" + entry.path().filename().string();
-      // The cost model's coefficients are fitted to runs, and docs/performance.md has them.
       if (source == "reconstruct/cost.cpp") continue;
       for (std::sregex_iterator i(text.begin(), text.end(), fraction), end; i != end; ++i)
-        EXPECT_TRUE(rows.contains({source, (*i)[1]})) << source << ": " << (*i)[1] << " is not in docs/method.md";
+        EXPECT_TRUE(not_tuned.contains((*i)[1]) || rows.contains({source, (*i)[1]}))
+            << source << ": " << (*i)[1] << " is not in docs/method.md";
     }
   }
 }
