@@ -11,8 +11,8 @@
 #include <string_view>
 
 #include "base/descriptor.h"
-#include "lamina/file_ending.h"
 #include "lamina/error.h"
+#include "lamina/file_ending.h"
 #include "lamina/info.h"
 
 namespace lamina {

@@ -188,6 +188,7 @@ class Projector::Level {
   void add_batch(const NumberedBuckets& numbers, const std::vector<std::uint32_t>& tiles,
                  std::vector<TileState>& kept) {
     std::vector<Block> blocks;
+    blocks.reserve(tiles.size());
     for (const std::uint32_t t : tiles) blocks.push_back(work_[t].tile.block);
     const ClusteredBatch batch = scratch_.load(numbers, feed_, lattice_);
     const TileRuns bins = bin_clusters(lattice_, layers_, batch, blocks);

@@ -44,8 +44,8 @@ struct Plane {
 Plane fit_plane(const Moments& moments);
 
 struct DirectionSettings {
-  int k = 16;        ///< neighbours the plane is fitted to
-  float radius = 0;  ///< steps; above 0: all neighbours within it, however many
+  int k = 16;               ///< neighbours the plane is fitted to
+  float radius = 0;         ///< steps; above 0: all neighbours within it, however many
   float search_radius = 0;  ///< steps: samples farther apart are no neighbours
 };
 

@@ -6,8 +6,8 @@
 #include "lamina/surface.h"
 #include "mls/project.h"
 #include "mls/refit_normals.h"
-#include "samples/sampling_survey.h"
 #include "samples/sample_feed.h"
+#include "samples/sampling_survey.h"
 
 namespace lamina {
 

@@ -116,8 +116,8 @@ std::uint64_t samples_of(const std::vector<WeightedRadius>& radii) {
                          [](std::uint64_t n, auto& r) { return n + r.samples; });
 }
 
-float quantile(const std::vector<WeightedRadius>& sorted, std::uint64_t total, double q) {
-  auto left = static_cast<std::uint64_t>(q * static_cast<double>(total - 1));
+float quantile(const std::vector<WeightedRadius>& sorted, std::uint64_t total, double share) {
+  auto left = static_cast<std::uint64_t>(share * static_cast<double>(total - 1));
   for (const auto& [radius, samples] : sorted) {
     if (left < samples) return radius;
     left -= samples;

@@ -12,13 +12,13 @@
 namespace lamina {
 namespace {
 
-constexpr std::int32_t kSide = 1000;  ///< of a cell of level 1
-const Lattice kLattice{kSide / 2, 4};
+constexpr std::int32_t kSheetSide = 1000;  ///< of a cell of level 1
+const Lattice kSheetLattice{kSheetSide / 2, 4};
 
 /// A square of 20 x 20 cells at a height, four samples a cell; of x and y from somewhere on.
 void add_sheet(std::int32_t z, float facing, LocalSamples& out, std::int32_t from = 0) {
   std::mt19937 random(7);
-  std::uniform_int_distribution<std::int32_t> at(0, 20 * kSide - 1);
+  std::uniform_int_distribution<std::int32_t> at(0, 20 * kSheetSide - 1);
   for (int i = 0; i < 1600; ++i) {
     const std::int32_t x = at(random), y = at(random);
     if (std::min(x, y) < from) continue;
@@ -36,7 +36,7 @@ constexpr std::int64_t kAll = std::numeric_limits<std::int64_t>::max();
 /// The levels that samples get which ask for these; radius 0: left out.
 std::vector<std::uint8_t> levels_of(const LocalSamples& samples, std::vector<std::uint8_t> levels,
                                     const std::vector<float>& radius) {
-  SheetRefinement sheets(kLattice);
+  SheetRefinement sheets(kSheetLattice);
   sheets.push(samples, levels, radius);
   std::vector<bool> finer;
   EXPECT_TRUE(sheets.pop(kAll, finer));
@@ -66,13 +66,13 @@ TEST(SheetRefinement, OneSheetIsNotNorAreTwoThatLieThreeCellsApart) {
 TEST(SheetRefinement, OnlyWhereBothSheetsAre) {
   LocalSamples wall;
   add_sheet(200, 1, wall);
-  add_sheet(700, -1, wall, 10 * kSide);
+  add_sheet(700, -1, wall, 10 * kSheetSide);
   const std::vector<std::uint8_t> levels = levels_of(wall, 1);
   for (std::size_t i = 0; i < 1600; ++i) {
     const std::int32_t nearest = std::min(wall.x[i], wall.y[i]);
-    if (nearest >= 12 * kSide) {
+    if (nearest >= 12 * kSheetSide) {
       EXPECT_EQ(levels[i], 0);
-    } else if (nearest < 9 * kSide) {
+    } else if (nearest < 9 * kSheetSide) {
       EXPECT_EQ(levels[i], 1);
     }
   }
@@ -92,13 +92,13 @@ TEST(SheetRefinement, TheFinestLevelStaysAndLeftOutSamplesDoNotCount) {
 /// Normals that agree the more the farther to the right they are; so many cells tall.
 LocalSamples disagreeing_cloud(int count, std::uint32_t seed, double height) {
   std::mt19937 random(seed);
-  std::uniform_int_distribution<std::int32_t> at(-4 * kSide, 4 * kSide);
+  std::uniform_int_distribution<std::int32_t> at(-4 * kSheetSide, 4 * kSheetSide);
   std::normal_distribution<float> normal;
   LocalSamples cloud;
   for (int i = 0; i < count; ++i) {
     cloud.x.push_back(at(random));
     const float x = normal(random), y = normal(random);
-    const float z = normal(random) + static_cast<float>(cloud.x.back()) / static_cast<float>(kSide);
+    const float z = normal(random) + static_cast<float>(cloud.x.back()) / static_cast<float>(kSheetSide);
     const float length = std::hypot(x, y, z);
     cloud.y.push_back(at(random));
     cloud.z.push_back(static_cast<std::int32_t>(at(random) * height / 8));
@@ -116,7 +116,7 @@ TEST(SheetRefinement, AgreesWithLookingAtAllSamples) {
   EXPECT_GT(std::accumulate(levels.begin(), levels.end(), 0), 0);
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const auto near = [&](const std::vector<std::int32_t>& v, std::size_t j) {
-      return std::abs(floor_div(v[i], kSide) - floor_div(v[j], kSide)) <= 1;
+      return std::abs(floor_div(v[i], kSheetSide) - floor_div(v[j], kSheetSide)) <= 1;
     };
     double x = 0, y = 0, z = 0, count = 0;
     for (std::size_t j = 0; j < cloud.size(); ++j) {
@@ -158,7 +158,7 @@ TEST(SheetRefinement, DoesNotDependOnWhereBucketsAreCut) {
   const std::vector<std::uint8_t> whole = levels_of(cloud, wanted, std::vector<float>(cloud.size(), 900));
   EXPECT_NE(whole, wanted);
   for (const std::size_t size : {1U, 7U, 100U, 1111U}) {
-    SheetRefinement sheets(kLattice);
+    SheetRefinement sheets(kSheetLattice);
     std::vector<bool> finer;
     std::size_t popped = 0;
     std::size_t most_waiting = 0;
@@ -179,7 +179,10 @@ TEST(SheetRefinement, DoesNotDependOnWhereBucketsAreCut) {
       pop_all(end < cloud.size() ? cloud.z[by_z[end]] : kAll);
     }
     EXPECT_EQ(popped, cloud.size());
-    if (size < 100) EXPECT_LT(most_waiting, cloud.size());  // two cells of the coarsest level are waited for, not all
+    // Two cells of the coarsest level are waited for, not all.
+    if (size < 100) {
+      EXPECT_LT(most_waiting, cloud.size());
+    }
   }
 }
 
