@@ -279,11 +279,11 @@ std::unique_ptr<PointSource> with_normals(std::unique_ptr<PointSource> source, c
 
 std::size_t NormalsReport::worst_slab() const {
   // A few links say nothing.
-  constexpr std::uint64_t kEnough = 1000;
+  constexpr std::uint64_t kEnoughLinks = 1000;
   std::size_t worst = 0;
   double share = -1;
   for (std::size_t i = 0; i < slabs.size(); ++i) {
-    if (slabs[i].pairs < std::min(kEnough, conflicts.pairs) || slabs[i].share() <= share) continue;
+    if (slabs[i].pairs < std::min(kEnoughLinks, conflicts.pairs) || slabs[i].share() <= share) continue;
     share = slabs[i].share();
     worst = i;
   }
