@@ -195,6 +195,7 @@ class RanksJob {
     SlabStore& store = cloud.ingested.store;
     const std::vector<SlabSpan> spans = cut(plan, store, ranks_.size());
     std::vector<BucketSpan> wanted;
+    wanted.reserve(spans.size());
     for (const SlabSpan& span : spans) wanted.push_back(span.empty() ? BucketSpan{} : buckets_for(plan, store, span));
     const auto rank = static_cast<std::size_t>(ranks_.rank());
     const SlabSpan own = spans[rank];
