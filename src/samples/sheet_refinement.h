@@ -1,5 +1,6 @@
 // Finer cells where two sheets of a surface lie closer than a cell, by what the samples' normals say.
 #pragma once
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <limits>
@@ -33,28 +34,32 @@ class SheetRefinement {
 
  private:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
-  enum class Verdict : std::uint8_t { open, pending, stays, finer };
   /// The samples in a cell. Sums of integers do not depend on their order.
   struct CellNormals {
-    Cell cell;
-    std::uint8_t level = 0;
-    Verdict verdict = Verdict::open;
-    std::uint32_t samples = 0;
     std::int64_t x = 0, y = 0, z = 0;  ///< sum of the normals, in units of 1 / kUnit
+    std::uint32_t samples = 0;
+  };
+  /// 2^3 cells of a level: what surrounds all of them is found by 27 look-ups instead of by 27 for each. A bit per
+  /// cell.
+  struct Block {
+    Cell at;  ///< coordinates of its cells, halved
+    std::uint8_t level = 0;
+    std::uint8_t wanted = 0, decided = 0, finer = 0;
+    std::array<CellNormals, 8> cells{};
   };
   struct WaitingBucket {
-    std::vector<std::uint32_t> cell_of;                            ///< of each sample; kNone: does not count
+    std::vector<std::uint32_t> cell_of;  ///< of each sample: index of its block * 8 + cell; kNone: does not count
     std::int64_t low = std::numeric_limits<std::int64_t>::max();   ///< least z of the samples that count
     std::int64_t high = std::numeric_limits<std::int64_t>::min();  ///< upper end of the cells around them
   };
-  [[nodiscard]] std::size_t slot_of(const Cell& cell, std::uint8_t level) const;  ///< where it is or would be
-  std::uint32_t touch(const Cell& cell, std::uint8_t level);
+  [[nodiscard]] std::size_t slot_of(const Cell& block, std::uint8_t level) const;  ///< where it is or would be
+  std::uint32_t touch(const Cell& block, std::uint8_t level);
   void rehash();
-  [[nodiscard]] bool cancels_around(const CellNormals& middle) const;
+  void decide(Block& block) const;
 
   Lattice lattice_;
   std::vector<FloorDivider> to_cell_;  ///< by level
-  std::vector<CellNormals> cells_;     ///< a cell keeps its index until it is forgotten
+  std::vector<Block> blocks_;          ///< a block keeps its index until it is forgotten
   std::vector<std::uint32_t> free_;    ///< indices of forgotten ones
   std::vector<std::uint32_t> slots_ = std::vector<std::uint32_t>(64, kNone);  ///< a power of two, at most half full
   std::int64_t needed_from_ = std::numeric_limits<std::int64_t>::min();       ///< z of samples still to be judged
