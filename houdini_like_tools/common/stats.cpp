@@ -10,6 +10,8 @@ void add_cleaning(nlohmann::ordered_json& j, const SurfaceStats& s, const Surfac
                   {"merged", c.merged},
                   {"outliers", c.outliers},
                   {"outlier_distance", c.outlier_distance},
+                  {"lonely", c.lonely},
+                  {"off_surface", c.off_surface},
                   {"thinned", c.thinned}};
   if (settings.prune_triangles > 0 || settings.prune_size.value > 0) {
     j["pruned"] = {{"kept_parts", s.pruned.kept},

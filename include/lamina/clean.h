@@ -25,9 +25,10 @@ struct CleanSettings {
   std::optional<double> merge;    ///< >= 0; 0: equal positions only (to 2^-30 of the cloud's diagonal)
   double sigma = 0;               ///< > 0; 0: outliers stay
   std::uint32_t neighbours = 16;  ///< 1..256, of the outlier test
+  bool strays = false;            ///< samples on no surface of their neighbours are left out, by a test local to them
   double spacing = 0;             ///< > 0: least distance between samples; 0: none
   /// True when a step looks at other samples: then several passes are needed.
-  [[nodiscard]] bool looks_around() const { return merge.has_value() || sigma > 0 || spacing > 0; }
+  [[nodiscard]] bool looks_around() const { return merge.has_value() || sigma > 0 || strays || spacing > 0; }
 };
 
 /// Samples that each step has left out.
@@ -35,6 +36,8 @@ struct CleanCounts {
   std::uint64_t clipped = 0;  ///< outside the box
   std::uint64_t skipped = 0;  ///< by RowPick::every
   std::uint64_t merged = 0, outliers = 0, thinned = 0;
+  std::uint64_t lonely = 0;       ///< strays far from their neighbours
+  std::uint64_t off_surface = 0;  ///< strays on no surface of their neighbours
   double outlier_distance = 0;  ///< input units: samples with a larger mean distance to their neighbours were outliers
 };
 

@@ -1,4 +1,4 @@
-// Nearest and near points: a balanced kd-tree over a set of positions in double (normals/sample_tree.h is the one for k
+// Nearest and near points: a balanced kd-tree over a set of positions in double (samples/sample_tree.h is the one for k
 // nearest samples of a window).
 #pragma once
 #include <array>

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "normals/sample_tree.h"
+#include "samples/sample_tree.h"
 #include "normals/sample_window.h"
 
 namespace lamina::normals {

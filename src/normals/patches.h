@@ -4,7 +4,7 @@
 #include <cstdint>
 
 #include "normals/patch_graph.h"
-#include "normals/sample_tree.h"
+#include "samples/sample_tree.h"
 #include "normals/sample_window.h"
 #include "normals/viewpoints.h"
 

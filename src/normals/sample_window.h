@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "normals/sample_tree.h"
+#include "samples/sample_tree.h"
 #include "store/slab_store.h"
 
 namespace lamina::normals {

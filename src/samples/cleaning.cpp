@@ -8,6 +8,7 @@
 
 #include "lamina/clean.h"
 #include "lamina/error.h"
+#include "samples/strays.h"
 #include "samples/thinner.h"
 
 namespace lamina {
@@ -42,6 +43,8 @@ std::string describe(const CleanCounts& c) {
   add(c.skipped, "skipped");
   add(c.merged, "duplicates merged");
   add(c.outliers, fmt::format("outliers (mean distance above {:.4g})", c.outlier_distance));
+  add(c.lonely, "strays far from others");
+  add(c.off_surface, "strays on no surface");
   add(c.thinned, "thinned out");
   return text;
 }
@@ -96,6 +99,11 @@ KeepMasks choose_samples(const SlabStore& store, const Cleaning& cleaning, Clean
     counts.outliers = outliers.count;
     counts.outlier_distance = outliers.limit * cleaning.step;
   }
+  if (settings.strays) {
+    const StrayCounts strays = drop_strays(store, masks, run);
+    counts.lonely = strays.lonely;
+    counts.off_surface = strays.off_surface;
+  }
   if (settings.spacing > 0) counts.thinned = thin_store(store, settings.spacing / cleaning.step, masks, run);
   return masks;
 }
@@ -106,12 +114,13 @@ void clean_ingested(Ingested& in, const Cleaning& cleaning, const std::string& n
   if (in.store.total() == 0)
     throw Error(ExitCode::empty, fmt::format("{}: cleaning has left no samples ({})", name, describe(counts)));
   // Far outliers would have the sweep go through their emptiness.
-  if (counts.merged + counts.outliers + counts.thinned > 0) in.extent = extent_of(in.store);
+  if (counts.merged + counts.outliers + counts.lonely + counts.off_surface + counts.thinned > 0)
+    in.extent = extent_of(in.store);
 }
 
 std::string cleaning_words(const CleanSettings& settings) {
   // Every setting by name: one that is added must be dealt with here, or this does not compile.
-  const auto& [pick, merge, sigma, neighbours, spacing] = settings;
+  const auto& [pick, merge, sigma, neighbours, strays, spacing] = settings;
   const auto& [clip, every] = pick;
   std::string words;
   const auto add = [&](bool given, const std::string& text) {
@@ -124,6 +133,7 @@ std::string cleaning_words(const CleanSettings& settings) {
   add(every > 1, fmt::format("every {}", every));
   add(merge.has_value(), fmt::format("merge {}", merge.value_or(0)));
   add(sigma > 0, fmt::format("outliers {} neighbours {}", sigma, neighbours));
+  add(strays, "strays");
   add(spacing > 0, fmt::format("spacing {}", spacing));
   return words;
 }

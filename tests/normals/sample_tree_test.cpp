@@ -1,4 +1,4 @@
-#include "normals/sample_tree.h"
+#include "samples/sample_tree.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
