@@ -22,10 +22,9 @@ namespace {
 constexpr std::uint64_t kSurveyed = 1u << 16;   ///< samples the spacing is taken from
 constexpr std::uint64_t kStraySlab = 1u << 17;  ///< samples tested together, at least
 /// How far neighbours are looked for, in median density radii (two spacings each).
-constexpr double kStrayReach = 12;
-/// Where more than this share of all samples goes, others may have been kept by those alone: one more look.
-constexpr double kManyStrays = 1e-3;
-constexpr int kLooks = 2;
+constexpr double kStrayReach = 6;
+/// Neighbours looked for, so that enough are left when some of them are strays.
+constexpr std::size_t kLookedAt = 16;
 
 struct Oriented {
   std::vector<std::int32_t> x, y, z;
@@ -63,9 +62,10 @@ class Neighbourhoods {
   /// Of the slab itself and not of its surroundings.
   [[nodiscard]] bool is_own(std::size_t place) const { return bucket_[place] >= first_ && bucket_[place] < end_; }
   [[nodiscard]] std::size_t bucket(std::size_t place) const { return bucket_[place]; }
-  /// Own, or near enough to be a neighbour of one that is.
-  [[nodiscard]] bool is_near(std::size_t place) const {
-    return samples_.z[place] >= low_ - halo_ / 2 && samples_.z[place] <= high_ + halo_ / 2;
+  /// Within `margin` of the slab's samples along z.
+  [[nodiscard]] bool is_near(std::size_t place, float margin) const {
+    const auto by = static_cast<std::int64_t>(margin);
+    return samples_.z[place] >= low_ - by && samples_.z[place] <= high_ + by;
   }
 
  private:
@@ -140,70 +140,104 @@ class Neighbourhoods {
   std::unique_ptr<SampleTree> tree_;
 };
 
-/// What is known of each place of a slab's tree.
-struct Loneliness {
+/// What is known of the places of a slab's tree.
+struct Surroundings {
   std::vector<float> distance;            ///< mean distance to the neighbours; negative: not looked at
-  std::vector<std::uint32_t> neighbours;  ///< kStrayNeighbours for each place
+  std::vector<std::uint32_t> neighbours;  ///< kLookedAt for each place, nearest first
   std::vector<std::uint8_t> count;        ///< of them
-  std::vector<std::uint8_t> off_surface;
+  std::vector<std::uint8_t> stray;        ///< Verdict
 };
 
-bool is_off_surface(const Oriented& s, std::size_t place, const Neighbour* found, std::size_t count) {
-  if (count == 0) return true;
-  const float limit = kNearPlane * std::sqrt(found[count - 1].squared);
-  std::size_t on = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    const std::size_t n = found[i].sample;
+enum Verdict : std::uint8_t { kStays, kIsLonely, kIsOffSurface };
+
+/// The neighbours of a place that have not been found to be strays.
+struct Company {
+  std::array<std::uint32_t, kStrayNeighbours> places;
+  std::size_t count = 0;
+};
+
+Company company_of(const Surroundings& known, std::size_t place) {
+  Company out;
+  for (std::size_t k = 0; k < known.count[place] && out.count < kStrayNeighbours; ++k) {
+    const std::uint32_t n = known.neighbours[place * kLookedAt + k];
+    if (known.stray[n] == kStays) out.places[out.count++] = n;
+  }
+  return out;
+}
+
+float mean_distance(const Oriented& s, std::size_t place, const Company& company, float reach) {
+  float sum = static_cast<float>(kStrayNeighbours - company.count) * reach;  // those not found are at least there
+  for (std::size_t k = 0; k < company.count; ++k) {
+    const std::size_t n = company.places[k];
     const auto dx = static_cast<float>(s.x[n] - s.x[place]);
     const auto dy = static_cast<float>(s.y[n] - s.y[place]);
     const auto dz = static_cast<float>(s.z[n] - s.z[place]);
-    const float off = std::abs(dx * s.nx[place] + dy * s.ny[place] + dz * s.nz[place]);
-    const float cosine = std::abs(s.nx[n] * s.nx[place] + s.ny[n] * s.ny[place] + s.nz[n] * s.nz[place]);
-    on += off <= limit && cosine > kAlongSurface ? 1 : 0;
+    sum += std::sqrt(dx * dx + dy * dy + dz * dz);
   }
-  return static_cast<float>(on) < kLeastOnSurface * static_cast<float>(count);
+  return sum / static_cast<float>(kStrayNeighbours);
 }
 
-Loneliness look_around(const Neighbourhoods& around, float reach) {
+bool is_off_surface(const Oriented& s, std::size_t place, const Company& company) {
+  if (company.count == 0) return true;
+  std::array<float, kStrayNeighbours> off;
+  float farthest2 = 0;
+  for (std::size_t i = 0; i < company.count; ++i) {
+    const std::size_t n = company.places[i];
+    const auto dx = static_cast<float>(s.x[n] - s.x[place]);
+    const auto dy = static_cast<float>(s.y[n] - s.y[place]);
+    const auto dz = static_cast<float>(s.z[n] - s.z[place]);
+    off[i] = std::abs(dx * s.nx[place] + dy * s.ny[place] + dz * s.nz[place]);
+    farthest2 = std::max(farthest2, dx * dx + dy * dy + dz * dz);
+  }
+  const float limit = kNearPlane * std::sqrt(farthest2);
+  std::size_t along = 0;  // its surface, facing its way
+  std::size_t against = 0;
+  std::array<float, 3> mean{};  // of all neighbours' normals
+  for (std::size_t i = 0; i < company.count; ++i) {
+    const std::size_t n = company.places[i];
+    const float cosine = s.nx[n] * s.nx[place] + s.ny[n] * s.ny[place] + s.nz[n] * s.nz[place];
+    along += off[i] <= limit && cosine > kAlongSurface ? 1 : 0;
+    against += off[i] <= limit && cosine < -kAlongSurface ? 1 : 0;
+    mean[0] += s.nx[n];
+    mean[1] += s.ny[n];
+    mean[2] += s.nz[n];
+  }
+  const auto all = static_cast<float>(company.count);
+  const float agreement = std::sqrt(mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2]) / all;
+  // Neighbours that do not agree among themselves say nothing of the way a sample faces.
+  if (agreement < kAgreeing) along += against;
+  return static_cast<float>(along) < kLeastOnSurface * all;
+}
+
+void find_neighbours(const Neighbourhoods& around, float reach, Surroundings& out) {
   const SampleTree& tree = around.tree();
-  const Oriented& samples = around.samples();
-  Loneliness out;
-  out.distance.assign(tree.size(), -1);
-  out.neighbours.resize(tree.size() * kStrayNeighbours);
+  out.neighbours.resize(tree.size() * kLookedAt);
   out.count.assign(tree.size(), 0);
-  out.off_surface.assign(tree.size(), 0);
+  out.stray.assign(tree.size(), kStays);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree.leaves(), 64), [&](const auto& range) {
-    std::array<Neighbour, SampleTree::kMostInLeaf * kStrayNeighbours> found;
+    std::array<Neighbour, SampleTree::kMostInLeaf * kLookedAt> found;
     std::array<std::size_t, SampleTree::kMostInLeaf> counts;
     for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf) {
       const SampleTree::Places places = tree.places_of(leaf);
       bool near = false;
-      for (std::size_t p = places.begin; p < places.end && !near; ++p) near = around.is_near(p);
+      for (std::size_t p = places.begin; p < places.end && !near; ++p) near = around.is_near(p, 2 * reach);
       if (!near) continue;
-      tree.nearest_to_leaf(leaf, kStrayNeighbours, reach * reach, found.data(), counts.data());
+      tree.nearest_to_leaf(leaf, kLookedAt, reach * reach, found.data(), counts.data());
       for (std::size_t i = 0; i < places.size(); ++i) {
         const std::size_t p = places.begin + i;
-        const Neighbour* const own = found.data() + i * kStrayNeighbours;
-        float sum = static_cast<float>(kStrayNeighbours - counts[i]) * reach;  // those not found are at least there
-        for (std::size_t k = 0; k < counts[i]; ++k) {
-          sum += std::sqrt(own[k].squared);
-          out.neighbours[p * kStrayNeighbours + k] = own[k].sample;
-        }
         out.count[p] = static_cast<std::uint8_t>(counts[i]);
-        out.distance[p] = sum / static_cast<float>(kStrayNeighbours);
-        out.off_surface[p] = is_off_surface(samples, p, own, counts[i]) ? 1 : 0;
+        for (std::size_t k = 0; k < counts[i]; ++k) out.neighbours[p * kLookedAt + k] = found[i * kLookedAt + k].sample;
       }
     }
   });
-  return out;
 }
 
-/// The median of the same at the neighbours; 0 where there are none.
-float usual_distance(const Loneliness& known, std::size_t place) {
+/// The median of the distances of its company; 0 where it has none.
+float usual_distance(const Surroundings& known, const Company& company) {
   std::array<float, kStrayNeighbours> distances;
   std::size_t n = 0;
-  for (std::size_t k = 0; k < known.count[place]; ++k) {
-    const float d = known.distance[known.neighbours[place * kStrayNeighbours + k]];
+  for (std::size_t k = 0; k < company.count; ++k) {
+    const float d = known.distance[company.places[k]];
     if (d >= 0) distances[n++] = d;
   }
   if (n == 0) return 0;
@@ -212,36 +246,52 @@ float usual_distance(const Loneliness& known, std::size_t place) {
   return *middle;
 }
 
-StrayCounts look(const SlabStore& store, float reach, KeepMasks& masks, const RunContext& run) {
-  StrayCounts counts;
-  const KeepMasks before = masks;
-  Neighbourhoods around(store, before, 2 * static_cast<std::int64_t>(reach));
-  while (around.advance()) {
-    if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
-    const Loneliness known = look_around(around, reach);
-    for (std::size_t p = 0; p < around.tree().size(); ++p) {
-      if (!around.is_own(p)) continue;
-      const bool lonely = known.distance[p] > kLonely * usual_distance(known, p);
-      if (!lonely && known.off_surface[p] == 0) continue;
-      masks[around.bucket(p)][around.samples().number[p]] = false;
-      ++(lonely ? counts.lonely : counts.off_surface);
+/// Judges the places within `margin` of the slab by what stays around them.
+void judge_places(const Neighbourhoods& around, float reach, float margin, Surroundings& known) {
+  const Oriented& samples = around.samples();
+  const auto for_places = [&](float within, const auto& each) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, samples.size(), 4096), [&](const auto& range) {
+      for (std::size_t p = range.begin(); p < range.end(); ++p) {
+        if (around.is_near(p, within) && known.stray[p] == kStays) each(p);
+      }
+    });
+  };
+  known.distance.assign(samples.size(), -1);
+  for_places(margin + reach,
+             [&](std::size_t p) { known.distance[p] = mean_distance(samples, p, company_of(known, p), reach); });
+  std::vector<std::uint8_t> verdicts = known.stray;
+  for_places(margin, [&](std::size_t p) {
+    const Company company = company_of(known, p);
+    if (known.distance[p] > kLonely * usual_distance(known, company)) {
+      verdicts[p] = kIsLonely;
+    } else if (is_off_surface(samples, p, company)) {
+      verdicts[p] = kIsOffSurface;
     }
-  }
-  return counts;
+  });
+  known.stray = std::move(verdicts);
 }
 
 }  // namespace
 
 StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, const RunContext& run) {
   const RadiusSurvey radii = survey_radii(store, kSurveyed);
-  constexpr double kMostReach = 1 << 28;
+  constexpr double kMostReach = 1 << 27;
   const auto reach = static_cast<float>(std::clamp(kStrayReach * double{radii.median}, 1.0, kMostReach));
   StrayCounts counts;
-  for (int i = 0; i < kLooks; ++i) {
-    const StrayCounts found = look(store, reach, masks, run);
-    counts.lonely += found.lonely;
-    counts.off_surface += found.off_surface;
-    if (static_cast<double>(found.all()) <= kManyStrays * static_cast<double>(store.total())) break;
+  const KeepMasks before = masks;
+  Neighbourhoods around(store, before, 3 * static_cast<std::int64_t>(reach));
+  Surroundings known;
+  while (around.advance()) {
+    if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+    find_neighbours(around, reach, known);
+    // Strays keep each other company: those left are judged again without the others.
+    judge_places(around, reach, reach, known);
+    judge_places(around, reach, 0, known);
+    for (std::size_t p = 0; p < around.tree().size(); ++p) {
+      if (!around.is_own(p) || known.stray[p] == kStays) continue;
+      masks[around.bucket(p)][around.samples().number[p]] = false;
+      ++(known.stray[p] == kIsLonely ? counts.lonely : counts.off_surface);
+    }
   }
   return counts;
 }

@@ -21,6 +21,9 @@ inline constexpr float kLonely = 2.5F;
 /// not asked: it is often wrong.
 inline constexpr float kNearPlane = 0.5F;
 inline constexpr float kAlongSurface = 0.26F;
+/// Which of two ways they face is asked where the neighbours agree among themselves: where the mean of their normals is
+/// at least so long. That of a dozen normals with signs by chance is a third.
+inline constexpr float kAgreeing = 0.7F;
 /// A sample lies on no surface when fewer of its neighbours than this share do: of a ball filled at random a third is
 /// near the plane, and a third of those face along it; at a right edge half of them do.
 inline constexpr float kLeastOnSurface = 0.35F;
@@ -32,7 +35,8 @@ struct StrayCounts {
 };
 
 /// Clears the masks of stray samples; those they find cleared are not there. Where many go, those left are tested
-/// again. Depends on the cloud alone. Memory: some 150 bytes for each sample of a dozen spacings of the cloud's height.
+/// again. Depends on the cloud alone. Memory: some 150 bytes for each sample of three dozen spacings of the cloud's
+/// height.
 StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, const RunContext& run);
 
 }  // namespace lamina
