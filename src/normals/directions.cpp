@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "meshes/vec3.h"
+#include "normals/local_scale.h"
 
 namespace lamina::normals {
 namespace {
@@ -101,43 +103,109 @@ bool is_line(const Plane& plane) {
   return !plane.valid() || plane.middle < kLine * plane.most;
 }
 
-}  // namespace
+/// Of samples outside the slab, and of those whose normals are given.
+constexpr std::uint8_t kNoLevel = 255;
 
-void find_directions(const SampleTree& tree, const DirectionSettings& settings, WindowSamples& samples, Links& links) {
-  links.neighbours.resize(links.core.size());
-  links.scale.resize(links.core.size());
-  const float bound = settings.search_radius * settings.search_radius;
-  const float ball = settings.radius * settings.radius;
-  const auto k = static_cast<std::size_t>(settings.k);
-  const auto find = [&](std::size_t i) {
-    const std::uint32_t place = links.core[i];
+class DirectionFinder {
+ public:
+  DirectionFinder(const SampleTree& tree, const DirectionSettings& settings, WindowSamples& samples, Links& links)
+      : tree_(tree),
+        settings_(settings),
+        bound_(settings.search_radius * settings.search_radius),
+        samples_(samples),
+        links_(links),
+        reach_(links.core.size(), 0.0F),
+        level_(samples.size(), kNoLevel) {
+    links_.neighbours.resize(links.core.size());
+    links_.scale.resize(links.core.size());
+  }
+
+  void run() {
+    for_core([&](std::size_t i) { search(i); });
+    // Noise is no matter of single samples: levels that neighbours do not share are chance.
+    const std::vector<std::uint8_t> chosen = level_;
+    for_core([&](std::size_t i) { settle(i, chosen); });
+  }
+
+ private:
+  template <class Work>
+  void for_core(const Work& work) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, links_.core.size(), 512), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) work(i);
+    });
+  }
+
+  void search(std::size_t i) {
+    const auto k = static_cast<std::size_t>(settings_.k);
+    const std::uint32_t place = links_.core[i];
     std::array<Neighbour, SampleTree::kMostNeighbours> found;
     std::size_t wanted = std::max(k, kLeastLinked);
-    std::size_t count = tree.nearest(place, wanted, bound, found.data());
-    Plane plane = plane_of(tree, place, found.data(), std::min(count, k));
+    std::size_t count = tree_.nearest(place, wanted, bound_, found.data());
+    std::size_t taken = std::min(count, k);
+    Plane plane = plane_of(tree_, place, found.data(), taken);
     const std::size_t most = std::min(4 * wanted, SampleTree::kMostNeighbours);
     while (is_line(plane) && count == wanted && wanted < most) {
       wanted = std::min(2 * wanted, most);
-      count = tree.nearest(place, wanted, bound, found.data());
-      plane = plane_of(tree, place, found.data(), count);
+      taken = count = tree_.nearest(place, wanted, bound_, found.data());
+      plane = plane_of(tree_, place, found.data(), count);
     }
-    link(found.data(), count, place, i, links);
-    if (samples.given[place] != 0) return;
-    if (ball > 0) {
-      Moments m;
-      m.count = 1;
-      tree.within(place, ball, [&](Neighbour n) { m.add(tree.offset(place, n.sample)); });
-      const Plane wide = fit_plane(m);
-      // Too few within the radius: the nearest ones will do.
-      if (!is_line(wide)) plane = wide;
+    link(found.data(), count, place, i, links_);
+    if (samples_.given[place] != 0) return;
+    if (settings_.radius > 0) {
+      plane = plane_of_ball(place, plane);
+    } else if (taken > 0) {
+      reach_[i] = plane.valid() ? found[taken - 1].squared : 0.0F;
+      level_[place] = choose_level(tree_, {place, plane, static_cast<double>(taken + 1), reach_[i], bound_});
     }
-    samples.nx[place] = plane.normal[0];
-    samples.ny[place] = plane.normal[1];
-    samples.nz[place] = plane.normal[2];
-  };
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, links.core.size(), 512), [&](const auto& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) find(i);
-  });
+    set_normal(place, plane);
+  }
+
+  /// Too few within the radius: the nearest ones will do.
+  [[nodiscard]] Plane plane_of_ball(std::uint32_t place, const Plane& nearest) const {
+    Moments m;
+    m.count = 1;
+    tree_.within(place, settings_.radius * settings_.radius,
+                 [&](Neighbour n) { m.add(tree_.offset(place, n.sample)); });
+    const Plane wide = fit_plane(m);
+    return is_line(wide) ? nearest : wide;
+  }
+
+  /// The median of the sample's level and its neighbours'.
+  void settle(std::size_t i, const std::vector<std::uint8_t>& chosen) {
+    if (reach_[i] == 0) return;
+    const std::uint32_t place = links_.core[i];
+    std::array<std::uint8_t, Links::kMost + 1> levels;
+    levels.fill(chosen[place]);
+    for (std::size_t l = 0; l < Links::kMost; ++l) {
+      const std::uint8_t level = chosen[links_.neighbours[i][l]];
+      if (level != kNoLevel) levels[l] = level;
+    }
+    std::nth_element(levels.begin(), levels.begin() + Links::kMost / 2, levels.end());
+    const std::uint8_t level = levels[Links::kMost / 2];
+    if (level == 0) return;
+    const Plane plane = plane_within(tree_, place, std::min(reach_of_level(reach_[i], level), bound_));
+    if (plane.valid()) set_normal(place, plane);
+  }
+
+  void set_normal(std::uint32_t place, const Plane& plane) {
+    samples_.nx[place] = plane.normal[0];
+    samples_.ny[place] = plane.normal[1];
+    samples_.nz[place] = plane.normal[2];
+  }
+
+  const SampleTree& tree_;
+  const DirectionSettings& settings_;
+  float bound_;
+  WindowSamples& samples_;
+  Links& links_;
+  std::vector<float> reach_;  ///< by number of the core sample: of its first plane, squared; 0 where there is none
+  std::vector<std::uint8_t> level_;  ///< by place
+};
+
+}  // namespace
+
+void find_directions(const SampleTree& tree, const DirectionSettings& settings, WindowSamples& samples, Links& links) {
+  DirectionFinder(tree, settings, samples, links).run();
 }
 
 }  // namespace lamina::normals

@@ -4,14 +4,14 @@
 #include <array>
 #include <cstdint>
 
-#include "samples/sample_tree.h"
 #include "normals/sample_window.h"
+#include "samples/sample_tree.h"
 
 namespace lamina::normals {
 
 /// Sums of offsets from one sample, of any unit: where it is among its neighbours they cannot cancel.
 struct Moments {
-  double count = 0;
+  double count = 0;  ///< or weight
   std::array<double, 3> sum{};
   std::array<double, 6> products{};  ///< xx xy xz yy yz zz
 
@@ -30,6 +30,21 @@ struct Moments {
     products[4] += y * z;
     products[5] += z * z;
   }
+  void add(const std::array<float, 3>& d, double weight) {
+    const double x = d[0];
+    const double y = d[1];
+    const double z = d[2];
+    count += weight;
+    sum[0] += weight * x;
+    sum[1] += weight * y;
+    sum[2] += weight * z;
+    products[0] += weight * x * x;
+    products[1] += weight * x * y;
+    products[2] += weight * x * z;
+    products[3] += weight * y * y;
+    products[4] += weight * y * z;
+    products[5] += weight * z * z;
+  }
 };
 
 struct Plane {
@@ -44,14 +59,15 @@ struct Plane {
 Plane fit_plane(const Moments& moments);
 
 struct DirectionSettings {
-  int k = 16;               ///< neighbours the plane is fitted to
+  int k = 16;               ///< neighbours the plane is fitted to, where they are not noisy
   float radius = 0;         ///< steps; above 0: all neighbours within it, however many
   float search_radius = 0;  ///< steps: samples farther apart are no neighbours
 };
 
 /// Finds the links of the samples links.core names, and the normals of those that have none. Where the nearest samples
-/// lie on a line, as those of one scan line do, twice and four times as many are taken. A sample whose neighbours
-/// make no plane is left without a normal.
+/// lie on a line, as those of one scan line do, twice and four times as many are taken; where they are noisy, as many
+/// as the noise asks for and the shape allows (normals/local_scale.h), about the same at neighbouring samples. A sample
+/// whose neighbours make no plane is left without a normal.
 void find_directions(const SampleTree& tree, const DirectionSettings& settings, WindowSamples& samples, Links& links);
 
 }  // namespace lamina::normals

@@ -4,9 +4,9 @@
 #include <cstdint>
 
 #include "normals/patch_graph.h"
-#include "samples/sample_tree.h"
 #include "normals/sample_window.h"
 #include "normals/viewpoints.h"
+#include "samples/sample_tree.h"
 
 namespace lamina::normals {
 

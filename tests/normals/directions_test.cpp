@@ -4,8 +4,15 @@
 #include <rapidcheck/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <numbers>
 #include <random>
 #include <vector>
+
+#include "normals/clouds.h"
 
 namespace lamina::normals {
 namespace {
@@ -82,6 +89,77 @@ TEST(FitPlane, IsExactOnCoordinatePlanes) {
   const Plane plane = fit({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {3, -2, 0}});
   EXPECT_EQ(std::abs(plane.normal[2]), 1);
   EXPECT_EQ(plane.least, 0);
+}
+
+/// Samples with noise across the surface, and the directions found for them.
+struct NoisyCloud {
+  test::Oriented truth, noisy;
+
+  void move(double deviation) {
+    std::mt19937 random(5);
+    std::normal_distribution<> noise(0, deviation);
+    noisy = truth;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      const double d = noise(random);
+      for (std::size_t a = 0; a < 3; ++a) noisy.positions[i][a] += d * truth.normals[i][a];
+    }
+  }
+  /// Root mean square angle to the true lines, degrees, of the samples that `counts` says.
+  template <class Counts>
+  [[nodiscard]] double error(const Counts& counts) const {
+    const test::Found found = test::find_normals(noisy);
+    double sum = 0;
+    double n = 0;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      if (!counts(truth.positions[i])) continue;
+      const double angle = std::acos(std::min(1.0, std::abs(test::dot(truth.normals[i], found.normals[i]))));
+      sum += angle * angle;
+      n += 1;
+    }
+    return std::sqrt(sum / n) * 180 / std::numbers::pi;
+  }
+  [[nodiscard]] double error() const {
+    return error([](const test::Vector&) { return true; });
+  }
+};
+
+// Spacing 0.013: planes of the nearest sixteen are some 10 degrees off with noise of half of it, 30 with twice of it.
+TEST(FindDirections, AverageNoiseAway) {
+  NoisyCloud cloud;
+  test::add_sheet(cloud.truth, 6000, [](double, double) { return 0.0; });
+  const auto inside = [](const test::Vector& p) { return std::abs(p[0] - 0.5) < 0.4 && std::abs(p[1] - 0.5) < 0.4; };
+  cloud.move(0.006);
+  EXPECT_LT(cloud.error(inside), 3);
+  cloud.move(0.025);
+  EXPECT_LT(cloud.error(inside), 6);
+}
+
+TEST(FindDirections, FollowASphereThroughItsNoise) {
+  NoisyCloud cloud;
+  test::add_sphere(cloud.truth, 20000, 1);
+  cloud.move(0.01);
+  EXPECT_LT(cloud.error(), 3.5);
+  cloud.move(0.04);
+  EXPECT_LT(cloud.error(), 7);
+}
+
+// A roof of 90 degrees: noise must not round it beyond what it hides.
+TEST(FindDirections, KeepAnEdge) {
+  NoisyCloud cloud;
+  test::add_sheet(cloud.truth, 12000, [](double x, double) { return std::abs(x - 0.5); });
+  cloud.move(0.003);
+  // A fifth of the density radius from the edge on.
+  EXPECT_LT(cloud.error([](const test::Vector& p) { return std::abs(p[0] - 0.5) > 0.03; }), 4.5);
+}
+
+// The two faces of a wall four deviations of noise thick: the other one's samples must not turn the plane.
+TEST(FindDirections, OfAThinWallAreAcrossIt) {
+  NoisyCloud cloud;
+  test::add_sheet(cloud.truth, 12000, [](double, double) { return 0.0; });
+  test::add_sheet(cloud.truth, 12000, [](double, double) { return 0.03; });
+  cloud.move(0.0075);
+  EXPECT_LT(cloud.error([](const test::Vector& p) { return std::abs(p[0] - 0.5) < 0.4 && std::abs(p[1] - 0.5) < 0.4; }),
+            7);
 }
 
 }  // namespace
