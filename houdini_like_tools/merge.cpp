@@ -122,7 +122,7 @@ void add_merge(CLI::App& app) {
       ->type_name(" ");
   tool->add_option_function<std::string>(
           "-o,--output", [o](const std::string& name) { o->output = pipe_name(name); },
-          "File of the same kind; - for PLY on standard output")
+          "File of the same kind, by its ending; - for PLY on standard output")
       ->required()
       ->type_name("FILE")
       ->group("Output");

@@ -20,6 +20,7 @@
 #include "common/surface_options.h"
 #include "common/text.h"
 #include "lamina/error.h"
+#include "lamina/file_ending.h"
 #include "tool.h"
 
 namespace lamina::tools {
@@ -41,6 +42,14 @@ void draw_preview(const SurfaceOptions& o, const std::string& mesh, const RunCon
   constexpr std::uintmax_t kUnasked = std::uintmax_t{1} << 30;  // where no limit was given
   const std::uintmax_t most = context.max_memory > 0 ? context.max_memory : kUnasked;
   const bool whole = kPicture + kBytesPerByte * std::filesystem::file_size(mesh) <= most;
+  const std::string ending = file_ending(mesh);
+  if (!whole && (ending == ".off" || ending == ".stl")) {
+    context.warn(
+        fmt::format("{}: not drawn: the mesh is too large to be held for a picture, and only the vertices of "
+                    "a .ply or .obj can be drawn as they are read",
+                    o.preview));
+    return;
+  }
   Renderer renderer({}, context);
   const std::unique_ptr<Model> model = whole ? open_model(mesh, {}, context) : open_vertices(mesh, context);
   model->frame(renderer);
@@ -133,8 +142,8 @@ void add_surface(CLI::App& app) {
       ->type_name("");
   auto* output = tool->add_option(
       "-o,--output", s.output,
-      "Mesh to write: binary PLY, named .ply; - for standard output, and from there to other formats: '| lamina "
-      "convert - -o mesh.obj'. Not needed with --dry-run and --print-tasks");
+      "Mesh to write: .ply, binary and streamed; .obj, .off or .stl, written when the mesh is complete; - for PLY on "
+      "standard output. Not needed with --dry-run and --print-tasks");
   output->type_name("FILE");
 
   const std::string samples = "Samples";
@@ -252,6 +261,7 @@ void add_surface(CLI::App& app) {
       "without it.");
   add_examples(*tool,
                "  lamina surface scan.ply -o mesh_of_scan.ply\n"
+               "  lamina surface scan.ply -o mesh_of_scan.stl\n"
                "  lamina surface scan.ply --dry-run\n"
                "  lamina surface scan.ply -o smooth.ply --blend auto --vdb smooth.vdb --stats smooth.json");
   tool->callback([o, tool, output, dry] {

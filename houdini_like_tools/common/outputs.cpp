@@ -82,11 +82,11 @@ std::string volume_text(std::string_view verb, const VolumeEditStats& stats) {
 
 void require_mesh_name(const std::string& output) {
   const std::string ending = file_ending(output);
-  const std::string hint = among(kMeshes, ending) ? ", or pipe it on: -o - | lamina convert - -o " + output
-                           : ending == ".gz"      ? ", or pipe it on: -o - | gzip"
-                           : ending == ".vdb"     ? " (--vdb names the volume beside it)"
-                                                  : "";
-  require(output, ".ply", "the mesh is written as PLY", hint);
+  if (among(kMeshes, ending)) return;
+  const std::string hint = ending == ".gz"    ? ", or pipe a PLY on: -o - | gzip"
+                           : ending == ".vdb" ? " (--vdb names the volume beside it)"
+                                              : "";
+  require(output, ".ply", "the mesh is written as PLY, OBJ, OFF or STL", hint);
 }
 
 void require_volume_name(const std::string& output) {

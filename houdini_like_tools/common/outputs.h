@@ -25,10 +25,10 @@ PointColumns with_precision(PointColumns columns, Precision precision);
 /// "kept 2 grids of 1.2 M voxels and 300 points, 4.5 MB".
 std::string volume_text(std::string_view verb, const VolumeEditStats& stats);
 
-// Each throws Error(usage) for a name such as "mesh.obj" where PLY is written, with the way to what was meant. Names
-// that promise nothing ("-", "out", "mesh.tmp") will do.
+// Each throws Error(usage) for a name such as "mesh.usd" that promises another format, with the way to what was meant.
+// Names that promise nothing ("-", "out", "mesh.tmp") will do.
 
-/// Meshes that stream into their files: PLY.
+/// Reconstructed meshes: PLY, OBJ, OFF, STL.
 void require_mesh_name(const std::string& output);
 /// OpenVDB files.
 void require_volume_name(const std::string& output);

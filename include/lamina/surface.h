@@ -33,7 +33,7 @@ struct SurfaceSettings {
   std::string input;  ///< point file, folder, pattern or scan list (expand_inputs()); "-" is standard input
   std::vector<std::string> more_inputs;  ///< taken together with `input`, as one cloud
   std::string columns;                   ///< of text files (PointSettings::columns)
-  std::string output;                    ///< mesh file (PLY); "-" is standard output
+  std::string output;                    ///< mesh file: .obj, .off, .stl, else PLY; "-": standard output
 
   std::optional<FrameMode> frame;  ///< unset: pca, or axis where grids are asked for (they have the input's axes then)
   BadSamples bad_samples = BadSamples::drop;  ///< non-finite, without a normal, with a radius <= 0

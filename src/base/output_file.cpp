@@ -224,12 +224,12 @@ void report_write_error(const std::string& name, int error) {
                                             full ? "; free some space or choose another folder" : ""));
 }
 
-ResultFile::ResultFile(std::string path) : path_(std::move(path)) {
+ResultFile::ResultFile(std::string path, const std::string& tmp_dir) : path_(std::move(path)) {
   if (path_ == "-") {
     file_ = stdout;
     return;
   }
-  staged_ = std::make_unique<OutputFile>(path_, std::string{});
+  staged_ = std::make_unique<OutputFile>(path_, tmp_dir);
   Descriptor second(::fcntl(staged_->fd(), F_DUPFD_CLOEXEC, 0));
   file_ = second ? ::fdopen(second.get(), "wb") : nullptr;
   if (file_ == nullptr) fail("cannot be written");

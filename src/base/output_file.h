@@ -74,8 +74,8 @@ class OutputFile {
 /// standard output, written to at once; other pipes and devices get everything at commit().
 class ResultFile {
  public:
-  /// Throws Error(budget) when the file cannot be made.
-  explicit ResultFile(std::string path);
+  /// `tmp_dir`: as OutputFile. Throws Error(budget) when the file cannot be made.
+  explicit ResultFile(std::string path, const std::string& tmp_dir = {});
   ~ResultFile();
   ResultFile(const ResultFile&) = delete;
   ResultFile& operator=(const ResultFile&) = delete;

@@ -24,9 +24,10 @@ std::string describe(const HoleStats& s) {
 
 namespace boundary {
 
-HoleCloser::HoleCloser(const HoleSettings& settings, std::size_t attributes)
+HoleCloser::HoleCloser(const HoleSettings& settings, std::size_t attributes, bool double_positions)
     : settings_(settings),
       attributes_(attributes),
+      distinct_(double_positions),
       paths_(
           settings.longest * (settings.watertight ? HoleSettings::kWatertight : 1), attributes,
           [this](Loop&& loop, const LoopExtent& extent) { loops_.emplace_back(std::move(loop), extent); },
@@ -185,9 +186,11 @@ Addition HoleCloser::finish(std::uint64_t vertices) {
       continue;
     }
     append(loop, fillings[l], vertices, out);
+    for (const BoundaryVertex& v : loop.vertices) distinct_.occupy(v.position[0], v.position[1], v.position[2]);
     ++stats_.closed;
     stats_.closed_edges += extent.edges;
   }
+  distinct_.separate(out.vertices);
   stats_.vertices = out.vertices.size();
   stats_.triangles = out.triangles.size();
   loops_.clear();

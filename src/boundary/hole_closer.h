@@ -8,6 +8,7 @@
 #include "boundary/boundary_paths.h"
 #include "boundary/fill.h"
 #include "lamina/holes.h"
+#include "meshes/distinct_positions.h"
 #include "meshes/mesh_sink.h"
 
 namespace lamina::boundary {
@@ -27,8 +28,8 @@ struct Addition {
 /// may be filled. What comes out depends on the mesh alone, not on the order of the batches.
 class HoleCloser {
  public:
-  /// `attributes`: of a vertex.
-  HoleCloser(const HoleSettings& settings, std::size_t attributes);
+  /// `attributes`: of a vertex; `double_positions`: as they are written.
+  HoleCloser(const HoleSettings& settings, std::size_t attributes, bool double_positions);
   HoleCloser(const HoleCloser&) = delete;
   HoleCloser& operator=(const HoleCloser&) = delete;
 
@@ -50,6 +51,7 @@ class HoleCloser {
 
   HoleSettings settings_;
   std::size_t attributes_;
+  DistinctPositions distinct_;
   HoleStats stats_;
   std::vector<std::pair<Loop, LoopExtent>> loops_;
   BoundaryPaths paths_;

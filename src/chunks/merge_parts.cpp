@@ -10,6 +10,8 @@
 #include "boundary/hole_closer.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
+#include "meshes/mesh_format.h"
+#include "meshes/stored_mesh.h"
 #include "meshes/streamed_ply.h"
 
 namespace lamina {
@@ -46,7 +48,7 @@ void require_successive(const std::vector<PartReader>& parts) {
 /// What closes the holes of the whole mesh; counts it.
 boundary::Addition close_holes(const std::vector<PartReader>& parts, MergedParts& merged) {
   const PartInfo& info = parts.front().info();
-  boundary::HoleCloser closer(info.holes, info.attributes.size());
+  boundary::HoleCloser closer(info.holes, info.attributes.size(), info.double_positions);
   std::uint64_t first = 0;
   for (const PartReader& part : parts) {
     if (!part.info().span.empty()) closer.add_part(part.read_boundary(), first);
@@ -160,7 +162,10 @@ MergedParts merge_parts(const std::vector<std::string>& paths, const std::string
   OutputFile file(output, run.tmp_dir);
   const std::uint64_t own_vertices = merged.vertices;
   const boundary::Addition addition = close_holes(parts, merged);
-  const MeshSinkSettings layout = parts.front().info().layout();
+  MeshSinkSettings layout = parts.front().info().layout();
+  layout.path = output;
+  layout.tmp_dir = run.tmp_dir;
+  if (const std::string losses = meshes::describe_losses(layout); !losses.empty()) run.warn(losses);
   const std::string header = mesh_header(layout, merged.vertices, merged.triangles);
   std::uint64_t bytes = header.size();
   write(file, header.data(), header.size());
@@ -194,13 +199,11 @@ MergedParts merge_parts(const std::vector<std::string>& paths, const std::string
     step();
   }
   append(encode_addition(addition.triangles, merged.vertices));
-  if (file.streams()) {
-    Descriptor to = file.destination();
-    int error = copy_all(file.fd(), bytes, to.get());
-    if (error == 0) error = to.close();
-    if (error != 0) report_write_error(file.name(), error);
+  if (meshes::mesh_format(output) == meshes::MeshFormat::ply) {
+    file.complete(bytes);
   } else {
-    file.publish();
+    const std::uint64_t faces_at = bytes - merged.triangles * kFaceRecordBytes;
+    write_stored({file.fd(), header.size(), file.fd(), faces_at, merged.vertices, merged.triangles}, layout, run);
   }
   return merged;
 }

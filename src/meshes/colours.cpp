@@ -19,15 +19,19 @@ float scale_of(ScalarType type) {
 
 }  // namespace
 
-std::optional<ColourColumns> find_colours(const TriangleMesh& mesh) {
+std::optional<ColourColumns> find_colours(const AttributeLayout& layout) {
   std::array<std::optional<std::size_t>, 3> found;
-  for (std::size_t i = 0; i < mesh.layout.size(); ++i) {
-    if (mesh.layout[i].name == "red") found[0] = i;
-    if (mesh.layout[i].name == "green") found[1] = i;
-    if (mesh.layout[i].name == "blue") found[2] = i;
+  for (std::size_t i = 0; i < layout.size(); ++i) {
+    if (layout[i].name == "red") found[0] = i;
+    if (layout[i].name == "green") found[1] = i;
+    if (layout[i].name == "blue") found[2] = i;
   }
   if (!found[0] || !found[1] || !found[2]) return std::nullopt;
-  return ColourColumns{{*found[0], *found[1], *found[2]}, scale_of(mesh.layout[*found[0]].type)};
+  return ColourColumns{{*found[0], *found[1], *found[2]}, scale_of(layout[*found[0]].type)};
+}
+
+std::optional<ColourColumns> find_colours(const TriangleMesh& mesh) {
+  return find_colours(mesh.layout);
 }
 
 }  // namespace lamina::meshes

@@ -18,7 +18,8 @@ struct ColourColumns {
   }
 };
 
-/// Empty unless the mesh has all three.
+/// Empty unless all three are there.
+std::optional<ColourColumns> find_colours(const AttributeLayout& layout);
 std::optional<ColourColumns> find_colours(const TriangleMesh& mesh);
 
 }  // namespace lamina::meshes

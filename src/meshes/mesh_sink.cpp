@@ -11,6 +11,8 @@
 #include "base/descriptor.h"
 #include "base/output_file.h"
 #include "lamina/error.h"
+#include "meshes/mesh_format.h"
+#include "meshes/stored_mesh.h"
 #include "meshes/streamed_ply.h"
 
 namespace lamina {
@@ -64,12 +66,18 @@ struct MeshSink::Impl {
     }
   }
 
-  void commit() {
+  void commit(const RunContext& run) {
     require_open();
     require_indices();
     check_written(vertex_writer.flush(output.fd()));
     check_written(face_writer.flush(face_file.get()));
     check_written(writer.drain());
+    if (meshes::mesh_format(settings.path) != meshes::MeshFormat::ply) {
+      const std::uint64_t first = mesh_header_bytes(settings);
+      write_stored({output.fd(), first, face_file.get(), 0, vertices, triangles}, settings, run);
+      committed = true;
+      return;
+    }
     const std::string header = mesh_header(settings, vertices, triangles);
     check_vertices(pwrite_all(output.fd(), header.data(), header.size(), 0));
     if (output.streams()) {
@@ -134,8 +142,8 @@ std::uint64_t MeshSink::vertices() const {
 std::uint64_t MeshSink::triangles() const {
   return impl_->triangles;
 }
-void MeshSink::commit() {
-  impl_->commit();
+void MeshSink::commit(const RunContext& run) {
+  impl_->commit(run);
 }
 
 }  // namespace lamina

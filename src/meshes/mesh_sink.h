@@ -1,5 +1,6 @@
 // The streamed mesh file: vertices go straight to the output behind a reserved header, faces to a temporary file
-// appended at the end; the output appears under its name only when complete.
+// appended at the end; the output appears under its name only when complete. Formats other than PLY are written from
+// these two files when they are.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "lamina/attributes.h"
+#include "lamina/run.h"
 
 namespace lamina {
 
@@ -23,8 +25,10 @@ struct VertexBatch {
 };
 
 struct MeshSinkSettings {
-  std::string path{};     ///< final name; "-" is standard output; links are followed, pipes and devices written to
-  std::string tmp_dir{};  ///< for the face file; empty: next to the output (standard output: the system's)
+  /// Final name; "-" is standard output; links are followed, pipes and devices written to. Its ending says the format:
+  /// .obj, .off and .stl are meant, every other name is a PLY's.
+  std::string path{};
+  std::string tmp_dir{};          ///< for the face file; empty: next to the output (standard output: the system's)
   AttributeLayout attributes{};   ///< written after the normals in their own types; integers are rounded and clamped
   bool double_positions = false;  ///< `property double x` where float would lose precision
   std::vector<std::string> comments{};  ///< one header line each, beside the signature
@@ -53,8 +57,9 @@ class MeshSink {
   [[nodiscard]] std::uint64_t vertices() const;
   [[nodiscard]] std::uint64_t triangles() const;
   /// Fills in the header (`uint` indices where more than 2^31 - 1 vertices need them; up to 2^32 - 1), appends the
-  /// faces, renames to the final name. Throws Error(budget) on disk full; the output's name is untouched then.
-  void commit();
+  /// faces, renames to the final name; in another format than PLY, which has its own limits, writes the file anew.
+  /// Throws Error(budget) on disk full, Error(internal) when cancelled; the output's name is untouched then.
+  void commit(const RunContext& run = {});
 
  private:
   struct Impl;

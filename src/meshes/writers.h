@@ -1,23 +1,47 @@
-// The formats' writers behind write_mesh(). Ours, because OpenMesh's writers round positions to float and its OBJ
-// writer refuses colours.
+// The formats' writers behind write_mesh() and the streamed meshes. Ours, because OpenMesh's writers hold the mesh and
+// round positions to float, and its OBJ writer refuses colours.
 #pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
 #include "base/output_file.h"
 #include "lamina/mesh.h"
+#include "meshes/mesh_format.h"
 
 namespace lamina::meshes {
 
-/// True when every position survives a round trip through float.
-bool fits_float(const TriangleMesh& mesh);
+/// A mesh to be written, block by block: from memory or from a file. Blocks are read in order, some of them again.
+class MeshBlocks {
+ public:
+  MeshBlocks() = default;
+  virtual ~MeshBlocks() = default;
+  MeshBlocks(const MeshBlocks&) = delete;
+  MeshBlocks& operator=(const MeshBlocks&) = delete;
+
+  [[nodiscard]] virtual std::uint64_t vertices() const = 0;
+  [[nodiscard]] virtual std::uint64_t triangles() const = 0;
+  [[nodiscard]] virtual bool has_normals() const = 0;
+  [[nodiscard]] virtual const AttributeLayout& layout() const = 0;
+  /// Lines a format with comments begins with.
+  [[nodiscard]] virtual std::vector<std::string> comments() const { return {}; }
+  /// Positions, normals and attributes of `count` vertices into `out`, whose triangles are not looked at.
+  virtual void read_vertices(std::uint64_t first, std::size_t count, TriangleMesh& out) = 0;
+  virtual void read_triangles(std::uint64_t first, std::size_t count,
+                              std::vector<std::array<std::uint32_t, 3>>& out) = 0;
+};
 
 /// Positions as float where that loses nothing, else double; normals; attributes in their own types (rounded and
 /// clamped to them); faces as `list uchar int vertex_indices` (uint beyond 2^31 - 1 vertices).
 void write_ply(const TriangleMesh& mesh, ResultFile& out);
 
-/// `v x y z [r g b]` with colours from 0 to 1, `vn`, faces `f v//vn`. Positions read back as the same bits.
-void write_obj(const TriangleMesh& mesh, ResultFile& out);
-/// [C][N]OFF with colours as r g b a bytes. Positions read back as the same bits.
-void write_off(const TriangleMesh& mesh, ResultFile& out);
-/// Positions as floats, facet normals computed; vertices and colours are not shared by this format.
-void write_stl(const TriangleMesh& mesh, ResultFile& out);
+/// Of the other formats. Keeps blocks, for STL at most a million positions, too.
+/// OBJ: `v x y z [r g b]` with colours from 0 to 1, `vn`, faces `f v//vn`. Positions read back as the same bits.
+/// OFF: [C][N]OFF with colours as r g b a bytes. Positions read back as the same bits.
+/// STL: positions as floats, facet normals computed; vertices and colours are not shared by this format. Throws
+/// Error(budget) for more than 2^32 - 1 triangles.
+void write_blocks(MeshBlocks& mesh, MeshFormat format, ResultFile& out);
 
 }  // namespace lamina::meshes

@@ -12,6 +12,8 @@
 #include "boundary/hole_closer.h"
 #include "chunks/merge_parts.h"
 #include "lamina/error.h"
+#include "meshes/mesh_format.h"
+#include "meshes/stored_mesh.h"
 #include "meshes/streamed_ply.h"
 #include "reconstruct/job.h"
 
@@ -68,7 +70,7 @@ boundary::Addition close_together(Ranks& ranks, RankSlabs& part, const std::vect
   std::array<std::uint64_t, 2> added{};
   ranks.together([&] {
     if (!ranks.first()) return;
-    boundary::HoleCloser closer(settings, part.layout().attributes.size());
+    boundary::HoleCloser closer(settings, part.layout().attributes.size(), part.layout().double_positions);
     std::uint64_t first = 0;
     for (std::size_t r = 0; r < rims.size(); ++r) {
       if (borders[r].any) closer.add_part(boundary::unpack(rims[r]), first);
@@ -92,6 +94,18 @@ void write_addition(SharedFile& file, const RankSlabs& part, const Place& place,
   const std::uint64_t faces = place.triangles - addition.triangles.size();
   file.write(header + place.vertices * record + faces * kFaceRecordBytes,
              encode_addition(addition.triangles, place.vertices));
+}
+
+/// The file that all have written becomes the mesh.
+void publish_mesh(OutputFile& file, const RankSlabs& part, const Place& place, const std::string& output,
+                  const RunContext& run) {
+  if (meshes::mesh_format(output) == meshes::MeshFormat::ply) return file.publish();
+  MeshSinkSettings layout = part.layout();
+  layout.path = output;
+  const std::uint64_t header = make_header(part, place).size();
+  const std::uint64_t record = vertex_record_bytes(layout.attributes, layout.double_positions);
+  write_stored({file.fd(), header, file.fd(), header + place.vertices * record, place.vertices, place.triangles},
+               layout, run);
 }
 
 }  // namespace
@@ -141,6 +155,9 @@ Place write_together(Ranks& ranks, const ReconstructionPlan& plan, RankSlabs& pa
   const boundary::Addition addition = close_together(ranks, part, borders, plan.holes, place, job.stats.holes);
   ranks.together([&] {
     if (!ranks.first()) return;
+    MeshSinkSettings layout = part.layout();
+    layout.path = output;
+    if (const std::string losses = meshes::describe_losses(layout); !losses.empty()) job.run.warn(losses);
     file.emplace(output, std::string());
     staged = std::filesystem::absolute(file->staged()).string();
   });
@@ -158,7 +175,7 @@ Place write_together(Ranks& ranks, const ReconstructionPlan& plan, RankSlabs& pa
     shared.close();
   }
   ranks.together([&] {
-    if (file) file->publish();
+    if (file) publish_mesh(*file, part, place, output, job.run);
   });
   return place;
 }

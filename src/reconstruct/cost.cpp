@@ -22,15 +22,17 @@ double cells_per_sample(const FeedSettings& feed) {
   return 0.25 / (main_cell(feed) * main_cell(feed));
 }
 
-/// Faces wait on disk for the vertices. A sample stands for a quarter of its radius squared of surface; a main cell's
-/// worth of surface gives some 3.3 triangles (the cells it cuts, two each), clustering leaves 55 % of them.
-std::uint64_t expected_face_bytes(const ReconstructionPlan& plan) {
-  constexpr double kFaceBytes = 13;
+/// Faces wait on disk for the vertices, and both for a format that is not PLY. A sample stands for a quarter of its
+/// radius squared of surface; a main cell's worth of surface gives some 3.3 triangles (the cells it cuts, two each),
+/// clustering leaves 55 % of them.
+std::uint64_t expected_waiting_bytes(const ReconstructionPlan& plan) {
+  constexpr double kVerticesPerFace = 0.5;
+  const double face_bytes = 13 + kVerticesPerFace * static_cast<double>(plan.waiting_vertex_bytes);
   const double finest = plan.lattice.cell;
   const double cell = plan.feed.fixed_cell() ? finest : std::max(finest, main_cell(plan.feed) * plan.radius.median);
   const double cells =
       static_cast<double>(plan.samples) * 0.25 * plan.radius.median * plan.radius.median / (cell * cell);
-  return static_cast<std::uint64_t>(kFaceBytes * cells * (plan.cluster == ClusterMode::none ? 3.3 : 1.8));
+  return static_cast<std::uint64_t>(face_bytes * cells * (plan.cluster == ClusterMode::none ? 3.3 : 1.8));
 }
 
 /// Behind the sweep the store gives its disk back, a file at a time, while the faces grow.
@@ -64,9 +66,10 @@ double slabs_with_values(const ReconstructionPlan& plan) {
   return reach_of(Stage::project).ahead + static_cast<double>(plan.window);
 }
 
-/// Slabs whose surface waits for the clusters around it: those triangulated below, and the one numbered above.
+/// Slabs whose surface waits for the clusters around it: those triangulated below, and the one numbered above. (A part
+/// begins a slab further below, for the positions alone.)
 double slabs_with_surface(const ReconstructionPlan& plan) {
-  return reach_of(Stage::triangulate).below + reach_of(Stage::number).ahead + static_cast<double>(plan.window);
+  return reach_of(Stage::triangulate).below - 1 + reach_of(Stage::number).ahead + static_cast<double>(plan.window);
 }
 
 /// Of --vdb, from samples per slab and cells of surface per sample. Bricks of 8^3 voxels wait until the band around
@@ -140,7 +143,7 @@ ExpectedCost expected_cost(const ReconstructionPlan& plan, const Ingested& cloud
   ExpectedCost out;
   out.memory = static_cast<std::uint64_t>(mesh_memory(plan, store, per_slab) + volume_memory(plan, per_slab)) +
                table_bytes(plan, store);
-  out.disk = expected_disk(store, expected_face_bytes(plan));
+  out.disk = expected_disk(store, expected_waiting_bytes(plan));
   out.cpu_seconds = expected_cpu_seconds(plan);
   out.reading_seconds = kReferenceRead * static_cast<double>(plan.samples);
   return out;

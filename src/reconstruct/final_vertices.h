@@ -20,7 +20,8 @@ struct VertexSettings {
                            ///< finest
   bool curvature = false;  ///< another: mean curvature of the fit, 1 / input unit
   double finest_cell = 1;  ///< of the lattice, steps
-  RadiusRule radii;        ///< the influence radius around each vertex, by the finest cell around its corner
+  bool double_positions = false;  ///< as they are written
+  RadiusRule radii;               ///< the influence radius around each vertex, by the finest cell around its corner
 };
 
 /// A finished slab with what it refers to.

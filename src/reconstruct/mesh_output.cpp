@@ -8,7 +8,11 @@
 namespace lamina {
 
 MeshOutput::MeshOutput(ClusterMode mode, const VertexSettings& vertices, const Frame& frame, SlabSink& sink)
-    : settings_(vertices), frame_(frame), sink_(sink), clusterer_(ClusterSettings{mode}) {}
+    : settings_(vertices),
+      frame_(frame),
+      sink_(sink),
+      clusterer_(ClusterSettings{mode}),
+      distinct_(vertices.double_positions) {}
 
 MeshOutput::~MeshOutput() {
   tasks_.cancel();
@@ -59,7 +63,9 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
   while (clusterer_.pop(done_)) {
     const IsoSlab* next = clustered_.size() > 1 ? clustered_[1].get() : nullptr;
     place_vertices({done_, *clustered_.front(), next}, frame_, settings_, vertices_);
+    distinct_.separate(vertices_);
     sink_.write(done_, vertices_);
+    written_ += vertices_.size();
     triangles_ += done_.triangles.size();
     if (clustered_.front().use_count() == 1) {
       const std::lock_guard lock(mutex_);

@@ -15,6 +15,7 @@
 #include "isosurface/iso_mesh.h"
 #include "lamina/frame.h"
 #include "lamina/surface.h"
+#include "meshes/distinct_positions.h"
 #include "meshes/mesh_sink.h"
 #include "reconstruct/final_vertices.h"
 
@@ -67,6 +68,7 @@ class MeshOutput {
   /// An empty slab, with the storage of one that was written where there is any.
   std::shared_ptr<IsoSlab> spare();
   /// Written so far; at any time.
+  [[nodiscard]] std::uint64_t vertices() const { return written_; }
   [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
   /// After finish().
   [[nodiscard]] const ClusterCounts& counts() const { return clusterer_.counts(); }
@@ -82,18 +84,19 @@ class MeshOutput {
   std::deque<std::shared_ptr<IsoSlab>> clustered_;  ///< by the clusterer, not yet written
   FinalSlab done_;                                  ///< lent to the clusterer and back: its storage is kept
   VertexBatch vertices_;
+  DistinctPositions distinct_;
   std::mutex mutex_;  ///< of spares_
   std::vector<std::shared_ptr<IsoSlab>> spares_;
-  std::atomic<std::uint64_t> triangles_ = 0;
+  std::atomic<std::uint64_t> written_ = 0, triangles_ = 0;
   tbb::task_group tasks_;
 };
 
 /// Passes slabs on and watches for rims.
 class ClosingSlabs final : public SlabSink {
  public:
-  /// `settings`, `attributes`: as HoleCloser.
-  ClosingSlabs(const HoleSettings& settings, std::size_t attributes, SlabSink& to)
-      : closer_(settings, attributes), to_(to) {}
+  /// `mesh`: the file the slabs go to.
+  ClosingSlabs(const HoleSettings& settings, const MeshSinkSettings& mesh, SlabSink& to)
+      : closer_(settings, mesh.attributes.size(), mesh.double_positions), to_(to) {}
   void write(const FinalSlab& slab, const VertexBatch& vertices) override;
   /// All slabs have come: what is to be added to the mesh.
   boundary::Addition finish();

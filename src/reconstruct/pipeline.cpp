@@ -101,8 +101,9 @@ void Pipeline::triangulate_to(std::int32_t slab) {
   for (; triangulated_ < std::min(slab + 1, stages_.of(Stage::triangulate).end); ++triangulated_) {
     const auto at = static_cast<std::size_t>(triangulated_ - held_);
     IsoSlab& here = *iso_[at];
-    triangulate(window_, triangulated_, here, at + 1 < iso_.size() ? *iso_[at + 1] : nothing, extracted_);
-    separate_fans(at > 0 ? iso_[at - 1].get() : nullptr, here, extracted_);
+    IsoSlab& above = at + 1 < iso_.size() ? *iso_[at + 1] : nothing;
+    triangulate(window_, triangulated_, here, above, extracted_);
+    separate_fans(at > 0 ? iso_[at - 1].get() : nullptr, here, &above, extracted_);
     isotriangles_ += here.triangles.size();
     if (at > 0) hand_over();
   }
@@ -152,7 +153,8 @@ void Pipeline::run(const RunContext& run, Stopwatch& watch) {
 
 void Pipeline::note_disk() {
   constexpr std::uint64_t kFaceBytes = 13;  // a count of 1 byte and three indices of 4
-  disk_bytes_ = std::max(disk_bytes_, feed_.disk_bytes() + kFaceBytes * output_.triangles());
+  const std::uint64_t mesh = kFaceBytes * output_.triangles() + plan_.waiting_vertex_bytes * output_.vertices();
+  disk_bytes_ = std::max(disk_bytes_, feed_.disk_bytes() + mesh);
 }
 
 void Pipeline::report(SurfaceStats& stats) const {

@@ -24,7 +24,8 @@ namespace lamina {
 class Pipeline {
  public:
   /// The sink gets the finished slabs of `span`, and a few below it whose vertices but for the last of these slabs are
-  /// not those of a sweep through all. With a volume the span is plan.slabs.
+  /// not those of a sweep through all (the last but one's lie where they do there, but may not be moved apart). With a
+  /// volume the span is plan.slabs.
   Pipeline(const ReconstructionPlan& plan, SampleFeed& feed, const SlabSpan& span, const SweepOutput& output);
   void run(const RunContext& run, Stopwatch& watch);
   void report(SurfaceStats& stats) const;

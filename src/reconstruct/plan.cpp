@@ -8,6 +8,8 @@
 
 #include "lamina/error.h"
 #include "levelset/surface_volume.h"
+#include "meshes/mesh_format.h"
+#include "meshes/streamed_ply.h"
 #include "reconstruct/choose_support.h"
 #include "reconstruct/constants.h"
 #include "reconstruct/cost.h"
@@ -176,6 +178,9 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
   if (s.vertex_levels) plan.mesh_attributes.push_back({"level", ScalarType::uint8});
   if (s.vertex_curvature) plan.mesh_attributes.push_back({"curvature", ScalarType::float32});
   plan.double_positions = needs_double(cloud.ingested.census, plan.lattice.cell * plan.frame.step);
+  plan.vertices.double_positions = plan.double_positions;
+  if (meshes::mesh_format(s.output) != meshes::MeshFormat::ply)
+    plan.waiting_vertex_bytes = vertex_record_bytes(plan.mesh_attributes, plan.double_positions);
   plan.volume = s.volume;
   plan.volume.shift = cloud.shift;
   if (cloud.shift) plan.comments.push_back("shift " + shift_text(*cloud.shift));

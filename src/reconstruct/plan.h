@@ -61,6 +61,7 @@ struct ReconstructionPlan {
   std::vector<std::string> comments;  ///< of the mesh file
   AttributeLayout mesh_attributes;
   bool double_positions = false;
+  std::uint64_t waiting_vertex_bytes = 0;  ///< of a vertex that lies on disk until its mesh's format can be written
 
   ExpectedCost expected;
 

@@ -34,13 +34,13 @@ struct StageReach {
 };
 
 inline constexpr std::array<StageReach, kStages> kStageReach{{
-    {"mark", 3 + kTouchSlabs, 6 + kTouchSlabs, 5 + kTouchSlabs, "samples touch cells three slabs away"},
-    {"refine", 3, 6, 5, "a corner belongs to the cells of the slab below, too"},
-    {"place", 3, 5, 5, "corners of the cells; the values of a slab are extended from those above it"},
-    {"project", 3, 5, 5, "as place; with diffusion a slab more below, for the centres of its cells"},
-    {"extend", 2, 4, 4, "signs by the values around, a slab either way"},
-    {"number", 1, 4, 4, "an edge's ends lie in its slab and on the first plane above"},
-    {"triangulate", 0, 4, 3, "clusters look two slabs down and two up, and fans a slab further down"},
+    {"mark", 3 + kTouchSlabs, 7 + kTouchSlabs, 5 + kTouchSlabs, "samples touch cells three slabs away"},
+    {"refine", 3, 7, 5, "a corner belongs to the cells of the slab below, too"},
+    {"place", 3, 6, 5, "corners of the cells; the values of a slab are extended from those above it"},
+    {"project", 3, 6, 5, "as place; with diffusion a slab more below, for the centres of its cells"},
+    {"extend", 2, 5, 4, "signs by the values around, a slab either way"},
+    {"number", 1, 5, 4, "an edge's ends lie in its slab and on the first plane above"},
+    {"triangulate", 0, 5, 3, "clusters look two slabs down and two up, fans and vertices at one position one further"},
 }};
 
 constexpr const StageReach& reach_of(Stage stage) {

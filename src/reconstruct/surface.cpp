@@ -7,6 +7,7 @@
 
 #include "lamina/error.h"
 #include "levelset/surface_volume.h"
+#include "meshes/mesh_format.h"
 #include "meshes/mesh_sink.h"
 #include "reconstruct/job.h"
 #include "reconstruct/mesh_output.h"
@@ -40,12 +41,13 @@ class PrunedSlabs final : public SlabSink {
 
 /// The mesh of a plan into its file, whose name and folder `layout` has.
 void write_surface(const ReconstructionPlan& plan, StoredCloud& cloud, const MeshSinkSettings& layout, Job& job) {
+  if (const std::string losses = meshes::describe_losses(layout); !losses.empty()) job.run.warn(losses);
   MeshSink sink(layout);
   std::optional<SurfaceVolume> volume;
   if (plan.volume.wanted())
     volume.emplace(plan.volume, plan.frame, plan.lattice, plan.main_level, plan.attributes, layout.tmp_dir);
   MeshFileSlabs whole(sink);
-  ClosingSlabs closing(plan.holes, layout.attributes.size(), whole);
+  ClosingSlabs closing(plan.holes, layout, whole);
   Pruner pruner(plan.pruning, layout.tmp_dir, closing);
   PrunedSlabs pruned(pruner);
   const bool prunes = plan.pruning.triangles > 0 || plan.pruning.size > 0;
@@ -62,7 +64,7 @@ void write_surface(const ReconstructionPlan& plan, StoredCloud& cloud, const Mes
     volume->commit();
     job.stats.volume = volume->stats();
   }
-  job.watch.time("commit", [&] { sink.commit(); });
+  job.watch.time("commit", [&] { sink.commit(job.run); });
   job.stats.vertices = sink.vertices();
   job.stats.triangles = sink.triangles();
 }

@@ -60,9 +60,9 @@ void Replay::triangulate() {
   IsoSlab nothing;
   ExtractCounts counts;
   for (std::size_t k = 0; k < iso_.size(); ++k) {
-    lamina::triangulate(window_, first_ + static_cast<std::int32_t>(k), *iso_[k],
-                        k + 1 < iso_.size() ? *iso_[k + 1] : nothing, counts);
-    separate_fans(k > 0 ? iso_[k - 1].get() : nullptr, *iso_[k], counts);
+    IsoSlab& above = k + 1 < iso_.size() ? *iso_[k + 1] : nothing;
+    lamina::triangulate(window_, first_ + static_cast<std::int32_t>(k), *iso_[k], above, counts);
+    separate_fans(k > 0 ? iso_[k - 1].get() : nullptr, *iso_[k], &above, counts);
   }
 }
 

@@ -48,10 +48,10 @@ inline WholeMesh extract_all(Window& window, std::int32_t first, std::int32_t en
     number_edges(window, s, i > 0 ? &mesh.slabs[i - 1] : nullptr, mesh.slabs[i]);
     if (i == 0) continue;
     triangulate(window, s - 1, mesh.slabs[i - 1], mesh.slabs[i], mesh.counts);
-    separate_fans(i > 1 ? &mesh.slabs[i - 2] : nullptr, mesh.slabs[i - 1], mesh.counts);
+    separate_fans(i > 1 ? &mesh.slabs[i - 2] : nullptr, mesh.slabs[i - 1], &mesh.slabs[i], mesh.counts);
     window.retire_below(s - 1);
   }
-  separate_fans(&mesh.slabs[mesh.slabs.size() - 2], mesh.slabs.back(), mesh.counts);
+  separate_fans(&mesh.slabs[mesh.slabs.size() - 2], mesh.slabs.back(), nullptr, mesh.counts);
 
   std::vector<std::uint32_t> base;
   for (const IsoSlab& slab : mesh.slabs) {

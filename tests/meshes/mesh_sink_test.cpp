@@ -9,6 +9,7 @@
 #include <sys/stat.h>
 #include <sys/wait.h>
 
+#include <atomic>
 #include <cmath>
 #include <csignal>
 #include <cstring>
@@ -17,6 +18,7 @@
 
 #include "base/temporary_folder.h"
 #include "lamina/error.h"
+#include "lamina/mesh.h"
 #include "lamina/points.h"
 
 namespace lamina {
@@ -309,6 +311,85 @@ TEST(MeshSink, FullDiskIsReportedWhereverItFills) {
   });
   EXPECT_THAT(both, HasSubstr("mesh.ply: cannot be written: No space left on device"));
   EXPECT_THAT(both, HasSubstr("left 0"));
+}
+
+/// Faces of some_triangles() name a vertex twice now and then, which readers of meshes do not take.
+Triangles strip(std::size_t count) {
+  Triangles triangles;
+  for (std::uint32_t i = 0; i < count; ++i) triangles.push_back({i, i + 1, i + 2});
+  return triangles;
+}
+
+TEST(MeshSink, OtherFormatsHoldTheMeshOfThePly) {
+  constexpr std::size_t kVertices = 30'000;  // some blocks
+  const AttributeLayout layout{{"red", ScalarType::uint8},
+                               {"green", ScalarType::uint8},
+                               {"blue", ScalarType::uint8},
+                               {"depth", ScalarType::uint16}};
+  const test::TemporaryFolder folder;
+  const auto write = [&](const std::string& name, bool wide) {
+    MeshSink sink({.path = folder / name, .attributes = layout, .double_positions = wide, .comments = {"shift 1 2 3"}});
+    VertexBatch batch = some_vertices(0, kVertices);
+    batch.attributes = {batch.attributes[0], batch.attributes[0], batch.attributes[0], batch.attributes[1]};
+    sink.append_vertices(batch);
+    sink.append_triangles(strip(kVertices - 2));
+    sink.append_triangles({{0, 15'000, static_cast<std::uint32_t>(kVertices - 1)}});  // from end to end
+    sink.commit();
+    return read_mesh(folder / name);
+  };
+  for (const bool wide : {false, true}) {
+    const TriangleMesh ply = write("mesh.ply", wide);
+    for (const char* name : {"mesh.obj", "mesh.OFF"}) {
+      const TriangleMesh mesh = write(name, wide);
+      EXPECT_EQ(mesh.positions, ply.positions) << name;
+      EXPECT_EQ(mesh.normals, ply.normals) << name;
+      EXPECT_EQ(mesh.triangles, ply.triangles) << name;
+      ASSERT_GE(mesh.attributes.size(), 3U) << name;  // OFF has an opacity, too
+      const float scale = mesh.layout[2].type == ScalarType::float32 ? 255.0F : 1.0F;  // OBJ's reach to 1
+      for (std::size_t v = 0; v < kVertices; ++v)
+        ASSERT_NEAR(scale * mesh.attributes[2][v], ply.attributes[2][v], 0.5) << name;
+    }
+    const TriangleMesh stl = write("mesh.stl", wide);
+    ASSERT_EQ(stl.triangles.size(), ply.triangles.size());
+    for (std::size_t t = 0; t < stl.triangles.size(); ++t) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        for (std::size_t c = 0; c < 3; ++c) {
+          ASSERT_EQ(stl.positions[stl.triangles[t][k]][c],
+                    static_cast<double>(static_cast<float>(ply.positions[ply.triangles[t][k]][c])));
+        }
+      }
+    }
+  }
+  EXPECT_EQ(folder.entries(), 4);
+  EXPECT_THAT(test::read_file(folder / "mesh.obj").substr(0, 60), HasSubstr("# shift 1 2 3"));
+}
+
+TEST(MeshSink, OtherFormatsFailAsThePlyDoes) {
+  const test::TemporaryFolder folder;
+  const auto write = [&](const std::string& path, const RunContext& run) {
+    MeshSink sink({.path = path, .attributes = kColours});
+    sink.append_vertices(some_vertices(0, 1000));
+    sink.append_triangles(strip(998));
+    sink.commit(run);
+  };
+  for (const char* name : {"mesh.obj", "mesh.off", "mesh.stl"}) {
+    std::atomic<bool> cancelled = true;
+    RunContext run;
+    run.cancel = &cancelled;
+    EXPECT_EQ(outcome([&] { write(folder / name, run); }), "1: cancelled") << name;
+    EXPECT_THAT(outcome([&] { write(folder / (std::string("no/such/") + name), {}); }), HasSubstr("4: ")) << name;
+    const std::string text = outcome_in_child([&] {
+      const rlimit limit{100'000, 100'000};  // the PLY's records fit, the text does not
+      ::setrlimit(RLIMIT_FSIZE, &limit);
+      std::signal(SIGXFSZ, SIG_IGN);
+      MeshSink sink({.path = folder / name, .attributes = kColours});
+      sink.append_vertices(some_vertices(0, 2400));
+      sink.append_triangles(strip(2398));
+      sink.commit();
+    });
+    EXPECT_THAT(text, HasSubstr("4: " + (folder / name) + ": cannot be written")) << name;
+    EXPECT_EQ(folder.entries(), 0) << name;
+  }
 }
 
 TEST(MeshSink, StandardOutputGetsTheSameBytes) {

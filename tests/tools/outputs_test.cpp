@@ -27,16 +27,16 @@ TEST(OutputName, MayPromiseWhatIsWrittenOrNothing) {
     EXPECT_EQ(refusal(require_volume_name, name), "") << name;
     EXPECT_EQ(refusal(require_picture_name, name), "") << name;
   }
-  EXPECT_EQ(refusal(require_mesh_name, "a.obj.PLY"), "");
+  for (const char* name : {"a.obj.PLY", "a.OBJ", "a.off", "a.stl"}) EXPECT_EQ(refusal(require_mesh_name, name), "");
   EXPECT_EQ(refusal(require_volume_name, "a.ply.vdb"), "");
   EXPECT_EQ(refusal(require_picture_name, "a.Png"), "");
 }
 
 TEST(OutputName, ThatPromisesAnotherFormatIsRefusedWithTheWayToIt) {
-  EXPECT_THAT(refusal(require_mesh_name, "a.OBJ"), HasSubstr("-o - | lamina convert - -o a.OBJ"));
   EXPECT_THAT(refusal(require_mesh_name, "a.ply.gz"), HasSubstr("-o - | gzip"));
   EXPECT_THAT(refusal(require_mesh_name, "a.vdb"), HasSubstr("--vdb"));
-  EXPECT_THAT(refusal(require_mesh_name, "a.usdc"), HasSubstr("a.usdc: the mesh is written as PLY; name it .ply"));
+  EXPECT_THAT(refusal(require_mesh_name, "a.usdc"),
+              HasSubstr("a.usdc: the mesh is written as PLY, OBJ, OFF or STL; name it .ply"));
   EXPECT_THAT(refusal(require_volume_name, "a.ply"),
               HasSubstr("a.ply: the volume is written as OpenVDB; name it .vdb"));
   EXPECT_THAT(refusal(require_picture_name, "a.jpg"), HasSubstr("a.jpg: the picture is written as PNG; name it .png"));

@@ -4,6 +4,8 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "support/program.h"
 #include "tools/tool_files.h"
@@ -34,6 +36,28 @@ TEST_F(PartsTool, PrintedTasksMakeTheSameMesh) {
   EXPECT_TRUE(read_text(mesh_) == read_text(whole_));
 }
 
+TEST_F(PartsTool, MeshesOfEveryFormat) {
+  std::vector<std::string> merge{"merge"};
+  for (const char* chunk : {"1/2", "2/2"}) {
+    merge.push_back(folder_ / (std::string(1, chunk[0]) + ".lmesh"));
+    ASSERT_EQ(run_lamina({"surface", store_, "--steps", "2", "--chunk", chunk, "-o", merge.back()}).code, 0);
+  }
+  for (const std::string ending : {".obj", ".off", ".stl"}) {
+    const std::string whole = folder_ / ("of_one_run" + ending), merged = folder_ / ("of_parts" + ending);
+    ASSERT_EQ(run_lamina({"surface", cloud_, "-o", whole, "--steps", "2"}).code, 0);
+    std::vector<std::string> words = merge;
+    words.insert(words.end(), {"-o", merged});
+    const Outcome outcome = run_lamina(words);
+    EXPECT_EQ(outcome.code, 0) << outcome.err;
+    EXPECT_THAT(outcome.err, HasSubstr(ending == ".stl" ? "not the properties red, green, blue, id;"
+                                                        : "no place for the properties id;"));
+    EXPECT_TRUE(read_text(merged) == read_text(whole)) << ending;
+    const std::string resumed = folder_ / ("resumed" + ending);
+    EXPECT_EQ(run_lamina({"surface", cloud_, "-o", resumed, "--steps", "2", "--checkpoint", folder_ / "kept"}).code, 0);
+    EXPECT_TRUE(read_text(resumed) == read_text(whole)) << ending;
+  }
+}
+
 TEST_F(PartsTool, TasksAsJsonSayWhatComesAfterWhat) {
   const Outcome tasks = run_lamina({"surface", store_, "-o", mesh_, "--diffuse", "--print-tasks", "2", "--json"});
   ASSERT_EQ(tasks.code, 0) << tasks.err;
@@ -48,7 +72,7 @@ TEST_F(PartsTool, TasksAsJsonSayWhatComesAfterWhat) {
 TEST_F(PartsTool, AMissingPartIsNamed) {
   const std::string part = folder_ / "two.lmesh";
   ASSERT_EQ(run_lamina({"surface", store_, "--chunk", "2/2", "-o", part}).code, 0);
-  EXPECT_EQ(run_lamina({"merge", part, "-o", folder_ / "mesh.stl"}).code, 2);
+  EXPECT_EQ(run_lamina({"merge", part, "-o", folder_ / "mesh.gltf"}).code, 2);
   const Outcome outcome = run_lamina({"merge", part, "-o", mesh_});
   EXPECT_EQ(outcome.code, 3);
   EXPECT_THAT(outcome.err, HasSubstr("chunk 1 of 2 is missing"));
