@@ -56,13 +56,13 @@ inline ScannerView look_around(const Vec3& eye, int columns, double elevation) {
   return {eye, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, columns, rows, elevation, true};
 }
 
-/// Views from all sides of a ball about the origin, square, from three of its radii away.
-inline std::vector<ScannerView> views_around(double radius, int views, int columns) {
+/// Views from all sides of a ball, square, from three of its radii away.
+inline std::vector<ScannerView> views_around(const Vec3& centre, double radius, int views, int columns) {
   std::vector<ScannerView> result;
   for (int i = 0; i < views; ++i) {
     const double z = 1 - (2 * i + 1.0) / views, across = std::sqrt(1 - z * z), turn = i * 2.399963;
-    const Vec3 eye = (3 * radius) * Vec3{across * std::cos(turn), across * std::sin(turn), z};
-    result.push_back(look_at(eye, {}, std::abs(z) < 0.9 ? Vec3{0, 0, 1} : Vec3{1, 0, 0}, columns, columns, 0.36));
+    const Vec3 eye = centre + (3 * radius) * Vec3{across * std::cos(turn), across * std::sin(turn), z};
+    result.push_back(look_at(eye, centre, std::abs(z) < 0.9 ? Vec3{0, 0, 1} : Vec3{1, 0, 0}, columns, columns, 0.36));
   }
   return result;
 }
@@ -92,7 +92,8 @@ class SceneScanner {
     high_ = box.high;
   }
 
-  SceneScan scan() {
+  /// `places`: how many places of the truth it tells of.
+  SceneScan scan(std::size_t places) {
     std::vector<double> spacings;
     for (const ScannerView& view : views_) images_.push_back(look(view, spacings));
     std::nth_element(spacings.begin(), spacings.begin() + static_cast<long>(spacings.size() / 2), spacings.end());
@@ -100,7 +101,7 @@ class SceneScanner {
     result.spacing = spacing_ = spacings[spacings.size() / 2];
     for (std::size_t i = 0; i < views_.size(); ++i) add_returns(i, result.cloud);
     add_outliers(result.cloud);
-    find_seen_places(result);
+    find_seen_places(places, result);
     return result;
   }
 
@@ -108,7 +109,6 @@ class SceneScanner {
   static constexpr double kGrazing = 0.26;  // cosine of 75 degrees
   static constexpr double kJump = 6;        // spacings: a jump between neighbouring depths
   static constexpr double kLostAtJumps = 0.5;
-  static constexpr std::size_t kPlaces = 40000;
 
   struct Return {
     double truth = 0;  ///< depth where the ray hits; 0: nowhere
@@ -237,10 +237,10 @@ class SceneScanner {
     }
   }
 
-  void find_seen_places(SceneScan& result) {
+  void find_seen_places(std::size_t places, SceneScan& result) {
     const AreaSampler sampler(truth_);
-    for (std::size_t i = 0; i < kPlaces; ++i) {
-      const double share = (static_cast<double>(i) + uniform()) / kPlaces, v = uniform();
+    for (std::size_t i = 0; i < places; ++i) {
+      const double share = (static_cast<double>(i) + uniform()) / static_cast<double>(places), v = uniform();
       const SurfacePoint place = sampler.at(share, v, uniform());
       const Vec3 p = position_at(truth_, place), normal = face_normal(place.triangle);
       result.places.push_back(p);

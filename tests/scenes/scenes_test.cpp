@@ -1,12 +1,12 @@
 // Scanned scenes, and how good the mesh is that comes of them without any option.
 #include <gtest/gtest.h>
 
-#include <functional>
+#include <cmath>
+#include <cstdint>
 #include <iostream>
 #include <map>
-#include <ostream>
 #include <string>
-#include <vector>
+#include <utility>
 
 #include "base/temporary_folder.h"
 #include "lamina/mesh.h"
@@ -15,7 +15,7 @@
 #include "reconstruct/clouds.h"
 #include "scenes/mesh_quality.h"
 #include "scenes/scanner.h"
-#include "scenes/truths.h"
+#include "scenes/scenes.h"
 
 namespace lamina {
 namespace {
@@ -37,51 +37,8 @@ const std::map<std::string, MeshQuality> kLimits{
 };
 // clang-format on
 
-struct Scene {
-  std::string name;
-  std::function<TriangleMesh()> truth;
-  std::vector<ScannerView> views;
-  ScannerErrors errors;
-  bool without_normals = false;
-};
-void PrintTo(const Scene& scene, std::ostream* out) {
-  *out << scene.name;
-}
-
-std::vector<ScannerView> street_views() {
-  std::vector<ScannerView> views;
-  for (const Vec3& eye : {Vec3{-3, 1.6, 9}, {2.5, 1.6, 5}, {5, 1.7, 10}})
-    views.push_back(look_at(eye, {0, 2.5, 0}, {0, 1, 0}, 220, 130, 0.7));
-  return views;
-}
-
-std::vector<ScannerView> views_from_above() {
-  std::vector<ScannerView> views;
-  for (const Vec3& eye : {Vec3{-2, -1, 6}, {2, 1.2, 6}, {0.5, -2.5, 5}})
-    views.push_back(look_at(eye, {0.7 * eye[0], 0.5 * eye[1], 0}, {0, 1, 0}, 170, 130, 0.6));
-  return views;
-}
-
-std::vector<Scene> scenes() {
-  const ScannerErrors mild{.noise = 0.3, .misregistration = 0.3}, bad{1, 1, 0.5, 0.005, 2}, stray{0.3, 0.2, 0.1, 0, 1},
-      slight{.noise = 0.2, .misregistration = 0.2};
-  const std::vector<ScannerView> ball = views_around(3.6, 6, 140);
-  const std::vector<ScannerView> inside{look_around({0.9, 1.4, 2.2}, 260, 1.3), look_around({3.1, 1.5, 0.7}, 260, 1.3)};
-  const auto plate = [] { return plate_truth(0.026); };
-  return {
-      {"Knot", knot_truth, ball, mild},
-      {"KnotWithoutNormals", knot_truth, ball, mild, true},
-      {"KnotBadlyScanned", knot_truth, ball, bad},
-      {"KnotFromOneSide", knot_truth, {ball[2]}, stray},
-      {"Facade", facade_truth, street_views(), stray},
-      {"Room", room_truth, inside, stray},
-      {"ThinPlate", plate, views_around(0.65, 6, 110), slight},
-      {"Terraces", terrain_truth, views_from_above(), mild},
-  };
-}
-
 class ScannedScene : public ::testing::TestWithParam<Scene> {};
-INSTANTIATE_TEST_SUITE_P(Surface, ScannedScene, ::testing::ValuesIn(scenes()),
+INSTANTIATE_TEST_SUITE_P(Surface, ScannedScene, ::testing::ValuesIn(all_scenes(1)),
                          [](const auto& scene) { return scene.param.name; });
 
 std::string write_points(const test::Cloud& cloud, bool with_normals, const std::string& path) {
@@ -97,7 +54,7 @@ std::string write_points(const test::Cloud& cloud, bool with_normals, const std:
 TEST_P(ScannedScene, KeepsItsLimits) {
   const Scene& scene = GetParam();
   const TriangleMesh truth = scene.truth();
-  const SceneScan scan = SceneScanner(truth, scene.views, scene.errors).scan();
+  const SceneScan scan = SceneScanner(truth, scene.views, scene.errors).scan(40000);
   const test::TemporaryFolder folder;
   SurfaceSettings settings;
   if (scene.without_normals) settings.normals = NormalsChoice::automatic;
@@ -121,6 +78,44 @@ TEST_P(ScannedScene, KeepsItsLimits) {
   EXPECT_LE(q.ragged, limits.ragged);
   EXPECT_LE(q.turn, limits.turn);
   EXPECT_LE(q.coincident, limits.coincident);
+}
+
+// The measures on meshes whose faults are known.
+TEST(ScannedScenes, OfTheTruthAndOfSpoiltTruths) {
+  const Scene scene = all_scenes(1).front();
+  const TriangleMesh truth = scene.truth();
+  const SceneScan scan = SceneScanner(truth, scene.views, {}).scan(10000);
+  const MeshQuality perfect = judge_mesh(truth, truth, scan);
+  EXPECT_LT(perfect.error, 1e-6);
+  EXPECT_NEAR(perfect.layers, 1, 1e-3);
+  EXPECT_LT(perfect.normals, 1e-3);
+  EXPECT_EQ(perfect.missing + perfect.flipped + perfect.loops + perfect.flakes + perfect.folds, 0);
+  EXPECT_EQ(perfect.parts, 1);
+
+  TriangleMesh turned = truth;
+  for (auto& t : turned.triangles) std::swap(t[0], t[1]);
+  EXPECT_NEAR(judge_mesh(turned, truth, scan).flipped, 100, 1e-6);
+
+  TriangleMesh halved = truth;  // cut along a ring of the tube on both sides
+  halved.triangles.resize(halved.triangles.size() / 2);
+  const MeshQuality half = judge_mesh(halved, truth, scan);
+  EXPECT_NEAR(half.missing, 50, 5);
+  EXPECT_EQ(half.loops, 2);
+  EXPECT_NEAR(half.ragged, 1.06, 0.03) << "smoothing makes a ring of nine spacings' radius this much shorter";
+  EXPECT_NEAR(half.turn, 360.0 / 80, 1) << "the rings have ripples";
+
+  TriangleMesh doubled = truth;  // a second layer a spacing outside, and a far speck
+  for (const auto& t : truth.triangles) {
+    const Vec3 normal =
+        unit(cross(truth.positions[t[1]] - truth.positions[t[0]], truth.positions[t[2]] - truth.positions[t[0]]));
+    for (const std::uint32_t v : t) doubled.positions.push_back(truth.positions[v] + scan.spacing * normal);
+    const auto next = static_cast<std::uint32_t>(doubled.positions.size());
+    doubled.triangles.push_back({next - 3, next - 2, next - 1});
+  }
+  const MeshQuality twice = judge_mesh(doubled, truth, scan);
+  EXPECT_NEAR(twice.error, std::sqrt(0.5), 0.03);
+  EXPECT_NEAR(twice.layers, 2, 0.2);
+  EXPECT_GT(twice.flakes, 45);
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ inline TriangleMesh knot_truth() {
     return {std::sin(t) + 2 * std::sin(2 * t), std::cos(t) - 2 * std::cos(2 * t), -std::sin(3 * t)};
   };
   const auto at = [&](int i, int j) -> Vec3 {
-    const double u = kTurn * i / kAround, v = kTurn * j / kAcross;
+    const double u = kTurn * (i % kAround) / kAround, v = kTurn * (j % kAcross) / kAcross;
     const Vec3 along = unit(centre(u + 1e-4) - centre(u - 1e-4));
     const Vec3 first = unit(cross(along, Vec3{0, 0, 1})), second = cross(first, along);
     const double radius = 0.5 + 0.04 * std::cos(9 * u) * std::cos(4 * v);
