@@ -67,6 +67,26 @@ def _estimate_normals(source, target):
     os.rename(target + ".part.ply", target)
 
 
+def has_normals(cloud):
+    """Of a PLY file."""
+    with open(cloud, "rb") as f:
+        return any(line.split()[-1:] == [b"nx"] for line in iter(f.readline, b"end_header\n"))
+
+
+def with_normals(cloud, target):
+    """The PLY itself, or a copy with normals by Open3D: for programs that do not look for them."""
+    if has_normals(cloud):
+        return cloud
+    if not os.path.exists(target):
+        import open3d
+        points = open3d.io.read_point_cloud(cloud)
+        points.estimate_normals(open3d.geometry.KDTreeSearchParamKNN(30))
+        points.orient_normals_consistent_tangent_plane(15)
+        open3d.io.write_point_cloud(target + ".part.ply", points)
+        os.rename(target + ".part.ply", target)
+    return target
+
+
 def _write_knot(path, around=2400, across=240):
     """A trefoil tube with ripples: smooth, closed, curved both ways, and known exactly."""
     vertices = bytearray()

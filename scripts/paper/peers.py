@@ -14,6 +14,8 @@ from paper import runs
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 CGAL_RADIUS = "1.5"  # sample spacings
+WRAP_ALPHA, WRAP_OFFSET = "5", "0.5"  # sample spacings
+TRIM = 2  # levels of the octree
 # Triangles of a grid in its squares of area, counted with MeshLab's APSS.
 GRID_TRIANGLES = 3.3
 
@@ -38,9 +40,23 @@ def available(folder, program, limit):
     for depth in (9, 10):
         add(f"Open3D Poisson, depth {depth}", "python3-open3d", open3d, _open3d(depth, limit))
     add("PCL Poisson, depth 9", "pcl-tools", bool(shutil.which("pcl_poisson_reconstruction")), _pcl(9, folder, program, limit))
-    cgal = _build_cgal(folder)
+    cgal = _build_cgal("cgal_poisson", folder)
     add("CGAL Poisson", "libcgal-dev, g++", cgal is not None, lambda samples, mesh, noisy, resolution: runs.run(
         [cgal, samples, mesh, CGAL_RADIUS], limit=limit))
+    return found, missing
+
+
+def available_for_scans(folder, program, limit):
+    """As available(), of those that are run on scans."""
+    found, missing = available(folder, program, limit)
+    open3d = {f"{name}, trimmed": _open3d(int(name.split()[-1]), limit, TRIM) for name in found if name.startswith("Open3D")}
+    found = open3d | {name: peer for name, peer in found.items() if name.startswith("MeshLab") and "10" not in name}
+    wrap = _build_cgal("cgal_alpha_wrap", folder)
+    if wrap:
+        found["CGAL alpha wrap"] = lambda samples, mesh, noisy, resolution: runs.run(
+            [wrap, samples, mesh, WRAP_ALPHA, WRAP_OFFSET], limit=limit)
+    else:
+        missing.append("CGAL alpha wrap (libcgal-dev, g++)")
     return found, missing
 
 
@@ -92,9 +108,9 @@ def _meshlab_poisson(depth, folder, limit):
     return peer
 
 
-def _open3d(depth, limit):
+def _open3d(depth, limit, *trim):
     def peer(samples, mesh, noisy, resolution):
-        return runs.run([sys.executable, os.path.join(HERE, "open3d_poisson.py"), samples, mesh, str(depth)],
+        return runs.run([sys.executable, os.path.join(HERE, "open3d_poisson.py"), samples, mesh, *map(str, (depth, *trim))],
                         limit=limit)
 
     return peer
@@ -112,10 +128,10 @@ def _pcl(depth, folder, program, limit):
     return peer
 
 
-def _build_cgal(folder):
+def _build_cgal(name, folder):
     """Compiles the few lines around CGAL's function; None without CGAL."""
-    binary = os.path.join(folder, "cgal_poisson")
-    source = os.path.join(HERE, "cgal_poisson.cpp")
+    binary = os.path.join(folder, name)
+    source = os.path.join(HERE, name + ".cpp")
     if os.path.exists(binary) and os.path.getmtime(binary) > os.path.getmtime(source):
         return binary
     command = ["g++", "-O3", "-DNDEBUG", "-DCGAL_EIGEN3_ENABLED", "-I/usr/include/eigen3", "-std=c++17", source, "-o", binary,

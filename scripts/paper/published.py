@@ -16,3 +16,7 @@ TABLE3 = {
     "diffused, N = 1": {"armadillo": (0.208, 0.312), "dragon": (0.155, 0.368)},
     "diffused, clustered, N = 1": {"armadillo": (0.210, 0.317), "dragon": (0.163, 0.381)},
 }
+
+# Chamfer distance in 1e-4 of the diagonal of the meshes that Huang et al. (2022) published with their survey: of screened Poisson,
+# and of the best of 13 methods, measured as ours are.
+SURVEY = {"tap": (34.9, 34.9), "bowl": (26.6, 25.6), "murex": (12.4, 12.4), "part": (123.6, 39.2)}

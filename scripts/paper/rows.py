@@ -2,7 +2,7 @@
 
 # What tells the rows of a table apart.
 KEYS = {"1": ("diffuse", "cluster"), "2": ("blend",), "3": ("model", "noisy", "name"), "peers": ("model", "noisy", "name"),
-        "cells": ("model", "blend", "cell")}
+        "cells": ("model", "blend", "cell"), "scans": ("scene", "name"), "scenes": ("scene", "name")}
 # What all rows of a table must have in common, or the older ones go.
 COUNTED = {"1": "large", "2": "large", "3": "count", "peers": "count", "cells": "count"}
 
@@ -26,6 +26,7 @@ def join(first, second, order):
     """Two runs' results as one: the second's rows in place of the first's, whose rows of another number of samples go."""
     tables = {}
     for name in dict.fromkeys([*first["tables"], *second["tables"]]):
-        same = first[COUNTED[name]] == second[COUNTED[name]]
+        counted = COUNTED.get(name)
+        same = counted is None or first[counted] == second[counted]
         tables[name] = merge(name, first["tables"].get(name, []) if same else [], second["tables"].get(name, []), order)
     return first | second | {"tables": tables}

@@ -110,3 +110,36 @@ def cells(results):
                      f"{c['triangles'] / 1e3:.0f}", *figures, c["open"]])
     return table(["model", "H", "cell, R", "cell, r", "k triangles", "RMS: vertices to truth", "mesh to truth", "truth to mesh",
                   "mean: vertices to truth", "mesh to truth", "truth to mesh", "boundary edges, main part"], rows)
+
+
+SHAPE = {"k triangles": lambda c: f"{c['triangles'] / 1e3:.0f}", "parts": lambda c: c["parts"], "loops": lambda c: c["loops"],
+         "ragged": lambda c: f"{c['ragged']:.2f}", "turn": lambda c: f"{c['turn']:.0f}"}
+SURVEY = {"CD": lambda c: f"{c['chamfer']:.1f}", "accuracy": lambda c: f"{c['accuracy']:.1f}",
+          "completeness": lambda c: f"{c['completeness']:.1f}", "NC": lambda c: f"{c['normal_consistency']:.3f}"}
+SCENE = {"error": lambda c: f"{c['error']:.3f}", "missing, %": lambda c: f"{100 * c['missing']:.2f}",
+         "invented, %": lambda c: f"{100 * c['invented']:.1f}", "normals": lambda c: f"{c['normals']:.1f}",
+         "flipped, %": lambda c: f"{100 * c['flipped']:.1f}", "folds, %": lambda c: f"{100 * c['folds']:.2f}"}
+
+
+def scans(results):
+    """The survey's benchmark; below each object what its authors' meshes have."""
+    return _by_scene(results, SURVEY | SHAPE, lambda scene: [
+        [scene, name, "-", "-", cd] + ["-"] * (len(SURVEY) + len(SHAPE) - 1) for name, cd in zip(
+            ("screened Poisson of the survey", "best of the survey's methods"), published.SURVEY.get(scene, ()))])
+
+
+def scenes(results):
+    return _by_scene(results, SCENE | SHAPE, lambda scene: [])
+
+
+def _by_scene(results, columns, more):
+    rows = []
+    for scene in dict.fromkeys(c["scene"] for c in results):
+        for c in results:
+            if c["scene"] == scene and "failed" in c:
+                rows.append([scene, c["name"], c["failed"], "-"] + ["-"] * len(columns))
+            elif c["scene"] == scene:
+                cost = [f"{c['cost']['cpu']:.1f}", f"{c['cost']['memory'] / 1e6:.0f}"]
+                rows.append([scene, c["name"], *cost, *(of(c) for of in columns.values())])
+        rows += more(scene)
+    return table(["", "", "CPU s", "MB", *columns], rows)
