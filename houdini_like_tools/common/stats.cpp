@@ -29,8 +29,9 @@ nlohmann::ordered_json normals_json(const NormalsReport& r) {
   j["estimated"] = r.estimated;
   j["flipped"] = r.flipped;
   j["without_normal"] = r.without;
-  j["sign_from"] = {
-      {"viewpoint", r.by_viewpoint}, {"given", r.by_given}, {"outside", r.by_outside}, {"outside_unsure", r.unsure}};
+  j["sign_from"] = {{"viewpoint", r.by_viewpoint}, {"given", r.by_given}, {"outside", r.by_outside},
+                    {"inside", r.by_inside},       {"up", r.by_up},       {"sight", r.by_sight},
+                    {"unsure", r.unsure}};
   j["patches"] = r.patches;
   j["components"] = r.components;
   j["sign_conflicts"] = {

@@ -60,7 +60,11 @@ struct NormalsReport {
   std::uint64_t by_viewpoint = 0;  ///< samples whose sign follows from a viewpoint, directly or through neighbours
   std::uint64_t by_given = 0;      ///< samples whose sign follows from normals of the input that stay
   std::uint64_t by_outside = 0;    ///< samples whose sign makes the volume that their surface encloses positive
-  std::uint64_t unsure = 0;        ///< of these, on surfaces too open or flat to tell: horizontal ones face +z
+  std::uint64_t by_inside = 0;     ///< samples of a room that was seen from inside: they face into it
+  std::uint64_t by_up = 0;         ///< samples of ground in a wide, flat and level cloud: they face +z
+  std::uint64_t by_sight = 0;      ///< samples that face the side from which one sees farther
+  std::uint64_t unsure = 0;        ///< samples on other open surfaces: level ones face +z, the rest outwards if that
+                                   ///< means anything
   std::uint64_t patches = 0, components = 0;  ///< patches of one sign; surfaces that no link joins
   SignConflicts conflicts;                    ///< of the result
   std::vector<SignConflicts> slabs;           ///< of the result, by slab of the sweep

@@ -80,8 +80,7 @@ Plane fit_plane(const Moments& m) {
 
 namespace {
 
-constexpr double kLine = 1.0 / 32;        ///< a smaller share of the middle variance in the largest is a line's
-constexpr std::size_t kLeastLinked = 12;  ///< neighbours that links are chosen from
+constexpr double kLine = 1.0 / 32;  ///< a smaller share of the middle variance in the largest is a line's
 
 /// Neighbours at even steps of the list: the nearest ones alone may lie on one scan line, or at one place.
 void link(const Neighbour* found, std::size_t count, std::uint32_t place, std::size_t i, Links& links) {

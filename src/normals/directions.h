@@ -2,6 +2,7 @@
 // analysis in closed form; and the links between neighbours along which signs will travel.
 #pragma once
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include "normals/sample_window.h"
@@ -57,6 +58,8 @@ struct Plane {
 /// Only sums, products, quotients and square roots: the same bits on every processor. The sign of the normal means
 /// nothing.
 Plane fit_plane(const Moments& moments);
+
+inline constexpr std::size_t kLeastLinked = 12;  ///< neighbours that links are chosen from
 
 struct DirectionSettings {
   int k = 16;               ///< neighbours the plane is fitted to, where they are not noisy

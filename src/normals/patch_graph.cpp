@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "base/union_find.h"
 #include "normals/sample_window.h"
+#include "normals/sides.h"
 
 namespace lamina::normals {
 namespace {
@@ -96,66 +98,6 @@ void grow_forest(std::vector<Evidence>& evidence, float least_share, SignedUnion
   }
 }
 
-/// Sums over the nodes of a cluster, with its signs so far.
-struct Body {
-  double area = 0;
-  std::array<double, 3> moment{};  ///< area times centre
-  std::array<double, 3> facing{};  ///< area times normal: zero for what is closed
-  double volume = 0, size = 0;
-  std::uint64_t samples = 0;
-
-  /// How much of it faces one way.
-  [[nodiscard]] double openness() const { return length(facing) / area; }
-  static double length(const std::array<double, 3>& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
-};
-
-std::vector<Body> bodies_of(const PatchGraph& graph, const std::vector<std::uint32_t>& root, const PatchSigns& signs) {
-  const std::size_t n = graph.nodes.size();
-  std::vector<Body> bodies(n);
-  for (std::size_t i = 1; i < n; ++i) {
-    const PatchNode& node = graph.nodes[i];
-    Body& body = bodies[root[i]];
-    body.area += double{node.area};
-    body.samples += node.count;
-    for (std::size_t a = 0; a < 3; ++a) {
-      body.moment[a] += double{node.area} * double{node.centre[a]};
-      body.facing[a] += signs.sign[i] * double{node.outward[a]};
-    }
-  }
-  for (std::size_t i = 1; i < n; ++i) {
-    const PatchNode& node = graph.nodes[i];
-    Body& body = bodies[root[i]];
-    std::array<double, 3> offset{};
-    double along = 0;
-    for (std::size_t a = 0; a < 3; ++a) {
-      offset[a] = double{node.centre[a]} - body.moment[a] / body.area;
-      along += double{node.outward[a]} * offset[a];
-    }
-    body.volume += signs.sign[i] * (along + double{node.bulge});
-    body.size += double{node.area} * Body::length(offset);
-  }
-  return bodies;
-}
-
-constexpr double kOpen = 0.3;  ///< half a sphere has 0.5
-
-/// Closed, and with an inside worth the name.
-bool encloses(const Body& body) {
-  constexpr double kLittle = 0.1;  // of the volume that the same area could enclose
-  return body.openness() <= kOpen && std::abs(body.volume) > kLittle * body.size;
-}
-
-/// A surface that encloses a positive volume has its normals outward: the sum of area, normal times offset from the
-/// centre is three times the volume. Sheets that face one way enclose nothing: a ground has its outside above, whether
-/// it is a hill or a bowl.
-bool is_inside_out(const Body& body, const std::array<float, 3>& up) {
-  constexpr double kUpright = 0.5;  // cosine
-  double upward = 0;
-  for (std::size_t a = 0; a < 3; ++a) upward += body.facing[a] * double{up[a]};
-  const bool ground = std::abs(upward) > kUpright * Body::length(body.facing) && body.openness() > kOpen;
-  return (ground ? upward : body.volume) < 0;
-}
-
 void read_forest(SignedUnionFind& forest, std::vector<std::uint32_t>& root, PatchSigns& signs) {
   for (std::uint32_t i = 0; i < root.size(); ++i) {
     root[i] = forest.find(i);
@@ -165,7 +107,7 @@ void read_forest(SignedUnionFind& forest, std::vector<std::uint32_t>& root, Patc
 
 }  // namespace
 
-PatchSigns find_signs(const PatchGraph& graph, const std::array<float, 3>& up) {
+PatchSigns find_signs(const PatchGraph& graph, const InputAxes& axes) {
   constexpr float kClear = 0.2F;  // share of evidence between clusters that do not contradict each other
   const std::size_t n = graph.nodes.size();
   PatchSigns signs{std::vector<std::int8_t>(n, 1), std::vector<SignSource>(n, SignSource::fixed), 0};
@@ -174,19 +116,26 @@ PatchSigns find_signs(const PatchGraph& graph, const std::array<float, 3>& up) {
   grow_forest(evidence, kClear, forest, n);
   std::vector<std::uint32_t> root(n);
   read_forest(forest, root, signs);
-  std::vector<Body> bodies = bodies_of(graph, root, signs);
+  std::vector<std::uint8_t> open(n, 0);
+  for (std::uint32_t i = 1; i < n; ++i) open[i] = root[i] != kFixed ? 1 : 0;
+  const Sides sides(graph, axes, open);
+  std::vector<Body> bodies = sides.bodies(root, signs.sign);
+  const std::optional<std::uint32_t> room = sides.find_room(bodies, root, signs.sign);
   for (std::uint32_t i = 1; i < n; ++i) {
-    if (root[i] != kFixed) signs.source[i] = encloses(bodies[root[i]]) ? SignSource::outside : SignSource::unsure;
+    if (root[i] == kFixed) continue;
+    signs.source[i] = root[i] == room ? SignSource::inside : sides.choose(bodies[root[i]]).source;
   }
-  // Bodies that pass through each other, as a handle through a wall, say nothing of each other: each has its outside.
+  // Bodies that pass through each other, as a handle through a wall, say nothing of each other: each has its own side.
   // Scraps that noise has cut off are none.
   constexpr std::uint64_t kShare = 200;
   std::uint64_t samples = 0;
   for (const PatchNode& node : graph.nodes) samples += node.count;
   for (std::uint32_t i = 1; i < n; ++i) {
-    if (root[i] != i || !encloses(bodies[i]) || bodies[i].samples < samples / kShare) continue;
+    if (root[i] != i || i == kFixed || bodies[i].samples < samples / kShare) continue;
+    const Side side = i == room ? Side{!is_inside_out(bodies[i]), SignSource::inside} : sides.choose(bodies[i]);
+    if (side.source == SignSource::unsure) continue;
     ++signs.components;
-    forest.unite(kFixed, i, static_cast<std::int8_t>(is_inside_out(bodies[i], up) ? -1 : 1));
+    forest.unite(kFixed, i, static_cast<std::int8_t>(side.turn ? -1 : 1));
   }
   regroup(evidence, forest);
   grow_forest(evidence, 0, forest, n);
@@ -194,11 +143,14 @@ PatchSigns find_signs(const PatchGraph& graph, const std::array<float, 3>& up) {
   signs.components += any_fixed ? 1 : 0;
 
   read_forest(forest, root, signs);
-  bodies = bodies_of(graph, root, signs);
+  bodies = sides.bodies(root, signs.sign);
   for (std::uint32_t i = 1; i < n; ++i) {
     if (root[i] == kFixed) continue;
+    const Body& body = bodies[root[i]];
     signs.components += root[i] == i ? 1 : 0;
-    if (is_inside_out(bodies[root[i]], up)) signs.sign[i] = static_cast<std::int8_t>(-signs.sign[i]);
+    const Side side = sides.choose(body);
+    if (side.turn) signs.sign[i] = static_cast<std::int8_t>(-signs.sign[i]);
+    signs.source[i] = side.source;
   }
   return signs;
 }

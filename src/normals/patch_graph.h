@@ -13,7 +13,7 @@ namespace lamina::normals {
 struct PatchNode {
   static constexpr double kUnit = 1 << 29;
   std::uint32_t count = 0;
-  float area = 0;
+  float area = 0;                  ///< kUnit^2
   std::array<float, 3> centre{};   ///< by area
   std::array<float, 3> outward{};  ///< normals, by area
   float bulge = 0;                 ///< normal times offset from the centre, by area
@@ -34,6 +34,7 @@ struct SlabLinks {
 };
 
 struct PatchGraph {
+  float cell = 0;  ///< side of the cubes that patches lie in, kUnit steps; 0: nothing is known of what they hide
   std::vector<PatchNode> nodes = std::vector<PatchNode>(1);  ///< the first is kFixed: it cannot turn
   std::vector<PatchEdge> edges;
   std::vector<SlabLinks> slabs;
@@ -43,8 +44,14 @@ struct PatchGraph {
 enum class SignSource : std::uint8_t {
   fixed,    ///< linked to the fixed node, by votes or by given normals
   outside,  ///< the surface encloses a volume
-  unsure,   ///< the same, but it is open, or encloses little
+  inside,   ///< the same, but what is in it was seen from inside
+  up,       ///< ground of a wide and flat cloud
+  sight,    ///< one looks farther from this side
+  unsure,   ///< too open, or encloses little
 };
+
+/// The input's x, y and z in the frame, unit length.
+using InputAxes = std::array<std::array<float, 3>, 3>;
 
 struct PatchSigns {
   std::vector<std::int8_t> sign;  ///< by node: 1 or -1
@@ -55,9 +62,9 @@ struct PatchSigns {
 /// Chooses signs so that as many links as possible agree: a spanning tree in Boruvka's rounds, where every cluster of
 /// patches joins the one that it has most to say about, for or against, and the sums are taken anew between the
 /// clusters. Votes are links to the fixed node. Clusters whose links contradict each other too much to follow wait
-/// until those that enclose a volume have been turned outside out. What then still is not joined to the fixed node is
-/// turned outside out, too; sheets that enclose nothing and lie flat towards `up` (unit length). Deterministic.
-PatchSigns find_signs(const PatchGraph& graph, const std::array<float, 3>& up);
+/// until those that enclose a volume have been turned outside out, or inside out if it is a room. What then still is
+/// not joined to the fixed node gets its side by itself (normals/sides.h). Deterministic.
+PatchSigns find_signs(const PatchGraph& graph, const InputAxes& axes);
 
 /// Conflicts that remain, by slab.
 std::vector<SignConflicts> count_conflicts(const PatchGraph& graph, const PatchSigns& signs);

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -176,6 +177,7 @@ class PatchGrower {
     std::vector<Sums> all(cell.patches);
     if (all.empty()) return;
     const std::uint32_t pivot = links_.core[order_[cell.begin]];
+    const double share = std::numbers::pi / settings_.neighbours / (PatchNode::kUnit * PatchNode::kUnit);
     for (std::size_t s = cell.begin; s < cell.end; ++s) {
       const std::uint32_t place = links_.core[order_[s]];
       if (samples_.node[place] == kNoNode || samples_.node[place] == kFixed) continue;
@@ -183,7 +185,7 @@ class PatchGrower {
       const Vector3f n = normal_of(samples_, place);
       const Vector3f at = tree_.offset(pivot, place);
       // A sample stands for the area its neighbourhood has for each of its samples.
-      const double area = std::max(double{links_.scale[order_[s]]}, 1.0) / (PatchNode::kUnit * PatchNode::kUnit);
+      const double area = share * std::max(double{links_.scale[order_[s]]}, 1.0);
       sum.area += area;
       for (std::size_t a = 0; a < 3; ++a) {
         sum.moment[a] += area * double{at[a]} / PatchNode::kUnit;

@@ -18,6 +18,7 @@ float agreement(const std::array<float, 3>& offset, const std::array<float, 3>& 
 
 struct PatchSettings {
   std::int32_t cell = 1;    ///< steps: patches lie within cubes of this side, on its multiples
+  int neighbours = 16;      ///< samples that lie within Links::scale
   bool given_stay = false;  ///< given normals keep their sign: they belong to the fixed node
 };
 

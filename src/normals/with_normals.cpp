@@ -75,10 +75,20 @@ Scale scale_of(const NormalsSettings& settings, const SlabStore& store, const Fr
   const double in_patch = std::max(kLeastPatch, static_cast<double>(store.total()) / kPatches);
   const double cell = std::max(0.5 * double{radii.median} * std::sqrt(in_patch), double{kLeastPatchCell});
   s.patches.cell = static_cast<std::int32_t>(steps(cell));
+  s.patches.neighbours = std::max(settings.k, static_cast<int>(kLeastLinked));
   s.patches.given_stay = settings.mode == NormalsMode::complete || settings.mode == NormalsMode::check;
   s.window.least_samples = kLeastSlab;
   s.window.least_height = std::min(2 * s.window.halo, s.patches.cell);
   return s;
+}
+
+InputAxes axes_in(const Frame& frame) {
+  InputAxes axes;
+  for (int a = 0; a < 3; ++a) {
+    const Eigen::Vector3f axis = frame.rotation.col(a).cast<float>();
+    axes[static_cast<std::size_t>(a)] = {axis.x(), axis.y(), axis.z()};
+  }
+  return axes;
 }
 
 class Job {
@@ -106,9 +116,9 @@ class Job {
         directory);
     const Scale scale = scale_of(settings_, in.store, frame);
     require_memory(in.store, scale, memory);
+    graph_.cell = static_cast<float>(scale.patches.cell / PatchNode::kUnit);
     sweep(in.store, scale, viewpoints, records);
-    const Eigen::Vector3f up = frame.rotation.col(2).cast<float>();
-    PatchSigns signs = find_signs(graph_, {up.x(), up.y(), up.z()});
+    PatchSigns signs = find_signs(graph_, axes_in(frame));
     report_.samples = in.store.total();
     tell(signs, viewpoints);
     if (settings_.flip) {
@@ -222,11 +232,20 @@ class Job {
         case SignSource::fixed:
           (viewpoints.any() ? report_.by_viewpoint : report_.by_given) += count;
           break;
-        case SignSource::unsure:
-          report_.unsure += count;
-          [[fallthrough]];
         case SignSource::outside:
           report_.by_outside += count;
+          break;
+        case SignSource::inside:
+          report_.by_inside += count;
+          break;
+        case SignSource::up:
+          report_.by_up += count;
+          break;
+        case SignSource::sight:
+          report_.by_sight += count;
+          break;
+        case SignSource::unsure:
+          report_.unsure += count;
           break;
       }
     }
@@ -296,10 +315,12 @@ std::string describe(const NormalsReport& r) {
   if (r.without > 0) text += fmt::format(", {} samples without one", r.without);
   if (r.by_viewpoint > 0) text += fmt::format("; {:.1f} % face a viewpoint", percent(r.by_viewpoint, r.samples));
   if (r.by_given > 0) text += fmt::format("; {:.1f} % follow given ones", percent(r.by_given, r.samples));
-  if (r.by_outside > 0) {
-    text += fmt::format("; {:.1f} % face outside of what they enclose", percent(r.by_outside, r.samples));
-    if (r.unsure > 0) text += fmt::format(" ({:.1f} % enclose little)", percent(r.unsure, r.samples));
-  }
+  if (r.by_outside > 0)
+    text += fmt::format("; {:.1f} % face out of what they enclose", percent(r.by_outside, r.samples));
+  if (r.by_inside > 0) text += fmt::format("; {:.1f} % face into a room", percent(r.by_inside, r.samples));
+  if (r.by_up > 0) text += fmt::format("; {:.1f} % are ground and face up", percent(r.by_up, r.samples));
+  if (r.by_sight > 0) text += fmt::format("; {:.1f} % face where one sees farther", percent(r.by_sight, r.samples));
+  if (r.unsure > 0) text += fmt::format("; {:.1f} % are too open to tell", percent(r.unsure, r.samples));
   return text + fmt::format("; {:.2f} % of neighbours conflict", 100 * r.conflicts.share());
 }
 

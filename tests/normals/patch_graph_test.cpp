@@ -7,6 +7,8 @@
 namespace lamina::normals {
 namespace {
 
+constexpr InputAxes kAxes{{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+
 PatchNode node_at(float x, float outward) {
   PatchNode n;
   n.count = 1;
@@ -28,7 +30,7 @@ TEST(PatchSigns, TurnABodyOutsideOut) {
     g.nodes.push_back(node_at(1, side));
     g.nodes.push_back(node_at(-1, side));
     link(g, 1, 2, -3);
-    const PatchSigns s = find_signs(g, {0, 0, 1});
+    const PatchSigns s = find_signs(g, kAxes);
     EXPECT_EQ(s.components, 1);
     EXPECT_EQ(s.sign[1], side);
     EXPECT_EQ(s.sign[2], -side);
@@ -47,11 +49,11 @@ TEST(PatchSigns, TurnAnOpenGroundUp) {
       g.nodes[i].bulge = bulge;
     }
     link(g, 1, 2, 3);
-    const PatchSigns s = find_signs(g, {0, 0, 1});
+    const PatchSigns s = find_signs(g, kAxes);
     EXPECT_EQ(s.sign[1], -1);
     EXPECT_EQ(s.source[1], SignSource::unsure);
-    EXPECT_EQ(find_signs(g, {0, 0, -1}).sign[1], 1);
-    EXPECT_EQ(find_signs(g, {0, 1, 0}).sign[1], bulge > 0 ? 1 : -1);
+    EXPECT_EQ(find_signs(g, {{{1, 0, 0}, {0, 1, 0}, {0, 0, -1}}}).sign[1], 1);
+    EXPECT_EQ(find_signs(g, {{{1, 0, 0}, {0, 0, 1}, {0, 1, 0}}}).sign[1], bulge > 0 ? 1 : -1);
   }
 }
 
@@ -61,7 +63,7 @@ TEST(PatchSigns, FollowVotesAgainstTheOutside) {
   g.nodes.push_back(node_at(-1, -1));
   g.nodes[2].vote = -2;
   link(g, 1, 2, 3);
-  const PatchSigns s = find_signs(g, {0, 0, 1});
+  const PatchSigns s = find_signs(g, kAxes);
   EXPECT_EQ(s.sign[1], -1);
   EXPECT_EQ(s.sign[2], -1);
   EXPECT_EQ(s.source[1], SignSource::fixed);
@@ -77,7 +79,7 @@ TEST(PatchSigns, SumUpWhatClustersSayOfEachOther) {
   link(g, 1, 3, -3);
   link(g, 2, 4, 2);
   link(g, 2, 3, 2);
-  const PatchSigns s = find_signs(g, {0, 0, 1});
+  const PatchSigns s = find_signs(g, kAxes);
   for (std::size_t i = 1; i < 5; ++i) EXPECT_EQ(s.sign[i], 1) << i;
 }
 
@@ -90,7 +92,7 @@ TEST(PatchSigns, CountsConflictsThatRemain) {
   link(g, 1, 3, 5, 8, 1);
   link(g, 2, 3, 1, 4, 0);  // against the odd one
   g.slabs.push_back({0, 0, 3});
-  const std::vector<SignConflicts> c = count_conflicts(g, find_signs(g, {0, 0, 1}));
+  const std::vector<SignConflicts> c = count_conflicts(g, find_signs(g, kAxes));
   ASSERT_EQ(c.size(), 2);
   EXPECT_EQ(c[0].pairs, 21);
   EXPECT_EQ(c[0].conflicts, 2);
@@ -111,7 +113,7 @@ RC_GTEST_PROP(PatchSigns, FindHiddenSigns, ()) {
     link(g, std::min(a, b), std::max(a, b), static_cast<float>(hidden[a] * hidden[b] * *rc::gen::inRange(1, 20)));
     joined.unite(a, b, 1);
   }
-  const PatchSigns s = find_signs(g, {0, 0, 1});
+  const PatchSigns s = find_signs(g, kAxes);
   std::uint64_t components = 0;
   for (std::uint32_t i = 1; i <= n; ++i) {
     const std::uint32_t root = joined.find(i);
