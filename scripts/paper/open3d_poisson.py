@@ -1,6 +1,6 @@
 """Screened Poisson by Open3D, on every core: open3d_poisson.py POINTS MESH DEPTH [TRIM]
 
-TRIM: what lies where the samples' density is that of so many levels above the deepest is cut away.
+TRIM: what lies where samples are as rare as so many levels of the octree above the median is cut away.
 """
 import os
 import sys
@@ -16,8 +16,9 @@ cloud = open3d.io.read_point_cloud(sys.argv[1])
 depth = int(sys.argv[3])
 mesh, density = open3d.geometry.TriangleMesh.create_from_point_cloud_poisson(cloud, depth=depth)
 if len(sys.argv) > 4:
-    positions, triangles = trim.trim(np.asarray(mesh.vertices), np.asarray(mesh.triangles).astype(np.int64), np.asarray(density),
-                                     depth - float(sys.argv[4]))
+    density = np.asarray(density)
+    positions, triangles = trim.trim(np.asarray(mesh.vertices), np.asarray(mesh.triangles).astype(np.int64), density,
+                                     np.median(density) - float(sys.argv[4]))
     meshes.write_ply(sys.argv[2], positions, triangles)
 else:
     open3d.io.write_triangle_mesh(sys.argv[2], mesh)

@@ -15,7 +15,7 @@ from paper import runs
 HERE = os.path.dirname(os.path.abspath(__file__))
 CGAL_RADIUS = "1.5"  # sample spacings
 WRAP_ALPHA, WRAP_OFFSET = "5", "0.5"  # sample spacings
-TRIM = 2  # levels of the octree
+TRIM = 2  # levels of the octree, from the median density
 # Triangles of a grid in its squares of area, counted with MeshLab's APSS.
 GRID_TRIANGLES = 3.3
 
@@ -46,11 +46,12 @@ def available(folder, program, limit):
     return found, missing
 
 
-def available_for_scans(folder, program, limit):
-    """As available(), of those that are run on scans."""
+def available_for_scans(folder, program, limit, depths):
+    """As available(), of those that are run on scans; Open3D's Poisson at the depths given."""
     found, missing = available(folder, program, limit)
-    open3d = {f"{name}, trimmed": _open3d(int(name.split()[-1]), limit, TRIM) for name in found if name.startswith("Open3D")}
-    found = open3d | {name: peer for name, peer in found.items() if name.startswith("MeshLab") and "10" not in name}
+    open3d = any(name.startswith("Open3D") for name in found)
+    found = {f"Open3D Poisson, depth {depth}, trimmed": _open3d(depth, limit, TRIM) for depth in depths if open3d} | {
+        name: peer for name, peer in found.items() if name.startswith("MeshLab") and "10" not in name}
     wrap = _build_cgal("cgal_alpha_wrap", folder)
     if wrap:
         found["CGAL alpha wrap"] = lambda samples, mesh, noisy, resolution: runs.run(

@@ -35,12 +35,12 @@ SCANNED = {"tap": ["--view", "30,40", "--up", "z"], "bowl": ["--view", "30,40", 
            "room": ["--zoom", "3,0.55,1.7,0.95", "--view", "200,20"],
            "KnotBadlyScanned": ["--view", "30,35"], "Facade": ["--view", "20,15"],
            "Room": ["--zoom", "2.2,0.7,1.6,1.2", "--view", "200,20"], "Terraces": ["--view", "30,35", "--up", "z"]}
-BESIDE = {"lamina": "lamina", "poisson": "Open3D Poisson, depth 9, trimmed"}
+BESIDE = ("lamina", "poisson")
 
 
 def scanned(program, case, folder):
     """Ours and Poisson's mesh of a scan, their boundaries in red; only those meshes that an earlier run left."""
-    for word, method in BESIDE.items() if case.name in SCANNED else ():
+    for word, method in zip(BESIDE, ("lamina", case.beside)) if case.name in SCANNED else ():
         if os.path.exists(case.mesh(method)):
             _render(program, [case.mesh(method), "-o", _scanned_picture(folder, case.name, word), "--size", "480x360",
                               "--mark-boundary", *SCANNED[case.name]])
@@ -51,7 +51,7 @@ def scanned_table(folder, link):
     rows = [name for name in SCANNED if all(os.path.exists(_scanned_picture(folder, name, word)) for word in BESIDE)]
     lines = [f"| {name} | " + " | ".join(f"![{name}, {word}]({_scanned_picture(link, name, word)})" for word in BESIDE) + " |"
              for name in rows]
-    return "\n".join(["| | " + " | ".join(BESIDE.values()) + " |", "|---|---|---|", *lines]) if rows else ""
+    return "\n".join(["| | lamina | Open3D's Poisson, trimmed |", "|---|---|---|", *lines]) if rows else ""
 
 
 def _scanned_picture(folder, name, word):

@@ -18,12 +18,13 @@ SCANS = {"tap": ("tap.ply", "tap_reference.ply"), "bowl": ("bowl.ply", "bowl_ref
          "murex": ("murex_noise.ply", "murex_truth.ply"), "part": ("part_missing.ply", "part_truth.ply")}
 # No option, and all closed.
 CHOICES = {"lamina": [], "lamina --fill all": ["--fill", "all"]}
+DEPTHS = {"scans": (8, 9), "scenes": (9, 10)}  # of Poisson's octrees, after the sizes of the clouds
 FIRST_SCENES = ("dragon", "heavy", "armadillo", "facade", "room", "cad", "plate")
 MAKER = "lamina_scenes"
 
 
 class Case:
-    """A cloud and its truth. `judge` tells of a mesh file what the table shows."""
+    """A cloud and its truth. `judge` tells of a mesh file what the table shows; `beside` is the mesh that is drawn beside ours."""
 
     def __init__(self, name, cloud, folder):
         self.name, self.cloud = name, cloud
@@ -42,6 +43,8 @@ class Case:
 
 
 class Scan(Case):
+    beside = f"Open3D Poisson, depth {DEPTHS['scans'][0]}, trimmed"
+
     def __init__(self, name, cloud, reference, folder):
         super().__init__(name, cloud, folder)
         self.reference = reference
@@ -52,6 +55,8 @@ class Scan(Case):
 
 
 class Scene(Case):
+    beside = f"Open3D Poisson, depth {DEPTHS['scenes'][0]}, trimmed"
+
     def __init__(self, name, scenes, folder):
         super().__init__(name, os.path.join(scenes, f"scan_{name}.ply"), folder)
         self.seen = os.path.join(scenes, f"seen_{name}.ply")
