@@ -58,13 +58,13 @@ void add_clean_options(CLI::App& app, CleanSettings& s, const std::string& group
       ->group(group);
 }
 
-void add_normals_choice(CLI::App& tool, NormalsChoice& normals, const std::string& group) {
+void add_normals_choice(CLI::App& tool, std::optional<NormalsChoice>& normals, const std::string& group) {
   tool.add_option(
           "--normals", normals,
           "Whose normals: the file's; auto: the file's, and found for the samples that have none; estimate: all found")
       ->transform(words<NormalsChoice>(
           {{"file", NormalsChoice::file}, {"auto", NormalsChoice::automatic}, {"estimate", NormalsChoice::estimate}}))
-      ->option_text("file|auto|estimate [file]")
+      ->option_text("file|auto|estimate [auto]")
       ->group(group);
 }
 

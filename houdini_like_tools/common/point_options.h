@@ -2,6 +2,7 @@
 // normals.
 #pragma once
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 
 #include "lamina/clean.h"
@@ -14,7 +15,7 @@ namespace lamina::tools {
 void add_clean_options(CLI::App& app, CleanSettings& settings, const std::string& group);
 
 /// --normals.
-void add_normals_choice(CLI::App& tool, NormalsChoice& normals, const std::string& group);
+void add_normals_choice(CLI::App& tool, std::optional<NormalsChoice>& normals, const std::string& group);
 
 /// --k, --radius, --viewpoint, --up, --flip.
 void add_normals_options(CLI::App& tool, NormalsSettings& settings, const std::string& group);

@@ -37,7 +37,9 @@ struct SurfaceSettings {
 
   std::optional<FrameMode> frame;  ///< unset: pca, or axis where grids are asked for (they have the input's axes then)
   BadSamples bad_samples = BadSamples::drop;  ///< non-finite, without a normal, with a radius <= 0
-  NormalsChoice normals = NormalsChoice::file;
+  /// Unset: automatic, but of a large input a million rows are looked at, and where no more than a hundredth lacks a
+  /// normal it is dropped. A store's stay.
+  std::optional<NormalsChoice> normals;
   NormalsSettings normal_search;  ///< how normals are found; its mode and bad_samples are those of this job
   double radius_scale = 1;        ///< > 0: multiplies every sample's radius, given or estimated
   std::uint32_t density = 16;  ///< samples a counting cell must hold to give a radius (Cuccuru et al. 2009, 3.1), >= 2

@@ -101,7 +101,7 @@ Json reading(const SurfaceSettings& settings, bool has_radius) {
 
 bool is_asked_for(const std::string& key, const SurfaceSettings& settings) {
   if (key == "bad_samples") return false;
-  if (key == "normals") return settings.normals != NormalsChoice::file;
+  if (key == "normals") return settings.normals && settings.normals != NormalsChoice::file;
   if (key == "cleaning") return !cleaning_words(settings.clean).empty();
   return key != "frame" || settings.frame || settings.volume.wanted();
 }

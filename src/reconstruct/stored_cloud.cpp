@@ -37,25 +37,29 @@ class PlannedNormals final : public PointSource {
   std::unique_ptr<PointSource> source_;
 };
 
-struct Usable {
-  bool any = false, all = true;
+/// How many of the rows looked at lack a usable normal.
+struct Lacking {
+  std::uint64_t rows = 0, missing = 0;
 };
 
-/// Looks until it knows: rows of every kind, or all of them.
-Usable look_for_normals(PointSource& source, const RunContext& run) {
-  Usable usable;
+/// All rows, or a million of a large input, spread over it if it can be read anywhere.
+Lacking look_for_normals(PointSource& source, bool every_row, const RunContext& run) {
+  constexpr std::uint64_t kLooks = 32;
+  const PointSourceInfo& info = source.info();
+  const bool part = !every_row && info.count > kLooks * kRowsAtOnce;
+  const std::uint64_t end = part && !info.random_access ? kLooks * kRowsAtOnce : info.count;
+  const std::uint64_t step = part && info.random_access ? info.count / kLooks : kRowsAtOnce;
+  Lacking lacking;
   SampleBatch batch;
-  for (std::uint64_t first = 0; first < source.info().count; first += kRowsAtOnce) {
+  for (std::uint64_t first = 0; first < end; first += step) {
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
     source.read(first, kRowsAtOnce, batch);
-    for (std::size_t i = 0; i < batch.size(); ++i) {
-      const bool missing = defect_of(batch, i) == Defect::normal;
-      usable.any = usable.any || !missing;
-      usable.all = usable.all && !missing;
-    }
-    if (usable.any && !usable.all) break;
+    lacking.rows += batch.size();
+    for (std::size_t i = 0; i < batch.size(); ++i) lacking.missing += defect_of(batch, i) == Defect::normal ? 1 : 0;
+    const bool mixed = lacking.missing > 0 && lacking.missing < lacking.rows;
+    if (mixed && every_row) break;
   }
-  return usable;
+  return lacking;
 }
 
 /// Fills the store. A large input is read once, in a frame chosen by a part of its rows; twice where samples lie
@@ -167,14 +171,18 @@ std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const 
 
 std::unique_ptr<PointSource> choose_normals(std::unique_ptr<PointSource> source, const SurfaceSettings& settings,
                                             const std::string& tmp_dir, Job& job) {
-  if (settings.normals == NormalsChoice::file || source->info().count == 0) return source;
+  const NormalsChoice choice = settings.normals.value_or(NormalsChoice::automatic);
+  if (choice == NormalsChoice::file || source->info().count == 0) return source;
   NormalsSettings search = settings.normal_search;
   search.bad_samples = settings.bad_samples;
   search.mode = NormalsMode::estimate;
-  if (settings.normals == NormalsChoice::automatic && source->info().has_normals) {
-    const Usable usable = look_for_normals(*source, job.run);
-    if (usable.all) return source;
-    if (usable.any) search.mode = NormalsMode::complete;
+  if (choice == NormalsChoice::automatic && source->info().has_normals) {
+    const bool asked = settings.normals.has_value();
+    const Lacking lacking = look_for_normals(*source, asked, job.run);
+    // Unasked, a few are not worth the search: they are dropped.
+    constexpr std::uint64_t kFew = 100;
+    if (lacking.missing <= (asked ? 0 : lacking.rows / kFew)) return source;
+    if (lacking.missing < lacking.rows) search.mode = NormalsMode::complete;
   }
   if (settings.dry_run) return std::make_unique<PlannedNormals>(std::move(source));
   RunContext here = job.run;
@@ -193,7 +201,7 @@ std::string normals_words(const SurfaceSettings& settings) {
   // Every setting by name: one that is added must be dealt with here, or this does not compile.
   const auto& [mode, k, radius, viewpoints, scanners, pose_origins, flip, bad_samples] = settings.normal_search;
   (void)mode, (void)bad_samples;
-  std::string words = settings.normals == NormalsChoice::automatic ? "auto" : "estimate";
+  std::string words = settings.normals == NormalsChoice::estimate ? "estimate" : "auto";
   words += fmt::format(" k {} radius {} scanners {} poses {} flip {}", k, radius, scanners, pose_origins, flip);
   for (const Viewpoint& v : viewpoints)
     words += fmt::format(" {} {} {} {}", v.direction ? "towards" : "from", v.at[0], v.at[1], v.at[2]);

@@ -92,8 +92,10 @@ TEST_F(SurfaceBadInput, NoNormals) {
   test::PlyModel model = test::ply_model(test::sphere_cloud(100));
   model.elements[0].columns.resize(3);
   for (auto& row : model.elements[0].cells) row.resize(3);
-  expect_failure(ExitCode::unreadable, {"in.ply", "no normals", "nx ny nz", "--normals auto"},
-                 test::write_file(folder_ / "in.ply", test::ply_bytes(model, PlyFormat::ascii)));
+  SurfaceSettings s;
+  s.normals = NormalsChoice::file;
+  s.input = test::write_file(folder_ / "in.ply", test::ply_bytes(model, PlyFormat::ascii));
+  expect_failure(ExitCode::unreadable, {"in.ply", "no normals", "nx ny nz", "--normals auto"}, s);
 }
 
 TEST_F(SurfaceBadInput, TooFewPlaces) {
@@ -115,7 +117,10 @@ TEST_F(SurfaceBadInput, NoUsableSample) {
   expect_failure(ExitCode::empty, {"in.ply", "none of its 10 samples is usable"}, cloud);
   cloud = test::sphere_cloud(10);
   for (Point3& n : cloud.normals) n = {0, 0, 0};
-  expect_failure(ExitCode::empty, {"in.ply", "none of its 10 samples has a normal", "--normals auto"}, cloud);
+  SurfaceSettings s;
+  s.normals = NormalsChoice::file;
+  s.input = test::write_cloud(cloud, folder_ / "in.ply");
+  expect_failure(ExitCode::empty, {"in.ply", "none of its 10 samples has a normal", "--normals auto"}, s);
 }
 
 TEST_F(SurfaceBadInput, CoordinatesTooLargeToSquare) {

@@ -101,7 +101,7 @@ TEST_F(NormalTool, RefusalsSayWhatToDo) {
   EXPECT_THAT(run_lamina({"normal", cloud_, "-o", out_, "--viewpoint", "here"}).err, HasSubstr("X,Y,Z"));
   EXPECT_THAT(run_lamina({"normal", cloud_, "-o", out_, "--reorient", "--missing"}).err, HasSubstr("exclude"));
   EXPECT_EQ(run_lamina({"normal", cloud_}).code, 2);
-  const auto refused = run_lamina({"surface", cloud_, "-o", out_});
+  const auto refused = run_lamina({"surface", cloud_, "-o", out_, "--normals", "file"});
   EXPECT_EQ(refused.code, 3);
   EXPECT_THAT(refused.err, HasSubstr("--normals auto"));
 }
@@ -109,7 +109,7 @@ TEST_F(NormalTool, RefusalsSayWhatToDo) {
 TEST_F(NormalTool, SurfaceFindsTheNormalsItLacks) {
   const std::string stats = folder_ / "stats.json";
   const std::string mesh = folder_ / "mesh.ply";
-  const auto run = run_lamina({"surface", cloud_, "-o", mesh, "--normals", "auto", "--stats", stats});
+  const auto run = run_lamina({"surface", cloud_, "-o", mesh, "--stats", stats});
   ASSERT_EQ(run.code, 0) << run.err;
   EXPECT_GT(nlohmann::json::parse(read_text(stats))["normals"]["estimated"], 2999);
   const TriangleMesh surface = read_mesh(mesh);
