@@ -122,7 +122,7 @@ def measured(case, program, found, wanted, known):
 
 
 def _lamina(program, cloud, mesh, options):
-    cost = runs.surface(program, cloud, mesh, ([] if models.has_normals(cloud) else ["--normals", "auto"]) + options)
+    cost = runs.surface(program, cloud, mesh, options)
     del cost["stats"]
     return cost
 

@@ -57,7 +57,6 @@ TEST_P(ScannedScene, KeepsItsLimits) {
   const SceneScan scan = SceneScanner(truth, scene.views, scene.errors).scan(40000);
   const test::TemporaryFolder folder;
   SurfaceSettings settings;
-  if (scene.without_normals) settings.normals = NormalsChoice::automatic;
   settings.input = write_points(scan.cloud, !scene.without_normals, folder / "in.ply");
   settings.output = folder / "out.ply";
   reconstruct_surface(settings, {});
