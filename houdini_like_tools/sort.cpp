@@ -27,6 +27,7 @@ struct SortOptions {
   SortSettings settings;
   Precision precision = Precision::automatic;
   RunOptions run;
+  const CLI::App* tool = nullptr;  ///< knows which options were given
 };
 
 /// For chunks of a reconstruction.
@@ -36,6 +37,7 @@ void run_store(const SortOptions& o) {
   settings.more_inputs.assign(o.inputs.begin() + 1, o.inputs.end());
   settings.columns = o.columns;
   settings.bad_samples = o.settings.bad_samples;
+  if (o.tool->count("--strays") == 0) settings.clean.strays = true;
   const RunContext context = make_context(o.run);
   const SurfaceStats stats = write_store(settings, o.store, context);
   context.info(
@@ -72,6 +74,7 @@ void add_reading(CLI::App& tool, CLI::Option& store, SurfaceSettings& reading) {
 void add_sort(CLI::App& app) {
   auto* tool = app.add_subcommand("sort", "Put points into another order, more of them than memory holds");
   auto o = std::make_shared<SortOptions>();
+  o->tool = tool;
   tool->add_option_function<std::vector<std::string>>(
           "INPUT",
           [o](const std::vector<std::string>& names) {

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -32,7 +33,12 @@ struct SurfaceOptions {
   RunOptions run;
   PartsOptions parts;
   std::string stats, preview;
+  bool raw = false;
+  const CLI::App* tool = nullptr;  ///< knows which options were given
 };
+
+/// H of --raw: that of SurfaceSettings.
+constexpr double kRawBlend = 1.2;
 
 /// A picture of the mesh file: of its triangles where they can be held, of its vertices where they cannot.
 void draw_preview(const SurfaceOptions& o, const std::string& mesh, const RunContext& context) {
@@ -59,8 +65,32 @@ void draw_preview(const SurfaceOptions& o, const std::string& mesh, const RunCon
                            whole ? "" : ", the vertices: the mesh is too large to be held for a picture"));
 }
 
+/// What --prune says.
+std::optional<std::uint64_t> triangles_of(const std::optional<double>& number) {
+  if (!number) return std::nullopt;
+  constexpr double kMost = 1e15;
+  if (!(*number >= 0 && *number <= kMost) || *number != std::floor(*number))
+    throw CLI::ValidationError("--prune", fmt::format("{:g}: is neither a whole number nor auto", *number));
+  return static_cast<std::uint64_t>(*number);
+}
+
+/// What is chosen where the user says nothing, and nothing is chosen with --raw. A store has been cleaned, and given
+/// normals, when it was made; ranks that share out an input's rows cannot look around.
+void choose_what_is_not_given(const SurfaceOptions& o, SurfaceSettings& settings) {
+  const auto given = [&o](const char* option) { return o.tool->count(option) > 0; };
+  if (o.raw) {
+    if (!given("--normals")) settings.normals = NormalsChoice::file;
+    if (!given("--blend")) settings.blend = kRawBlend;
+    if (!given("--prune")) settings.prune_triangles = 0;
+    return;
+  }
+  if (is_store(o.inputs.front())) return;
+  if (!given("--strays")) settings.clean.strays = launch().size == 1;
+}
+
 void run_surface(const SurfaceOptions& o) {
   SurfaceSettings settings = o.settings;
+  choose_what_is_not_given(o, settings);
   settings.input = pipe_name(o.inputs.front());
   for (auto name = o.inputs.begin() + 1; name != o.inputs.end(); ++name)
     settings.more_inputs.push_back(pipe_name(*name));
@@ -133,6 +163,9 @@ void add_surface(CLI::App& app) {
   auto* tool = app.add_subcommand("surface", "Reconstruct a triangle mesh from oriented points, streaming");
   auto o = std::make_shared<SurfaceOptions>();
   SurfaceSettings& s = o->settings;
+  o->tool = tool;
+  s.blend.reset();
+  s.prune_triangles.reset();
   tool->add_option(
           "INPUT", o->inputs,
           "Points with normals: PLY, OBJ, XYZ and other text, PTX, PCD, LAS, points of a .vdb, also gzipped; several "
@@ -178,6 +211,9 @@ void add_surface(CLI::App& app) {
   add_normals_choice(*tool, s.normals, "Normals");
   add_normals_options(*tool, s.normal_search, "Normals");
 
+  tool->add_flag("--raw", o->raw,
+                 "Choose nothing: the file's normals, all samples, --blend 1.2, --prune 0, where these are not given")
+      ->group("Fit");
   add_fit_options(*tool, s);
 
   const std::string mesh = "Mesh";
@@ -187,6 +223,12 @@ void add_surface(CLI::App& app) {
                    "0: never")
       ->type_name("K")
       ->capture_default_str()
+      ->group(mesh);
+  tool->add_option_function<double>(
+          "--trim", [&s](double level) { s.trim = level; },
+          "Cut the mesh where it reaches K influence radii R beyond its samples; 0.235 is the edge of evenly spread "
+          "ones; 0: keep or leave out whole triangles [chosen where --blend is, else 0]")
+      ->type_name("K")
       ->group(mesh);
   tool->add_option("--cluster", s.cluster,
                    "Vertex clustering: none, preserving the topology, or free, which may change it")
@@ -210,9 +252,11 @@ void add_surface(CLI::App& app) {
       ->group(mesh);
 
   add_hole_options(*tool, s, mesh);
-  tool->add_option("--prune", s.prune_triangles, "Leave out connected parts of fewer than N triangles; 0: none")
-      ->type_name("N")
-      ->capture_default_str()
+  add_number_or_auto(*tool, "--prune", "auto",
+                     "Leave out connected parts of fewer than N triangles; 0: none; auto: than a two-thousandth of the "
+                     "samples, at most 500, and none where the mesh is made in parts",
+                     [&s](const std::optional<double>& number) { s.prune_triangles = triangles_of(number); })
+      ->option_text("N|auto [auto]")
       ->group(mesh);
   add_length(*tool, "--prune-size", s.prune_size,
              "Leave out connected parts whose box has a shorter diagonal; r is the median radius here; 0: none")
@@ -263,7 +307,7 @@ void add_surface(CLI::App& app) {
                "  lamina surface scan.ply -o mesh_of_scan.ply\n"
                "  lamina surface scan.ply -o mesh_of_scan.stl\n"
                "  lamina surface scan.ply --dry-run\n"
-               "  lamina surface scan.ply -o smooth.ply --blend auto --vdb smooth.vdb --stats smooth.json");
+               "  lamina surface scan.ply -o smooth.ply --blend 2 --vdb smooth.vdb --stats smooth.json");
   tool->callback([o, tool, output, dry] {
     if (o->parts.tasks > 0) return print_tasks(*tool, o->inputs.front(), o->settings.output, o->parts);
     if (output->count() == 0 && dry->count() == 0) throw CLI::RequiredError("--output");

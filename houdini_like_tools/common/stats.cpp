@@ -13,7 +13,7 @@ void add_cleaning(nlohmann::ordered_json& j, const SurfaceStats& s, const Surfac
                   {"lonely", c.lonely},
                   {"off_surface", c.off_surface},
                   {"thinned", c.thinned}};
-  if (settings.prune_triangles > 0 || settings.prune_size.value > 0) {
+  if (settings.prune_triangles.value_or(1) > 0 || settings.prune_size.value > 0) {
     j["pruned"] = {{"kept_parts", s.pruned.kept},
                    {"removed_parts", s.pruned.removed},
                    {"removed_triangles", s.pruned.removed_triangles}};

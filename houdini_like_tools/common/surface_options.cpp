@@ -24,18 +24,18 @@ int steps_of(const std::optional<double>& number) {
 void add_fit_options(CLI::App& tool, SurfaceSettings& s) {
   const std::string fit = "Fit";
   add_number_or_auto(
-      tool, "--blend", fmt::format("{:g}", *s.blend),
+      tool, "--blend", "auto",
       "The influence radius R is H times a sample's radius r, H up to 64; noise wants 2 to 3. auto: H, and --cell and "
       "--refit where these are not given, by the cloud's noise and the evenness of its sampling",
       [&s](const std::optional<double>& number) { s.blend = number; })
-      ->option_text(fmt::format("H|auto [{:g}]", *s.blend))
+      ->option_text("H|auto [auto]")
       ->group(fit);
   add_number_or_auto(
-      tool, "--refit", "0, with --blend auto: auto",
+      tool, "--refit", "auto",
       "First replace normals by those fitted to the samples within so many radii r, up to 8; 0: keep them; auto: keep "
       "them unless --blend auto finds noise",
       [&s](const std::optional<double>& number) { s.refit = number; })
-      ->option_text("RADII|auto [0; auto with --blend auto]")
+      ->option_text("RADII|auto [auto; 0 where H is given]")
       ->group(fit);
   add_number_or_auto(tool, "--steps", "1", "Projection steps, 1 to 16; auto: as many as each corner needs, at most 16",
                      [&s](const std::optional<double>& number) { s.steps = steps_of(number); })

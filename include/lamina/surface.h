@@ -72,7 +72,13 @@ struct SurfaceSettings {
   /// Close all loops where none is longer than three times close_holes: the scanned object is taken to be closed then.
   /// Unset: chosen where `blend` is, else false.
   std::optional<bool> watertight;
-  std::uint64_t prune_triangles = 0;  ///< connected parts of the mesh with fewer triangles are dropped
+  /// R, 0 <= trim < 1: the mesh is cut along the curve where it reaches so far beyond the samples that carry it (where
+  /// their weighted mean lies so far to one side); 0.235 is the straight edge of evenly spread samples. 0: nowhere,
+  /// whole triangles are kept or left out. Unset: chosen where `blend` is, else 0.
+  std::optional<double> trim;
+  /// Connected parts of the mesh with fewer triangles are dropped. Unset: a two-thousandth of the samples' number, at
+  /// most 500; in jobs of several runs, which write no whole mesh, none.
+  std::optional<std::uint64_t> prune_triangles = 0;
   Length prune_size;   ///< so are parts whose box has a shorter diagonal; `r`, `R`: of the median sample; 0: none
   bool local = false;  ///< subtract a shift (SurfaceStats::shift) from coordinates, so that floats hold them
   int window = 1;      ///< >= 1: slabs that each stage advances at once; more is faster on many cores and takes memory

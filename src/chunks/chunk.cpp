@@ -13,6 +13,10 @@
 
 namespace lamina {
 
+bool is_store(const std::string& input) {
+  return is_kept_input(input);
+}
+
 SurfaceStats write_store(const SurfaceSettings& settings, const std::string& store, const RunContext& run) {
   SurfaceSettings own = settings;
   own.dry_run = true;  // nothing but the store is written

@@ -14,8 +14,8 @@ std::string mesh_settings(const SurfaceSettings& settings) {
   // does not change the mesh; names of files are not settings of it.
   const auto& [input, more_inputs, columns, output, frame, bad_samples, normals, normal_search, radius_scale, density,
                clean, max_radius, blend, refit, steps, step_tolerance, fit, diffuse, cell, levels, boundary, cluster,
-               chord, vertex_levels, vertex_curvature, close_holes, watertight, prune_triangles, prune_size, local,
-               window, dry_run, volume] = settings;
+               chord, vertex_levels, vertex_curvature, close_holes, watertight, trim, prune_triangles, prune_size,
+               local, window, dry_run, volume] = settings;
   // Jobs of several runs refuse these: require_mesh_alone().
   (void)prune_triangles, (void)prune_size, (void)local;
   (void)input, (void)more_inputs, (void)output, (void)normals, (void)normal_search, (void)window, (void)dry_run;
@@ -27,11 +27,11 @@ std::string mesh_settings(const SurfaceSettings& settings) {
       "columns {}\nframe {}\nbad_samples {}\nnormals {}\ncleaning {}\nparticlescale {}\ndensity {}\nmax_radius {}\n"
       "blend {}\nrefit {}\nsteps {}\nstep_tolerance {}\nfit {}\ndiffuse {}\ncell {}\nlevels {}\nboundary {}\ncluster "
       "{}\n"
-      "chord {}\nlevel {}\ncurvature {}\nclose_holes {}\nwatertight {}\n",
+      "chord {}\nlevel {}\ncurvature {}\nclose_holes {}\nwatertight {}\ntrim {}\n",
       columns, frame_word, static_cast<int>(bad_samples), normals_words(settings), cleaning_words(clean), radius_scale,
       density, to_string(max_radius), number(blend), number(refit), steps, step_tolerance, static_cast<int>(fit),
       diffuse, cell ? to_string(*cell) : "auto", levels, boundary, static_cast<int>(cluster), chord, vertex_levels,
-      vertex_curvature, close_holes, watertight ? (*watertight ? "yes" : "no") : "auto");
+      vertex_curvature, close_holes, watertight ? (*watertight ? "yes" : "no") : "auto", number(trim));
 }
 
 std::uint64_t job_hash(const SurfaceSettings& settings, const std::string& input_id, const ReconstructionPlan& plan) {
@@ -48,7 +48,7 @@ void require_mesh_alone(const SurfaceSettings& settings, const std::string& opti
     throw Error(ExitCode::usage,
                 fmt::format("{} makes the mesh alone: leave --vdb and --vdb-points to a run of their own", option));
   }
-  if (settings.prune_triangles > 0 || settings.prune_size.value > 0 || settings.local)
+  if (settings.prune_triangles.value_or(0) > 0 || settings.prune_size.value > 0 || settings.local)
     throw Error(ExitCode::usage,
                 fmt::format("{}: --prune, --prune-size and --local want the mesh from one run", option));
   if (settings.dry_run) throw Error(ExitCode::usage, fmt::format("{} and --dry-run contradict each other", option));

@@ -67,22 +67,22 @@ void PartSlabs::finish_below(std::int64_t slab) {
   while (at_ < parts_.size() && parts_[at_].span.end <= slab) close();
 }
 
-void PartSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {
+void PartSlabs::write(const MeshSlab& slab) {
   finish_below(slab.slab);
   if (at_ == parts_.size()) return;
   if (slab.slab >= parts_[at_].span.begin) {
     if (!writer_) open();
     make_relative(slab.triangles, first_, info_.below.vertices, relative_);
-    writer_->add(vertices, relative_);
+    writer_->add(slab.vertices, relative_);
     previous_ = writer_->last();
     boundary_.clear();
-    finder_.add(vertices, slab.triangles, boundary_);
+    finder_.add(slab.vertices, slab.triangles, boundary_);
     writer_->add(boundary_);
   } else {
-    previous_ = mark_of(vertices, layout_);
+    previous_ = mark_of(slab.vertices, layout_);
   }
-  below_ = vertices;
-  numbered_ += vertices.size();
+  below_ = slab.vertices;
+  numbered_ += slab.vertices.size();
 }
 
 void PartSlabs::finish() {

@@ -23,7 +23,7 @@ class PartSlabs : public SlabSink {
   PartSlabs(std::vector<Part> parts, int count, std::uint64_t job, const HoleSettings& holes, MeshSinkSettings layout);
 
   /// Slabs below the first part only tell what it stands on.
-  void write(const FinalSlab& slab, const VertexBatch& vertices) override;
+  void write(const MeshSlab& slab) override;
   /// The sweep is over: finishes the parts that wait for slabs without surface.
   void finish();
   [[nodiscard]] std::uint64_t vertices() const { return vertices_; }  ///< of finished parts

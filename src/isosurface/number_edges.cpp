@@ -9,6 +9,7 @@
 #include "base/resize_anew.h"
 #include "isosurface/crossing.h"
 #include "mls/extension.h"
+#include "mls/overhang.h"
 
 namespace lamina {
 namespace {
@@ -81,7 +82,7 @@ void clamp_to_samples(const float* record, float cell, std::array<float, 3>& off
 
 /// Fills in the tile's surface corners. Trusted corners are read here, which is what corner_value() answers for them in
 /// the finest level that holds them, without its search.
-void fill_corners(const Window& window, const TileView& tile, IsoSlab& out) {
+void fill_corners(const Window& window, const TileView& tile, DoubtfulPoints points, IsoSlab& out) {
   const CornerBlock& leaf = tile.leaf();
   const int attributes = window.attributes();
   const int slab_layers = window.slab_layers(tile.level);
@@ -114,10 +115,11 @@ void fill_corners(const Window& window, const TileView& tile, IsoSlab& out) {
         corner_value(window, tile.level, cell, value, extra.data());  // there is one: both ends of the edge are defined
       }
       for (int i = 0; i < 3; ++i) c.offset[i] = -value.distance * value.normal[i];
-      if ((doubtful & one) != 0) clamp_to_samples(record(), size, c.offset);
+      if ((doubtful & one) != 0 && points == DoubtfulPoints::near_samples) clamp_to_samples(record(), size, c.offset);
       c.normal = value.normal;
       c.distance = value.distance;
       c.curvature = value.curvature;
+      c.overhang = overhang(window, tile.level, cell, value.normal);
       for (int a = 0; a < attributes; ++a) out.corner_attributes[a][id] = extra[a];
       out.corners[id++] = c;
     });
@@ -210,7 +212,7 @@ class Numbering {
 
 }  // namespace
 
-void number_edges(Window& window, std::int32_t slab, IsoSlab* previous, IsoSlab& out) {
+void number_edges(Window& window, std::int32_t slab, DoubtfulPoints doubtful, IsoSlab* previous, IsoSlab& out) {
   out.slab = slab;
   out.triangles.clear();
   const std::vector<TileView> views = slab_tiles(window, slab);
@@ -222,7 +224,7 @@ void number_edges(Window& window, std::int32_t slab, IsoSlab* previous, IsoSlab&
   // Again: a corner that a finer level holds may have been marked in a tile without edges.
   const std::vector<TileView> surface = at_surface(views);
   assign_numbers(window, surface, out);
-  for_views(window, surface, [&](const TileView& tile, BlockCache&) { fill_corners(window, tile, out); });
+  for_views(window, surface, [&](const TileView& tile, BlockCache&) { fill_corners(window, tile, doubtful, out); });
   for_views(window, surface, [&](const TileView& tile, BlockCache& cache) {
     Numbering numbering(out, cache);
     const std::int32_t first = window.lattice().first_layer(tile.level, slab);

@@ -15,6 +15,12 @@ inline constexpr float kEdgeMargin = 0.01F;
 /// The projected point of a doubtful corner stays this near to the average of its own samples (cells).
 inline constexpr float kFarthestFromSamples = 0.3F;
 
+/// Where the projected points of doubtful corners lie.
+enum class DoubtfulPoints : std::uint8_t {
+  near_samples,  ///< no farther from the average of their own samples than kFarthestFromSamples
+  as_extended,   ///< where the planes of their neighbours lead: for rims that are cut where the samples end
+};
+
 /// Calls for consecutive slabs go: number_edges(0), number_edges(1), triangulate(0), separate_fans(0), number_edges(2),
 /// triangulate(1), separate_fans(1), ...; one empty slab beyond the last is numbered too. Slab s - 1 may leave the
 /// window after triangulate(s), and its IsoSlab the hands of the caller after separate_fans(s). Results are the same
@@ -27,6 +33,6 @@ inline constexpr float kFarthestFromSamples = 0.3F;
 /// `previous` (null before the first slab) is the slab below: its vertical edges that end in this slab are completed
 /// now (`high`, `t`). Order of vertices: level, tile (z, y, x), layer, axis, place in the layer; of corners: level,
 /// tile, layer, place. A corner that several levels hold is listed once, with the finest.
-void number_edges(Window& window, std::int32_t slab, IsoSlab* previous, IsoSlab& out);
+void number_edges(Window& window, std::int32_t slab, DoubtfulPoints doubtful, IsoSlab* previous, IsoSlab& out);
 
 }  // namespace lamina

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <vector>
 
+#include "mls/overhang.h"
 #include "mls/tile_values.h"
 #include "octree/window.h"
 
@@ -70,6 +71,8 @@ class CentresMean {
     for (int k = 0; k < 3; ++k) record[kNormalX + k] = n[k] / length;
     record[kCurvature] = sum_.curvature * inv;
     record[kOffsetFromMean] = sum_.offset_from_mean * inv;
+    for (float& l : sum_.lean) l *= inv;
+    record[kLean] = packed_lean(sum_.lean);
     for (std::size_t c = 0; c < attributes_.size(); ++c) record[kFirstAttribute + c] = attributes_[c] * inv;
     return trusted ? Found::trusted : Found::seen;
   }
@@ -82,7 +85,7 @@ class CentresMean {
   struct Sum {
     float weight = 0;
     float distance = 0, curvature = 0, offset_from_mean = 0;
-    std::array<float, 3> normal{};
+    std::array<float, 3> normal{}, lean{};
   };
 
   /// The seen centres of the leaf cells around a corner, each once; true where one of them is trusted.
@@ -120,6 +123,8 @@ class CentresMean {
     sum_.distance += w * (v[kDistance] + along + 0.5F * v[kCurvature] * across);
     sum_.curvature += w * v[kCurvature];
     sum_.offset_from_mean += w * v[kOffsetFromMean];
+    const std::array<float, 3> lean = unpacked_lean(v[kLean]);
+    for (int k = 0; k < 3; ++k) sum_.lean[k] += w * lean[k];
     for (int k = 0; k < 3; ++k) sum_.normal[k] += w * n[k];
     for (std::size_t c = 0; c < attributes_.size(); ++c) attributes_[c] += w * v[kFirstAttribute + c];
   }

@@ -66,10 +66,11 @@ struct FitInput {
 
 /// The fit at eight corners, lengths in cells.
 struct FitOutput {
-  Lanes distance;          ///< signed distance of the corner
-  Lanes nx, ny, nz;        ///< unit normal at the projected point; zero where there is none
-  Lanes curvature;         ///< signed, 1 / cell
-  Lanes offset_from_mean;  ///< |projected point - weighted average| / local support
+  Lanes distance;                ///< signed distance of the corner
+  Lanes nx, ny, nz;              ///< unit normal at the projected point; zero where there is none
+  Lanes curvature;               ///< signed, 1 / cell
+  Lanes offset_from_mean;        ///< |projected point - weighted average| / local support
+  Lanes lean_x, lean_y, lean_z;  ///< (weighted average - projected point) / local support
 };
 
 /// The rule of extension: a corner that is not trusted takes the mean of what the tangent planes of the trusted among

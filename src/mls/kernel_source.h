@@ -255,6 +255,7 @@ inline void fit(const Lanes* sums, const FitInput& in, FitOutput& out) {
   const Vec rx = yx - d * nx - ax;
   const Vec ry = yy - d * ny - ay;
   const Vec rz = yz - d * nz - az;
+  const Vec inv_support = one / (w > zero ? support : one);
   const Vec offset = root(rx * rx + ry * ry + rz * rz) / (w > zero ? support : one);
   const auto ok = (w > zero) & (g2 > tiny);
   vec(out.distance) = ok ? d : zero;
@@ -263,6 +264,9 @@ inline void fit(const Lanes* sums, const FitInput& in, FitOutput& out) {
   vec(out.nz) = ok ? nz : zero;
   vec(out.curvature) = ok ? two * u4 / scale : zero;
   vec(out.offset_from_mean) = ok ? offset : zero;
+  vec(out.lean_x) = ok ? -rx * inv_support : zero;
+  vec(out.lean_y) = ok ? -ry * inv_support : zero;
+  vec(out.lean_z) = ok ? -rz * inv_support : zero;
 }
 
 /// A bit for every lane where a comparison holds.

@@ -152,6 +152,7 @@ void store_values(Window& window, int level, const Work& work, const std::vector
       v[kNormalZ] = out.nz[l];
       v[kCurvature] = out.curvature[l] / cell;
       v[kOffsetFromMean] = out.offset_from_mean[l];
+      v[kLean] = packed_lean({out.lean_x[l], out.lean_y[l], out.lean_z[l]});
       const float inv = 1.0F / sums[kW][l];
       for (int c = 0; c < window.attributes(); ++c) v[kFirstAttribute + c] = sums[kSums + c][l] * inv;
     }

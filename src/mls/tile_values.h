@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "mls/overhang.h"
 #include "mls/queries.h"
 
 namespace lamina {

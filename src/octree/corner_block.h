@@ -19,7 +19,7 @@ namespace lamina {
 /// from its normal, as a sphere seen from outside); offset from the mean is |projected point - weighted average| in
 /// units of the local support radius. Of a corner that is not trusted the projected point is that average itself (its
 /// offset is the fit's).
-enum Channel : int { kDistance = 0, kNormalX, kNormalY, kNormalZ, kCurvature, kOffsetFromMean, kFirstAttribute };
+enum Channel : int { kDistance = 0, kNormalX, kNormalY, kNormalZ, kCurvature, kOffsetFromMean, kLean, kFirstAttribute };
 
 /// Leaves what it allocates as it is, for values that are written next.
 template <typename T>

@@ -21,7 +21,8 @@ constexpr std::size_t kVertexBytes = 256 << 10, kTriangleBytes = 64 << 10;
 RankSlabs::RankSlabs(const SlabSpan& span, MeshSinkSettings layout, const std::string& directory)
     : span_(span), layout_(std::move(layout)), records_(directory), faces_(directory) {}
 
-void RankSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {
+void RankSlabs::write(const MeshSlab& slab) {
+  const VertexBatch& vertices = slab.vertices;
   if (slab.slab < span_.begin) {
     if (slab.slab == span_.begin - 1) {
       below_ = mark_of(vertices, layout_);

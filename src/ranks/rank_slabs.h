@@ -19,7 +19,7 @@ class RankSlabs : public SlabSink {
  public:
   /// Throws Error(budget) when `directory` cannot be written.
   RankSlabs(const SlabSpan& span, MeshSinkSettings layout, const std::string& directory);
-  void write(const FinalSlab& slab, const VertexBatch& vertices) override;
+  void write(const MeshSlab& slab) override;
 
   [[nodiscard]] const SlabSpan& span() const { return span_; }
   [[nodiscard]] std::uint64_t vertices() const { return vertices_; }

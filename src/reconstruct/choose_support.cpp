@@ -18,7 +18,7 @@ void choose_for_noise(float noise, bool cell_given, StageSettings& out) {
   out.feed.blend = kNoisyBlend + (kVeryNoisyBlend - kNoisyBlend) * share;
   out.feed.cell = {kChosenCell, Length::Unit::sample_radius};
   out.refit.support = kNoisyRefit;
-  out.projection.trusted_offset = kNoisyTrust;
+  out.trim = kRimOverhang;
   if (!cell_given) out.projection.band = kNoisyBand;
 }
 
@@ -47,6 +47,10 @@ StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& surve
   } else if (survey.high < kEven * survey.low) {
     choose_for_even(s.cell.has_value(), out);
   }
+  if (!s.blend && survey.noise <= kNoisy) out.trim = kCleanRimOverhang;
+  if (s.trim) out.trim = *s.trim;
+  // Rims that are cut where the samples end may run on before.
+  if (out.trim > 0 && survey.noise > kNoisy) out.doubtful = DoubtfulPoints::as_extended;
   if (s.cell) out.feed.cell = *s.cell;
   if (s.refit) out.refit.support = *s.refit;
   // Free clustering joins sheets: a boundary loop may pass through a vertex several times.

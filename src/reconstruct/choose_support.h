@@ -2,6 +2,7 @@
 #pragma once
 #include <string>
 
+#include "isosurface/number_edges.h"
 #include "lamina/holes.h"
 #include "lamina/surface.h"
 #include "mls/project.h"
@@ -18,6 +19,8 @@ struct StageSettings {
   RefitSettings refit;
   ProjectSettings projection;
   HoleSettings holes;
+  double trim = 0;  ///< VertexSettings::trim
+  DoubtfulPoints doubtful = DoubtfulPoints::near_samples;
 };
 
 /// A function of settings and survey alone, so that all parts of a job choose the same.

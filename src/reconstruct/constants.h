@@ -1,5 +1,6 @@
 // Tuned constants of the automatic choice. docs/method.md has them in a table with the models they were confirmed on.
 #pragma once
+#include <cstdint>
 
 namespace lamina {
 
@@ -32,9 +33,19 @@ inline constexpr float kNoisyBand = 1.25F;
 inline constexpr float kSheetBand = 4;
 
 /// How far (support radii) a corner's projection may lie from its samples' mean, and how many must act, to be trusted.
-inline constexpr float kNoisyTrust = 0.2F;
 inline constexpr float kEvenTrust = 0.25F;
 inline constexpr int kEvenTrustedSamples = 4;
+
+/// Overhang (support radii) along which rims are cut. The straight edge of evenly spread samples has 0.235; a wide
+/// support averages chance out, so noisy clouds can be cut a little inside of it, which takes most of the flakes of
+/// strays along.
+inline constexpr double kRimOverhang = 0.18;
+inline constexpr double kCleanRimOverhang = 0.35;
+
+/// Connected parts of fewer triangles are left out where nobody says otherwise: one in so many of the samples, at most
+/// so many. A scan's samples carry about as many triangles.
+inline constexpr std::uint64_t kSpeckShare = 2000;
+inline constexpr std::uint64_t kMostSpeck = 500;
 
 /// The size of most cells in units of the largest the median radius allows: with 0.64 the radii of an evenly sampled
 /// surface (which scatter by 0.75 to 1.25 around their median) all ask for the same level.

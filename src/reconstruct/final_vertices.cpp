@@ -100,6 +100,17 @@ void place_curvatures(const ClusteredSlab& from, double step, VertexBatch& out) 
   }
 }
 
+void place_overhangs(const ClusteredSlab& from, VertexBatch& out) {
+  out.overhang.clear();
+  out.overhang.reserve(from.slab.vertices.size());
+  const auto of = [&](SlabIndex i) { return (i.next() ? *from.next : from.here).corners[i.index()].overhang; };
+  for (const FinalVertex& v : from.slab.vertices) {
+    float overhang = of(v.corner);
+    if (v.kind == FinalVertex::Kind::isovertex) overhang = (1 - v.t) * overhang + v.t * of(v.other);
+    out.overhang.push_back(overhang);
+  }
+}
+
 void place_radii(const ClusteredSlab& from, const RadiusRule& rule, VertexBatch& out) {
   out.radius.clear();
   out.radius.reserve(from.slab.vertices.size());
@@ -116,6 +127,7 @@ void place_vertices(const ClusteredSlab& slab, const Frame& frame, const VertexS
   place_points(slab, frame, settings.chord, out);
   if (settings.levels) place_levels(slab, settings.finest_cell, out);
   if (settings.curvature) place_curvatures(slab, frame.step, out);
+  if (settings.trim > 0) place_overhangs(slab, out);
   place_radii(slab, settings.radii, out);
 }
 

@@ -12,7 +12,9 @@ MeshOutput::MeshOutput(ClusterMode mode, const VertexSettings& vertices, const F
       frame_(frame),
       sink_(sink),
       clusterer_(ClusterSettings{mode}),
-      distinct_(vertices.double_positions) {}
+      distinct_(vertices.double_positions) {
+  if (vertices.trim > 0) trimmer_.emplace(static_cast<float>(vertices.trim));
+}
 
 MeshOutput::~MeshOutput() {
   tasks_.cancel();
@@ -62,25 +64,39 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
   if (last) clusterer_.finish();
   while (clusterer_.pop(done_)) {
     const IsoSlab* next = clustered_.size() > 1 ? clustered_[1].get() : nullptr;
-    place_vertices({done_, *clustered_.front(), next}, frame_, settings_, vertices_);
-    distinct_.separate(vertices_);
-    sink_.write(done_, vertices_);
-    written_ += vertices_.size();
-    triangles_ += done_.triangles.size();
+    mesh_.slab = done_.slab;
+    place_vertices({done_, *clustered_.front(), next}, frame_, settings_, mesh_.vertices);
+    std::swap(mesh_.triangles, done_.triangles);
+    if (trimmer_) {
+      trimmer_->push(std::move(mesh_));
+      mesh_ = {};
+    } else {
+      pass_on(mesh_);
+    }
     if (clustered_.front().use_count() == 1) {
       const std::lock_guard lock(mutex_);
       spares_.push_back(std::move(clustered_.front()));
     }
     clustered_.pop_front();
   }
+  if (!trimmer_) return;
+  if (last) trimmer_->finish();
+  while (trimmer_->pop(mesh_)) pass_on(mesh_);
 }
 
-void ClosingSlabs::write(const FinalSlab& slab, const VertexBatch& vertices) {
+void MeshOutput::pass_on(MeshSlab& slab) {
+  distinct_.separate(slab.vertices);
+  sink_.write(slab);
+  written_ += slab.vertices.size();
+  triangles_ += slab.triangles.size();
+}
+
+void ClosingSlabs::write(const MeshSlab& slab) {
   boundary_.clear();
-  finder_.add(vertices, slab.triangles, boundary_);
+  finder_.add(slab.vertices, slab.triangles, boundary_);
   closer_.add(boundary_);
-  vertices_ += vertices.size();
-  to_.write(slab, vertices);
+  vertices_ += slab.vertices.size();
+  to_.write(slab);
 }
 
 boundary::Addition ClosingSlabs::finish() {

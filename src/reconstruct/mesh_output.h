@@ -7,10 +7,12 @@
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "boundary/boundary.h"
 #include "boundary/hole_closer.h"
+#include "boundary/rim_trimmer.h"
 #include "clustering/clusterer.h"
 #include "isosurface/iso_mesh.h"
 #include "lamina/frame.h"
@@ -28,17 +30,16 @@ class SlabSink {
   virtual ~SlabSink() = default;
   SlabSink(const SlabSink&) = delete;
   SlabSink& operator=(const SlabSink&) = delete;
-  /// `vertices` are those of `slab`; its triangles name them, and those of the slab before, by numbers from the first
-  /// vertex written on.
-  virtual void write(const FinalSlab& slab, const VertexBatch& vertices) = 0;
+  /// The slab's triangles name its vertices, and those of the slab before, by numbers from the first vertex written on.
+  virtual void write(const MeshSlab& slab) = 0;
 };
 
 /// One mesh file.
 class MeshFileSlabs : public SlabSink {
  public:
   explicit MeshFileSlabs(MeshSink& sink) : sink_(sink) {}
-  void write(const FinalSlab& slab, const VertexBatch& vertices) override {
-    sink_.append_vertices(vertices);
+  void write(const MeshSlab& slab) override {
+    sink_.append_vertices(slab.vertices);
     sink_.append_triangles(slab.triangles);
   }
 
@@ -75,6 +76,7 @@ class MeshOutput {
 
  private:
   void work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last);
+  void pass_on(MeshSlab& slab);
 
   VertexSettings settings_;
   const Frame& frame_;
@@ -83,7 +85,8 @@ class MeshOutput {
   std::vector<std::shared_ptr<IsoSlab>> queued_;
   std::deque<std::shared_ptr<IsoSlab>> clustered_;  ///< by the clusterer, not yet written
   FinalSlab done_;                                  ///< lent to the clusterer and back: its storage is kept
-  VertexBatch vertices_;
+  MeshSlab mesh_;                                   ///< of `done_`
+  std::optional<RimTrimmer> trimmer_;
   DistinctPositions distinct_;
   std::mutex mutex_;  ///< of spares_
   std::vector<std::shared_ptr<IsoSlab>> spares_;
@@ -97,7 +100,7 @@ class ClosingSlabs final : public SlabSink {
   /// `mesh`: the file the slabs go to.
   ClosingSlabs(const HoleSettings& settings, const MeshSinkSettings& mesh, SlabSink& to)
       : closer_(settings, mesh.attributes.size(), mesh.double_positions), to_(to) {}
-  void write(const FinalSlab& slab, const VertexBatch& vertices) override;
+  void write(const MeshSlab& slab) override;
   /// All slabs have come: what is to be added to the mesh.
   boundary::Addition finish();
   [[nodiscard]] const HoleStats& stats() const { return closer_.stats(); }

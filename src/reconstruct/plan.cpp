@@ -33,6 +33,11 @@ void require(bool ok, const char* option, const char* range) {
   if (!ok) usage(fmt::format("{} must be {}", option, range));
 }
 
+/// Parts of fewer triangles, of which there are about as many as samples, are taken for specks.
+std::uint64_t specks(std::uint64_t samples) {
+  return std::min(kMostSpeck, samples / kSpeckShare);
+}
+
 /// The largest leaf cell for a sample of radius 1 where cells follow the samples.
 double cell_per_radius(const FeedSettings& feed) {
   return feed.cell.value * (feed.cell.unit == Length::Unit::influence_radius ? feed.blend : 1.0);
@@ -173,7 +178,8 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
   // between sheets tell nothing.
   plan.vertices.radii = {influence / static_cast<double>(plan.lattice.cell_size(plan.main_level)),
                          plan.feed.refine_sheets ? influence : 0};
-  plan.pruning = {s.prune_triangles, resolve(s.prune_size, median, plan.feed.blend)};
+  plan.pruning = {s.prune_triangles ? *s.prune_triangles : specks(plan.samples),
+                  resolve(s.prune_size, median, plan.feed.blend)};
   plan.mesh_attributes = plan.attributes;
   if (s.vertex_levels) plan.mesh_attributes.push_back({"level", ScalarType::uint8});
   if (s.vertex_curvature) plan.mesh_attributes.push_back({"curvature", ScalarType::float32});
@@ -211,6 +217,7 @@ void check_settings(const SurfaceSettings& s) {
   require(s.close_holes >= 0, "--close-holes", "0 (none) or positive, in influence radii");
   require(!s.watertight.value_or(false) || (s.close_holes > 0 && s.cluster != ClusterMode::free), "--watertight",
           "left out with --close-holes 0 and with --cluster free, which close no holes");
+  require(!s.trim || (*s.trim >= 0 && *s.trim < 1), "--trim", "auto or in [0, 1), in influence radii");
   require(s.chord >= 0 && s.chord <= 1, "--chord", "in 0..1");
   require(s.window >= 1 && s.window <= 1024, "--window", "in 1..1024");
   require_sane(s.clean);
@@ -242,6 +249,8 @@ ReconstructionPlan make_plan(const SurfaceSettings& s, const StoredCloud& cloud,
   plan.feed.max_radius = static_cast<float>(max_radius);
   plan_lattice(s, s.levels, plan);
   if (wants_lower_slabs(s, plan, store)) plan_lattice(s, kDefaultLevels - 1, plan);
+  plan.vertices.trim = stages.trim;
+  plan.doubtful = stages.doubtful;
   plan_mesh(s, cloud, plan);
   plan.expected = expected_cost(plan, cloud.ingested);
   return plan;

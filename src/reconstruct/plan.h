@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "boundary/hole_closer.h"
+#include "isosurface/number_edges.h"
 #include "lamina/surface.h"
 #include "lattice/lattice.h"
 #include "meshes/mesh_sink.h"
@@ -53,6 +54,7 @@ struct ReconstructionPlan {
   RefitSettings refit;
   ProjectSettings projection;
   float boundary = 0;  ///< SurfaceSettings::boundary
+  DoubtfulPoints doubtful = DoubtfulPoints::near_samples;
   ClusterMode cluster = ClusterMode::preserving;
   VertexSettings vertices;
   HoleSettings holes;

@@ -257,9 +257,10 @@ void Pruner::pass_on(Slab& slab) {
     if (renumbered[0] != kGone) slab.triangles[triangles++] = renumbered;
   }
   slab.triangles.resize(triangles);
-  FinalSlab out;
+  MeshSlab out;
+  out.vertices = std::move(v);
   out.triangles = std::move(slab.triangles);
-  sink_.write(out, v);
+  sink_.write(out);
   written_ += kept;
   passed_first_ = slab.first;
   passed_number_ = std::move(number);

@@ -22,9 +22,10 @@ void report_pruning(const PruneCounts& counts, const std::string& name, Job& job
   job.stats.pruned = counts;
   if (counts.kept == 0 && counts.removed > 0) {
     throw Error(ExitCode::empty, fmt::format("{}: all {} connected parts of the mesh are too small for --prune or "
-                                             "--prune-size",
+                                             "--prune-size; --prune 0 keeps them",
                                              name, counts.removed));
   }
+  if (counts.removed == 0 && counts.kept <= 1) return;
   job.run.info(fmt::format("{} connected parts, {} small ones left out with {} triangles", counts.kept, counts.removed,
                            counts.removed_triangles));
 }
@@ -33,7 +34,7 @@ void report_pruning(const PruneCounts& counts, const std::string& name, Job& job
 class PrunedSlabs final : public SlabSink {
  public:
   explicit PrunedSlabs(Pruner& pruner) : pruner_(pruner) {}
-  void write(const FinalSlab& slab, const VertexBatch& vertices) override { pruner_.add(vertices, slab.triangles); }
+  void write(const MeshSlab& slab) override { pruner_.add(slab.vertices, slab.triangles); }
 
  private:
   Pruner& pruner_;

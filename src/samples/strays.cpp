@@ -25,6 +25,13 @@ constexpr std::uint64_t kStraySlab = 1u << 17;  ///< samples tested together, at
 constexpr double kStrayReach = 6;
 /// Neighbours looked for, so that enough are left when some of them are strays.
 constexpr std::size_t kLookedAt = 16;
+/// Most samples are on a surface beyond doubt, and a dozen of them together tell so without a search: their mean normal
+/// is so long, each lies within this cosine of it, none is farther from their middle than so many times (squared) the
+/// usual, and none farther from their plane than this share (squared) of it.
+constexpr float kPlainAgreement = 0.9F;
+constexpr float kPlainCosine = 0.6F;
+constexpr float kPlainSpread = 4;
+constexpr float kPlainThickness = 0.25F;
 
 struct Oriented {
   std::vector<std::int32_t> x, y, z;
@@ -146,6 +153,7 @@ struct Surroundings {
   std::vector<std::uint32_t> neighbours;  ///< kLookedAt for each place, nearest first
   std::vector<std::uint8_t> count;        ///< of them
   std::vector<std::uint8_t> stray;        ///< Verdict
+  std::vector<std::uint8_t> suspect;      ///< 1: may be one
 };
 
 enum Verdict : std::uint8_t { kStays, kIsLonely, kIsOffSurface };
@@ -209,27 +217,94 @@ bool is_off_surface(const Oriented& s, std::size_t place, const Company& company
   return static_cast<float>(along) < kLeastOnSurface * all;
 }
 
+/// Whether the samples of a leaf lie close together on one plane and face its way: none of them can be a stray.
+bool is_plain(const Oriented& s, const SampleTree::Places& places) {
+  const auto count = static_cast<float>(places.size());
+  std::array<float, 3> middle{};
+  std::array<float, 3> normal{};
+  const auto at = [&](std::size_t i) {
+    return std::array<float, 3>{static_cast<float>(s.x[i] - s.x[places.begin]),
+                                static_cast<float>(s.y[i] - s.y[places.begin]),
+                                static_cast<float>(s.z[i] - s.z[places.begin])};
+  };
+  for (std::size_t i = places.begin; i < places.end; ++i) {
+    const std::array<float, 3> p = at(i);
+    for (std::size_t k = 0; k < 3; ++k) middle[k] += p[k] / count;
+    normal[0] += s.nx[i] / count;
+    normal[1] += s.ny[i] / count;
+    normal[2] += s.nz[i] / count;
+  }
+  const float length = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
+  if (length < kPlainAgreement) return false;
+  float sum2 = 0;
+  float farthest2 = 0;
+  float thickest = 0;
+  for (std::size_t i = places.begin; i < places.end; ++i) {
+    const std::array<float, 3> p = at(i);
+    float d2 = 0;
+    float off = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const float d = p[k] - middle[k];
+      d2 += d * d;
+      off += d * normal[k];
+    }
+    if (s.nx[i] * normal[0] + s.ny[i] * normal[1] + s.nz[i] * normal[2] < kPlainCosine * length) return false;
+    sum2 += d2;
+    farthest2 = std::max(farthest2, d2);
+    thickest = std::max(thickest, std::abs(off));
+  }
+  const float mean2 = sum2 / count;
+  return farthest2 <= kPlainSpread * mean2 && thickest * thickest <= kPlainThickness * mean2 * length * length;
+}
+
+/// Finds the neighbours of places that may be strays, and of those neighbours.
 void find_neighbours(const Neighbourhoods& around, float reach, Surroundings& out) {
   const SampleTree& tree = around.tree();
+  const Oriented& samples = around.samples();
   out.neighbours.resize(tree.size() * kLookedAt);
   out.count.assign(tree.size(), 0);
   out.stray.assign(tree.size(), kStays);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree.leaves(), 64), [&](const auto& range) {
-    std::array<Neighbour, SampleTree::kMostInLeaf * kLookedAt> found;
-    std::array<std::size_t, SampleTree::kMostInLeaf> counts;
-    for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf) {
-      const SampleTree::Places places = tree.places_of(leaf);
-      bool near = false;
-      for (std::size_t p = places.begin; p < places.end && !near; ++p) near = around.is_near(p, 2 * reach);
-      if (!near) continue;
+  out.suspect.assign(tree.size(), 0);
+  std::vector<std::uint32_t> leaf_of(tree.size());
+  enum Look : std::uint8_t { kNot, kAsNeighbour, kWanted };
+  std::vector<std::uint8_t> looks(tree.leaves(), kNot);
+  const auto for_leaves = [&](const auto& each) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree.leaves(), 64), [&](const auto& range) {
+      for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf) each(leaf, tree.places_of(leaf));
+    });
+  };
+  const auto search = [&](Look kind) {
+    for_leaves([&](std::size_t leaf, const SampleTree::Places& places) {
+      if (looks[leaf] != kind) return;
+      std::array<Neighbour, SampleTree::kMostInLeaf * kLookedAt> found;
+      std::array<std::size_t, SampleTree::kMostInLeaf> counts;
       tree.nearest_to_leaf(leaf, kLookedAt, reach * reach, found.data(), counts.data());
       for (std::size_t i = 0; i < places.size(); ++i) {
         const std::size_t p = places.begin + i;
         out.count[p] = static_cast<std::uint8_t>(counts[i]);
         for (std::size_t k = 0; k < counts[i]; ++k) out.neighbours[p * kLookedAt + k] = found[i * kLookedAt + k].sample;
       }
+    });
+  };
+  for_leaves([&](std::size_t leaf, const SampleTree::Places& places) {
+    bool near = false;
+    for (std::size_t p = places.begin; p < places.end; ++p) {
+      leaf_of[p] = static_cast<std::uint32_t>(leaf);
+      near = near || around.is_near(p, reach);
     }
+    if (!near || is_plain(samples, places)) return;
+    looks[leaf] = kWanted;
+    for (std::size_t p = places.begin; p < places.end; ++p) out.suspect[p] = 1;
   });
+  search(kWanted);
+  for (std::size_t p = 0; p < tree.size(); ++p) {
+    if (out.suspect[p] == 0) continue;
+    for (std::size_t k = 0; k < out.count[p]; ++k) {
+      std::uint8_t& look = looks[leaf_of[out.neighbours[p * kLookedAt + k]]];
+      if (look == kNot) look = kAsNeighbour;
+    }
+  }
+  search(kAsNeighbour);
 }
 
 /// The median of the distances of its company; 0 where it has none.
@@ -246,23 +321,25 @@ float usual_distance(const Surroundings& known, const Company& company) {
   return *middle;
 }
 
-/// Judges the places within `margin` of the slab by what stays around them.
+/// Judges the suspects within `margin` of the slab by what stays around them.
 void judge_places(const Neighbourhoods& around, float reach, float margin, Surroundings& known) {
   const Oriented& samples = around.samples();
-  const auto for_places = [&](float within, const auto& each) {
+  const auto for_places = [&](const auto& each) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, samples.size(), 4096), [&](const auto& range) {
       for (std::size_t p = range.begin(); p < range.end(); ++p) {
-        if (around.is_near(p, within) && known.stray[p] == kStays) each(p);
+        if (known.stray[p] == kStays) each(p);
       }
     });
   };
   known.distance.assign(samples.size(), -1);
-  for_places(margin + reach,
-             [&](std::size_t p) { known.distance[p] = mean_distance(samples, p, company_of(known, p), reach); });
+  for_places([&](std::size_t p) {
+    if (known.count[p] > 0) known.distance[p] = mean_distance(samples, p, company_of(known, p), reach);
+  });
   std::vector<std::uint8_t> verdicts = known.stray;
-  for_places(margin, [&](std::size_t p) {
+  for_places([&](std::size_t p) {
+    if (known.suspect[p] == 0 || !around.is_near(p, margin)) return;
     const Company company = company_of(known, p);
-    if (known.distance[p] > kLonely * usual_distance(known, company)) {
+    if (known.distance[p] < 0 || known.distance[p] > kLonely * usual_distance(known, company)) {
       verdicts[p] = kIsLonely;
     } else if (is_off_surface(samples, p, company)) {
       verdicts[p] = kIsOffSurface;

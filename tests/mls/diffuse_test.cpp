@@ -146,6 +146,7 @@ TEST(Diffuse, CornersTakeTheMeanOfTheCellsThatTouchThem) {
                 const CornerValues& v = leaf.values[s.window.slab_in_leaf(level, offset >> 6)];
                 const std::uint32_t i = leaf.value_index(offset, s.window.slab_layers(level));
                 for (int channel = 0; channel < s.window.channels(); ++channel) {
+                  if (channel == kLean) continue;  // packed: no number
                   ASSERT_NEAR(v.channel(channel)[i], truth->values[channel], truth->error[channel])
                       << "channel " << channel << " level " << level;
                 }

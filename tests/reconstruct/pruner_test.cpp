@@ -176,7 +176,7 @@ TEST(Pruner, TrianglesThatReachFartherBackAreRefused) {
 /// Takes what stays and keeps none of it.
 class Nowhere final : public SlabSink {
  public:
-  void write(const FinalSlab&, const VertexBatch&) override {}
+  void write(const MeshSlab&) override {}
 };
 
 TEST(Pruner, WhatWaitsInTheFileDoesNotWaitInMemory) {

@@ -170,9 +170,10 @@ TEST_F(CleanTool, TheSurfaceOfACloudIsThatOfTheCleanedCloud) {
   for (std::size_t i = 0; i < 500; ++i) append_row(rows, rows_, 3 * i);
   const std::string mesh = folder_ / "mesh.ply", stats = folder_ / "stats.json";
   ASSERT_EQ(clean(rows, {"--merge", "0", "--outliers", "4"}).code, 0);
-  ASSERT_EQ(run_lamina({"surface", out_, "-o", mesh, "--quiet"}).code, 0);
+  ASSERT_EQ(run_lamina({"surface", out_, "-o", mesh, "--raw", "--quiet"}).code, 0);
   const TriangleMesh apart = read_mesh(mesh);
-  const auto outcome = run_lamina({"surface", cloud_, "-o", mesh, "--merge", "0", "--outliers", "4", "--stats", stats});
+  const auto outcome =
+      run_lamina({"surface", cloud_, "-o", mesh, "--merge", "0", "--outliers", "4", "--raw", "--stats", stats});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_THAT(outcome.err, HasSubstr("500 duplicates merged"));
   const TriangleMesh together = read_mesh(mesh);

@@ -54,7 +54,7 @@ TEST_F(SurfaceTool, MakesAMeshAndSaysSo) {
   EXPECT_EQ(outcome.out, "");
   const TriangleMesh mesh = read_mesh(mesh_);
   EXPECT_TRUE(test::check_mesh(mesh.triangles).is_closed_manifold());
-  EXPECT_THAT(outcome.err, AllOf(HasSubstr("samples 4000"), HasSubstr("levels 4"), HasSubstr("influence R = 1.2 r"),
+  EXPECT_THAT(outcome.err, AllOf(HasSubstr("samples 4000"), HasSubstr("levels 4"), HasSubstr("influence R = 1 r"),
                                  HasSubstr("slabs"), HasSubstr("expected memory"), HasSubstr("temporary disk")));
   EXPECT_THAT(outcome.err, HasSubstr(std::to_string(mesh.positions.size()) + " vertices, " +
                                      std::to_string(mesh.triangles.size()) + " triangles"));

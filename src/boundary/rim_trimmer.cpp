@@ -1,0 +1,169 @@
+#include "boundary/rim_trimmer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace lamina {
+namespace {
+
+constexpr std::uint32_t kGone = ~0U;
+
+/// A vertex of one of two slabs.
+struct VertexAt {
+  const VertexBatch* batch;
+  std::size_t i;
+  [[nodiscard]] float overhang() const { return batch->overhang[i]; }
+};
+
+void append_copy(const VertexBatch& from, std::size_t i, VertexBatch& to) {
+  to.x.push_back(from.x[i]);
+  to.y.push_back(from.y[i]);
+  to.z.push_back(from.z[i]);
+  to.nx.push_back(from.nx[i]);
+  to.ny.push_back(from.ny[i]);
+  to.nz.push_back(from.nz[i]);
+  for (std::size_t a = 0; a < from.attributes.size(); ++a) to.attributes[a].push_back(from.attributes[a][i]);
+  if (!from.radius.empty()) to.radius.push_back(from.radius[i]);
+}
+
+/// The point at t between two vertices.
+void append_between(const VertexAt& a, const VertexAt& b, float t, VertexBatch& to) {
+  const double u = double{t};
+  const auto mix = [u](double p, double q) { return p + u * (q - p); };
+  const auto blend = [t](float p, float q) { return (1 - t) * p + t * q; };
+  to.x.push_back(mix(a.batch->x[a.i], b.batch->x[b.i]));
+  to.y.push_back(mix(a.batch->y[a.i], b.batch->y[b.i]));
+  to.z.push_back(mix(a.batch->z[a.i], b.batch->z[b.i]));
+  float nx = blend(a.batch->nx[a.i], b.batch->nx[b.i]);
+  float ny = blend(a.batch->ny[a.i], b.batch->ny[b.i]);
+  float nz = blend(a.batch->nz[a.i], b.batch->nz[b.i]);
+  const float length = std::sqrt(nx * nx + ny * ny + nz * nz);
+  if (length > 1e-6F) {
+    nx /= length;
+    ny /= length;
+    nz /= length;
+  } else {  // opposite ones: the first vertex's will do
+    nx = a.batch->nx[a.i];
+    ny = a.batch->ny[a.i];
+    nz = a.batch->nz[a.i];
+  }
+  to.nx.push_back(nx);
+  to.ny.push_back(ny);
+  to.nz.push_back(nz);
+  for (std::size_t c = 0; c < a.batch->attributes.size(); ++c)
+    to.attributes[c].push_back(blend(a.batch->attributes[c][a.i], b.batch->attributes[c][b.i]));
+  if (!a.batch->radius.empty()) to.radius.push_back(blend(a.batch->radius[a.i], b.batch->radius[b.i]));
+}
+
+}  // namespace
+
+void RimTrimmer::push(MeshSlab slab) {
+  Held& held = held_.emplace_back();
+  held.first = pushed_;
+  pushed_ += static_cast<std::uint32_t>(slab.vertices.size());
+  held.mesh = std::move(slab);
+}
+
+void RimTrimmer::finish() {
+  finished_ = true;
+}
+
+bool RimTrimmer::pop(MeshSlab& out) {
+  const std::size_t at = below_ ? 1 : 0;
+  if (held_.size() <= at || (held_.size() == at + 1 && !finished_)) return false;
+  trim(below_ ? &held_.front() : nullptr, held_[at], held_.size() > at + 1 ? &held_[at + 1] : nullptr, out);
+  if (below_) held_.pop_front();
+  below_ = true;
+  return true;
+}
+
+/// An edge belongs to the slab of its upper vertex: that slab's triangles and those of the slab above have it.
+void RimTrimmer::find_cuts(const Held* below, Held& here, const Held* above) const {
+  const auto inside = [&](std::uint32_t v) {
+    const Held& h = v >= here.first ? here : *below;
+    return h.mesh.vertices.overhang[v - h.first] < level_;
+  };
+  const auto look = [&](const std::vector<std::array<std::uint32_t, 3>>& triangles) {
+    for (const auto& t : triangles) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const auto [low, high] = std::minmax(t[k], t[(k + 1) % 3]);
+        if (high < here.first || high >= here.end() || inside(low) == inside(high)) continue;
+        here.cuts.emplace_back(low, high);
+      }
+    }
+  };
+  look(here.mesh.triangles);
+  if (above != nullptr) look(above->mesh.triangles);
+  std::sort(here.cuts.begin(), here.cuts.end());
+  here.cuts.erase(std::unique(here.cuts.begin(), here.cuts.end()), here.cuts.end());
+}
+
+void RimTrimmer::add_cut_vertices(const Held* below, const Held& here, VertexBatch& out) const {
+  const auto at = [&](std::uint32_t v) {
+    const Held& h = v >= here.first ? here : *below;
+    return VertexAt{&h.mesh.vertices, v - h.first};
+  };
+  for (const auto& [low, high] : here.cuts) {
+    VertexAt in = at(low);
+    VertexAt beyond = at(high);
+    if (in.overhang() >= level_) std::swap(in, beyond);
+    const float t = (level_ - in.overhang()) / (beyond.overhang() - in.overhang());
+    append_between(in, beyond, std::clamp(t, kLeastCut, 1 - kLeastCut), out);
+  }
+}
+
+void RimTrimmer::cut_triangles(const Held* below, const Held& here, MeshSlab& out) const {
+  const auto kept = [&](std::uint32_t v) {
+    const Held& h = v >= here.first ? here : *below;
+    const std::uint32_t n = h.number[v - h.first];
+    return n == kGone ? kGone : h.trimmed_first + n;
+  };
+  const auto cut = [&](std::uint32_t a, std::uint32_t b) {
+    const Edge edge = std::minmax(a, b);
+    const Held& h = edge.second >= here.first ? here : *below;
+    const auto found = std::lower_bound(h.cuts.begin(), h.cuts.end(), edge);
+    return h.trimmed_first + h.kept + static_cast<std::uint32_t>(found - h.cuts.begin());
+  };
+  for (std::array<std::uint32_t, 3> t : here.mesh.triangles) {
+    std::array<std::uint32_t, 3> to{kept(t[0]), kept(t[1]), kept(t[2])};
+    const auto gone = std::count(to.begin(), to.end(), kGone);
+    if (gone == 0) out.triangles.push_back(to);
+    if (gone == 0 || gone == 3) continue;
+    // The vertex that is alone on its side comes first.
+    while ((to[0] == kGone) != (gone == 1)) {
+      std::rotate(t.begin(), t.begin() + 1, t.end());
+      std::rotate(to.begin(), to.begin() + 1, to.end());
+    }
+    const std::uint32_t next = cut(t[0], t[1]);
+    const std::uint32_t before = cut(t[2], t[0]);
+    if (gone == 2) {
+      out.triangles.push_back({to[0], next, before});
+    } else {
+      // A quadrilateral next, to[1], to[2], before: it does not matter to the rim which way it is halved.
+      out.triangles.push_back({next, to[1], to[2]});
+      out.triangles.push_back({next, to[2], before});
+    }
+  }
+}
+
+void RimTrimmer::trim(const Held* below, Held& here, const Held* above, MeshSlab& out) {
+  const VertexBatch& from = here.mesh.vertices;
+  find_cuts(below, here, above);
+  here.trimmed_first = trimmed_;
+  here.number.assign(from.size(), kGone);
+  out.slab = here.mesh.slab;
+  out.triangles.clear();
+  out.vertices = {};
+  out.vertices.attributes.resize(from.attributes.size());
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    if (from.overhang[i] >= level_) continue;
+    here.number[i] = here.kept++;
+    append_copy(from, i, out.vertices);
+  }
+  add_cut_vertices(below, here, out.vertices);
+  trimmed_ += static_cast<std::uint32_t>(out.vertices.size());
+  cut_triangles(below, here, out);
+}
+
+}  // namespace lamina

@@ -1,0 +1,61 @@
+// Rims cut through triangles: the mesh ends on the curve where its overhang passes a level, as a surface trimmed by
+// density does (Kazhdan and Hoppe, "Screened Poisson surface reconstruction", 2013), and not along whole triangles.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <utility>
+#include <vector>
+
+#include "meshes/mesh_sink.h"
+
+namespace lamina {
+
+/// A cut lies at least this share of its edge away from either end, so that no triangle loses its area.
+inline constexpr float kLeastCut = 0.05F;
+
+/// A slab of a streamed mesh: triangles name vertices of this slab and of the one before, counted over all slabs.
+struct MeshSlab {
+  std::int64_t slab = 0;
+  VertexBatch vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+};
+
+/// Takes a streamed mesh slab by slab and gives back what lies within the level, one slab later, in the order in which
+/// it came: of every slab the vertices that stay, then those of its cuts by the edge they lie on. A manifold stays one.
+/// What comes out of a slab depends on it and on the slabs on either side alone.
+class RimTrimmer {
+ public:
+  /// `level`: > 0, of VertexBatch::overhang, which vertices that are pushed must have.
+  explicit RimTrimmer(float level) : level_(level) {}
+
+  void push(MeshSlab slab);
+  void finish();  ///< no more slabs come
+  /// The next trimmed slab, false when none is ready. Its vertices have no overhang.
+  bool pop(MeshSlab& out);
+
+ private:
+  using Edge = std::pair<std::uint32_t, std::uint32_t>;  ///< lower number first
+  struct Held {
+    MeshSlab mesh;
+    std::uint32_t first = 0;            ///< number of its first vertex as it came
+    std::uint32_t trimmed_first = 0;    ///< and as it goes
+    std::vector<std::uint32_t> number;  ///< of each vertex that stays, from trimmed_first
+    std::vector<Edge> cuts;             ///< ascending
+    std::uint32_t kept = 0;             ///< vertices that stay
+    [[nodiscard]] std::uint32_t end() const { return first + static_cast<std::uint32_t>(mesh.vertices.size()); }
+  };
+
+  void trim(const Held* below, Held& here, const Held* above, MeshSlab& out);
+  void find_cuts(const Held* below, Held& here, const Held* above) const;
+  void add_cut_vertices(const Held* below, const Held& here, VertexBatch& out) const;
+  void cut_triangles(const Held* below, const Held& here, MeshSlab& out) const;
+
+  float level_;
+  std::deque<Held> held_;  ///< at most the slab below the next one to trim, that one, and the one above
+  bool below_ = false;     ///< the first one held is trimmed
+  bool finished_ = false;
+  std::uint32_t pushed_ = 0, trimmed_ = 0;  ///< vertices
+};
+
+}  // namespace lamina
