@@ -20,7 +20,7 @@ struct VertexSettings {
                            ///< finest
   bool curvature = false;  ///< another: mean curvature of the fit, 1 / input unit
   double finest_cell = 1;  ///< of the lattice, steps
-  double trim = 0;                ///< > 0: the mesh is cut where its overhang is this (boundary/rim_trimmer.h)
+  double trim = 0;         ///< > 0: the mesh is cut where its overhang is this (boundary/rim_trimmer.h)
   bool double_positions = false;  ///< as they are written
   RadiusRule radii;               ///< the influence radius around each vertex, by the finest cell around its corner
 };

@@ -344,7 +344,7 @@ TEST(MeshSink, OtherFormatsHoldTheMeshOfThePly) {
       EXPECT_EQ(mesh.positions, ply.positions) << name;
       EXPECT_EQ(mesh.normals, ply.normals) << name;
       EXPECT_EQ(mesh.triangles, ply.triangles) << name;
-      ASSERT_GE(mesh.attributes.size(), 3U) << name;  // OFF has an opacity, too
+      ASSERT_GE(mesh.attributes.size(), 3U) << name;                                   // OFF has an opacity, too
       const float scale = mesh.layout[2].type == ScalarType::float32 ? 255.0F : 1.0F;  // OBJ's reach to 1
       for (std::size_t v = 0; v < kVertices; ++v)
         ASSERT_NEAR(scale * mesh.attributes[2][v], ply.attributes[2][v], 0.5) << name;
