@@ -15,7 +15,7 @@ def structure(program, cloud, box, folder, work):
                 "diffused": ["--diffuse"]}
     for name, options in variants.items():
         mesh = os.path.join(work, "picture.ply")
-        subprocess.run([program, "surface", cloud, "-o", mesh, "--quiet", *options], check=True)
+        subprocess.run([program, "surface", cloud, "-o", mesh, "--raw", "--quiet", *options], check=True)
         _render(program, [mesh, "-o", os.path.join(folder, f"paper_structure_{name}.png"), "--size", "480x480", "--wireframe",
                           "--flat", "--zoom", ",".join(f"{v:.6g}" for v in place)])
 
@@ -24,7 +24,7 @@ def distances(program, clouds, true_mesh, diagonal, folder, work):
     """The distance to the truth painted on the whole model, from clean and from noisy samples."""
     for name, cloud in clouds.items():
         mesh = os.path.join(work, "picture.ply")
-        subprocess.run([program, "surface", cloud, "-o", mesh, "--quiet"], check=True)
+        subprocess.run([program, "surface", cloud, "-o", mesh, "--raw", "--quiet"], check=True)
         _render(program, [mesh, "-o", os.path.join(folder, f"paper_distance_{name}.png"), "--size", "900x640", "--paint",
                           "distance", "--reference", true_mesh, "--paint-range", f"0,{RANGE * diagonal:.6g}"])
 
