@@ -37,9 +37,6 @@ struct SurfaceOptions {
   const CLI::App* tool = nullptr;  ///< knows which options were given
 };
 
-/// H of --raw: that of SurfaceSettings.
-constexpr double kRawBlend = 1.2;
-
 /// A picture of the mesh file: of its triangles where they can be held, of its vertices where they cannot.
 void draw_preview(const SurfaceOptions& o, const std::string& mesh, const RunContext& context) {
   // Positions become doubles, and normals, projected vertices and lists of triangles come on top.
@@ -80,7 +77,7 @@ void choose_what_is_not_given(const SurfaceOptions& o, SurfaceSettings& settings
   const auto given = [&o](const char* option) { return o.tool->count(option) > 0; };
   if (o.raw) {
     if (!given("--normals")) settings.normals = NormalsChoice::file;
-    if (!given("--blend")) settings.blend = kRawBlend;
+    if (!given("--blend")) settings.blend = SurfaceSettings{}.blend;
     if (!given("--prune")) settings.prune_triangles = 0;
     return;
   }

@@ -16,9 +16,10 @@ namespace lamina {
 /// input for reconstruct_surface() and reconstruct_chunk(), and appears under its name when it is complete. Throws
 /// Error as reconstruct_surface() does, and Error(budget) when the folder exists already or cannot be made. The plan in
 /// the result is that of the settings, as from a dry run.
-/// Whether an input is such a folder.
-bool is_store(const std::string& input);
 SurfaceStats write_store(const SurfaceSettings& settings, const std::string& store, const RunContext& run);
+
+/// Whether an input is a folder that write_store() has made. False for anything else, also for what is not there.
+bool is_store(const std::string& input);
 
 /// Chunk `number` of `count`: 1 <= number <= count.
 struct Chunk {
