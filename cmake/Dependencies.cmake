@@ -14,6 +14,7 @@ find_package(fmt REQUIRED)
 find_package(nlohmann_json REQUIRED)
 find_package(PNG REQUIRED)
 find_package(ZLIB REQUIRED)
+find_package(EXPAT REQUIRED)
 # Several machines on one mesh; without it the program runs alone.
 option(LAMINA_WITH_MPI "Build with MPI where it is found" ON)
 if(LAMINA_WITH_MPI)

@@ -165,7 +165,8 @@ void add_surface(CLI::App& app) {
   s.prune_triangles.reset();
   tool->add_option(
           "INPUT", o->inputs,
-          "Points with normals: PLY, OBJ, XYZ and other text, PTX, PCD, LAS, points of a .vdb, also gzipped; several "
+          "Points with normals: PLY, OBJ, XYZ and other text, PTX, PCD, LAS, E57, points of a .vdb, also gzipped; "
+          "several "
           "files, folders, patterns or scan lists (.conf) are one cloud; FILE@POSE.txt moves a file by the 4x4 matrix "
           "in POSE.txt. Or a store that lamina sort --store made. - for PLY on standard input")
       ->required()

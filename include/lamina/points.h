@@ -36,6 +36,7 @@ struct PointSourceInfo {
   bool random_access = false;        ///< read() takes any row, from several threads at once
   bool double_precision = false;     ///< positions need more than float32
   bool geographic = false;           ///< x and y are degrees of longitude and latitude, in which no job can measure
+  std::string coordinate_system;     ///< as the file has it, mostly well-known text; empty: none given
   std::vector<ScanPart> scans;       ///< ascending, the first begins with row 0; empty: one scan, nothing known of it
   AttributeLayout attributes;        ///< every other scalar property, in the file's order and types
   std::vector<std::string> remarks;  ///< what the user should know, one line each: guesses, things left out
@@ -67,10 +68,11 @@ struct PointSettings {
   /// column; NAME:TYPE with a PLY type fixes its type (red:ushort). Empty: taken from the file's header line, else
   /// guessed from the numbers. Other formats ignore it.
   std::string columns;
+  bool ignore_checksums = false;  ///< of E57: pages are believed whatever their checksums say
 };
 
 /// Opens a point file by its content, and by its ending where the content does not tell the format: PLY (also with a
-/// range grid), OBJ, XYZ and other text, PTX, PCD, LAS, OpenVDB points (held in memory); docs/formats.md has the
+/// range grid), OBJ, XYZ and other text, PTX, PCD, LAS, E57, OpenVDB points (held in memory); docs/formats.md has the
 /// details.
 /// "-" is standard input. Pipes are spooled to an unnamed file in `tmp_dir`, and .gz files are unpacked to one.
 ///

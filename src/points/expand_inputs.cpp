@@ -124,7 +124,7 @@ std::vector<std::string> files_in(const std::string& folder) {
   }
   if (error) refuse(folder, fmt::format("cannot be listed: {}", error.message()));
   if (files.empty())
-    refuse(folder, "no point files are in this folder (by their endings: .ply .obj .xyz .pts .ptx .pcd .las ...)");
+    refuse(folder, "no point files are in this folder (by their endings: .ply .obj .xyz .pts .ptx .pcd .las .e57 ...)");
   std::sort(files.begin(), files.end());
   return files;
 }

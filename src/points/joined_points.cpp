@@ -47,7 +47,9 @@ class JoinedPoints final : public PointSource, public OrganisedPoints {
     info_.remarks.clear();
     info_.scans.clear();
     for (auto& source : sources) add(std::move(source));
-    if (sources.size() > 1) info_.path = fmt::format("{} and {} more", info_.path, sources.size() - 1);
+    const bool one_file =
+        std::all_of(parts_.begin(), parts_.end(), [&](const Part& p) { return p.source->info().path == info_.path; });
+    if (!one_file) info_.path = fmt::format("{} and {} more", info_.path, parts_.size() - 1);
     for (const Part& part : parts_) {
       const PointSourceInfo& from = part.source->info();
       if (info_.radius_name.empty()) info_.radius_name = from.radius_name;

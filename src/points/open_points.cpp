@@ -56,6 +56,8 @@ std::unique_ptr<PointSource> open_points(const std::string& path, const PointSet
       return open_las(std::move(file), path);
     case PointFormat::ptx:
       return open_ptx(std::move(file), path);
+    case PointFormat::e57:
+      return open_e57(std::move(file), path, settings.ignore_checksums);
     case PointFormat::vdb:
       return open_vdb(path);
     case PointFormat::text:

@@ -30,6 +30,10 @@ std::unique_ptr<PointSource> open_las(InputFile file, const std::string& path);
 /// Throws Error(unreadable).
 std::unique_ptr<PointSource> open_ptx(InputFile file, const std::string& path);
 
+/// E57: the scans of the file, each in its pose. Points marked as invalid are left out, images too. Throws
+/// Error(unreadable), also for a page whose checksum is wrong unless these are ignored.
+std::unique_ptr<PointSource> open_e57(InputFile file, const std::string& path, bool ignore_checksums);
+
 /// Throws Error(usage) for PointSettings::columns that cannot be meant.
 void require_columns(const std::string& columns);
 

@@ -26,9 +26,6 @@ constexpr std::string_view kOff =
     "looks like an OFF mesh; its vertices as points: lamina convert FILE --vertices -o points.ply";
 
 constexpr std::array kSignatures{
-    Signature{"ASTM-E57",
-              "is an E57 file, which is not read; convert it: CloudCompare -O FILE -C_EXPORT_FMT PLY -SAVE_CLOUDS, or "
-              "pdal translate FILE.e57 FILE.las"},
     Signature{"# vtk DataFile", "is a VTK file; write it as PLY in ParaView or CloudCompare"},
     Signature{"CCB2",
               "is a file of CloudCompare's own; write it as PLY: CloudCompare -O FILE -C_EXPORT_FMT PLY -SAVE_CLOUDS"},
@@ -50,11 +47,11 @@ constexpr std::array kSignatures{
     Signature{"<html", "is a web page (a download that went wrong?)"},
 };
 
-constexpr std::string_view kKnown = "PLY, OBJ, XYZ, PTS, ASC, CSV, PWN, PTX, PCD, LAS and OpenVDB points are read";
+constexpr std::string_view kKnown = "PLY, OBJ, XYZ, PTS, ASC, CSV, PWN, PTX, PCD, LAS, E57 and OpenVDB points are read";
 
 constexpr std::array kTextEndings{".xyz"sv, ".pts"sv,  ".asc"sv,    ".csv"sv, ".pwn"sv, ".txt"sv,
                                   ".neu"sv, ".xyzn"sv, ".xyzrgb"sv, ".3d"sv,  ".dat"sv};
-constexpr std::array kOtherEndings{".ply"sv, ".obj"sv, ".ptx"sv, ".pcd"sv, ".las"sv};
+constexpr std::array kOtherEndings{".ply"sv, ".obj"sv, ".ptx"sv, ".pcd"sv, ".las"sv, ".e57"sv};
 
 template <class Endings>
 bool is_one_of(const Endings& endings, const std::string& ending) {
@@ -171,6 +168,7 @@ bool has_point_ending(std::string_view name) {
 PointFormat detect_format(std::string_view start, const std::string& name) {
   if (is_ply(start)) return PointFormat::ply;
   if (start.starts_with("\x20\x42\x44\x56"sv)) return PointFormat::vdb;
+  if (start.starts_with("ASTM-E57")) return PointFormat::e57;
   if (start.starts_with("LASF")) {
     if (is_laz(start)) {
       throw Error(ExitCode::unreadable,

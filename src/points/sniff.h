@@ -5,7 +5,7 @@
 
 namespace lamina {
 
-enum class PointFormat { ply, obj, pcd, las, ptx, vdb, text };
+enum class PointFormat { ply, obj, pcd, las, ptx, e57, vdb, text };
 
 /// The format of a file that begins with `start` (a few kilobytes suffice, unless a long comment comes first); `name`
 /// decides by its ending where the content does not. Throws Error(unreadable) for what is none of them, saying what it
