@@ -17,7 +17,8 @@ namespace lamina::tools {
 namespace {
 
 struct TransferOptions {
-  std::string mesh, points, output, columns;
+  std::string mesh, points, output;
+  PointSettings reading;
   TransferSettings settings;
   RunOptions run;
 };
@@ -27,7 +28,7 @@ void run_transfer(const TransferOptions& o) {
     throw Error(ExitCode::usage, "MESH and POINTS both name standard input; give one of them a file");
   const RunContext context = make_context(o.run);
   TriangleMesh mesh = read_mesh_input(o.mesh, context);
-  const auto points = open_point_input(o.points, o.columns, context);
+  const auto points = open_point_input(o.points, o.reading, context);
   TransferSettings settings = o.settings;
   if (context.max_memory > 0) {
     const std::uint64_t bytes = 64 + 4 * points->info().attributes.size();
@@ -83,7 +84,7 @@ void add_attribtransfer(CLI::App& app) {
       ->type_name("LENGTH")
       ->capture_default_str()
       ->group(group);
-  add_columns(*tool, o->columns);
+  add_point_options(*tool, o->reading.columns, o->reading.select);
   add_run_options(*tool, o->run);
   add_notes(
       *tool,

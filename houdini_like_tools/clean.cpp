@@ -17,7 +17,8 @@ namespace lamina::tools {
 namespace {
 
 struct CleanOptions {
-  std::string input, output, columns;
+  std::string input, output;
+  PointSettings reading;
   CleanSettings settings;
   BadSamples bad = BadSamples::drop;
   Precision precision = Precision::automatic;
@@ -29,7 +30,10 @@ void run_clean(const CleanOptions& o) {
   if (!o.settings.looks_around() && o.settings.pick.takes_all())
     throw Error(ExitCode::usage, "clean: nothing to do; give --clip, --every, --merge, --outliers or --spacing");
   const RunContext context = make_context(o.run, o.output);
-  const auto source = open_point_input(o.input, o.columns, context);
+  PointSettings reading = o.reading;
+  const RowPick& pick = o.settings.pick;
+  if (pick.clip && pick.every <= 1) reading.select.box = {pick.clip->low, pick.clip->high};
+  const auto source = open_point_input(o.input, reading, context);
   if (source->info().geographic && o.settings.looks_around())
     throw Error(ExitCode::unreadable, shown_name(o.input) +
                                           ": x and y are degrees of longitude and latitude, in which no distance can "
@@ -54,7 +58,7 @@ void add_clean(CLI::App& app) {
   auto o = std::make_shared<CleanOptions>();
   add_files(*tool, o->input, "Points", o->output, "Points that stay, in their order");
   add_clean_options(*tool, o->settings, "Cleaning");
-  add_columns(*tool, o->columns);
+  add_point_options(*tool, o->reading.columns, o->reading.select);
   add_bad_samples(*tool, o->bad);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

@@ -21,7 +21,8 @@ namespace lamina::tools {
 namespace {
 
 struct ClipOptions {
-  std::string input, output, columns;
+  std::string input, output;
+  PointSettings reading;
   ClipRegion region;
   Keep keep = Keep::inside;
   BadSamples bad = BadSamples::drop;
@@ -35,7 +36,9 @@ struct ClipOptions {
 }
 
 void clip_points(const ClipOptions& o, const RunContext& context) {
-  const auto source = open_point_input(o.input, o.columns, context);
+  PointSettings reading = o.reading;
+  if (o.region.box && o.keep == Keep::inside) reading.select.box = {o.region.box->low, o.region.box->high};
+  const auto source = open_point_input(o.input, reading, context);
   const auto writer = open_points_writer(o.output, with_precision(columns_of(source->info()), o.precision),
                                          {.count = {}, .tmp_dir = o.run.tmp_dir});
   const EditReport report = edit_points(
@@ -100,7 +103,7 @@ void add_clip(CLI::App& app) {
       ->check(CLI::IsMember({"inside", "outside"}).description(""))
       ->type_name("inside|outside")
       ->group("Region");
-  add_columns(*tool, o->columns);
+  add_point_options(*tool, o->reading.columns, o->reading.select);
   add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

@@ -21,7 +21,8 @@ namespace lamina::tools {
 namespace {
 
 struct ConvertOptions {
-  std::string input, output, columns;
+  std::string input, output;
+  PointSettings reading;
   std::string grid;
   bool vertices = false, fog = false;
   MeshingSettings meshing;
@@ -67,12 +68,12 @@ void points_to_volume(const ConvertOptions& o, PointSource& source, const RunCon
 
 void convert_points(const ConvertOptions& o, const RunContext& context) {
   const std::string to = file_ending(o.output);
-  if (to == ".vdb") return points_to_volume(o, *open_point_input(o.input, o.columns, context), context);
+  if (to == ".vdb") return points_to_volume(o, *open_point_input(o.input, o.reading, context), context);
   if (to == ".off" || to == ".stl")
     throw Error(ExitCode::usage, fmt::format("{}: points do not become a {} file: make a mesh of them with 'lamina "
                                              "surface' first",
                                              shown_name(o.input), to));
-  const auto source = open_point_input(o.input, o.columns, context);
+  const auto source = open_point_input(o.input, o.reading, context);
   const auto writer = open_points_writer(o.output, with_precision(columns_of(source->info()), o.precision),
                                          {.count = {}, .tmp_dir = o.run.tmp_dir});
   const EditReport report = edit_points(*source, *writer, {}, o.bad, context);
@@ -211,7 +212,7 @@ void add_convert(CLI::App& app) {
       ->group(volume);
   tool->add_flag("--fog", o->fog, "Make a fog volume (grid density) of a level set")->group(volume);
   tool->add_flag("--half", o->volume.half, "Store a level set or fog in 16-bit floats")->group(volume);
-  add_columns(*tool, o->columns);
+  add_point_options(*tool, o->reading.columns, o->reading.select);
   add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

@@ -18,7 +18,8 @@ namespace lamina::tools {
 namespace {
 
 struct InfoOptions {
-  std::string input, columns;
+  std::string input;
+  PointSettings reading;
   bool json = false;
   RunOptions run;
 };
@@ -194,7 +195,7 @@ void run_info(const InfoOptions& o) {
   const RunContext context = make_context(o.run);
   switch (content_of(o.input, o.run.tmp_dir)) {
     case FileContent::points:
-      return show(o, describe_points(*open_point_input(o.input, o.columns, context), context));
+      return show(o, describe_points(*open_point_input(o.input, o.reading, context), context));
     case FileContent::mesh:
       return show(o, describe_mesh(read_mesh_input(o.input, context, NonFinite::keep)));
     case FileContent::volume:
@@ -213,7 +214,7 @@ void add_info(CLI::App& app) {
       ->required()
       ->type_name("");
   tool->add_flag("--json", o->json, "Print JSON");
-  add_columns(*tool, o->columns);
+  add_point_options(*tool, o->reading.columns, o->reading.select);
   add_run_options(*tool, o->run);
   add_notes(*tool,
             "Tells the number of points, vertices or voxels, the box, every attribute with its type and range, and a "

@@ -23,7 +23,8 @@ namespace {
 
 struct MergeOptions {
   std::vector<std::string> inputs;
-  std::string output, columns;
+  std::string output;
+  PointSettings reading;
   MixedAttributes mixed = MixedAttributes::refuse;
   BadSamples bad = BadSamples::drop;
   Precision precision = Precision::automatic;
@@ -34,7 +35,7 @@ void merge_points(const MergeOptions& o, const std::vector<PointInput>& inputs, 
   std::vector<std::unique_ptr<PointSource>> sources;
   std::vector<const PointSourceInfo*> infos;
   for (const PointInput& input : inputs) {
-    auto source = open_point_input(input.path, o.columns, context);
+    auto source = open_point_input(input.path, o.reading, context);
     sources.push_back(input.posed ? pose_points(std::move(source), input.pose) : std::move(source));
     infos.push_back(&sources.back()->info());
   }
@@ -134,7 +135,7 @@ void add_merge(CLI::App& app) {
       ->check(CLI::IsMember({"refuse", "fill", "intersect"}).description(""))
       ->type_name("refuse|fill|intersect")
       ->group("Input");
-  add_columns(*tool, o->columns);
+  add_point_options(*tool, o->reading.columns, o->reading.select);
   add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

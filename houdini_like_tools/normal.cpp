@@ -22,7 +22,8 @@ namespace {
 
 struct NormalOptions {
   std::vector<std::string> inputs;
-  std::string output, columns, stats;
+  std::string output, stats;
+  PointSettings reading;
   NormalsSettings settings;
   bool reorient = false, check = false, missing = false;
   Precision precision = Precision::automatic;
@@ -47,7 +48,9 @@ void run_normal(const NormalOptions& o) {
   const RunContext context = make_context(o.run, o.output);
   std::vector<std::string> names;
   for (const std::string& name : o.inputs) names.push_back(pipe_name(name));
-  std::unique_ptr<PointSource> source = open_points(names, PointSettings{context.tmp_dir, o.columns});
+  PointSettings reading = o.reading;
+  reading.tmp_dir = context.tmp_dir;
+  std::unique_ptr<PointSource> source = open_points(names, reading);
   for (const std::string& remark : source->info().remarks) context.info(remark);
   const std::string path = shown_name(source->info().path);
   if (source->info().geographic)
@@ -96,7 +99,7 @@ void add_normal(CLI::App& app) {
   tool->add_flag("--missing", o->missing, "Keep the normals the input has, find those it lacks")->group(group);
   tool->add_flag("--check", o->check, "Change and write nothing: tell the share of sign conflicts")->group(group);
   add_normals_options(*tool, o->settings, group);
-  add_columns(*tool, o->columns);
+  add_point_options(*tool, o->reading.columns, o->reading.select);
   add_bad_samples(*tool, o->settings.bad_samples);
   add_precision(*tool, o->precision);
   tool->add_option("--stats", o->stats, "Write counts and conflicts by slab to this JSON file; - for standard output")

@@ -16,7 +16,8 @@ namespace lamina::tools {
 namespace {
 
 struct RadiusOptions {
-  std::string input, output, columns, name = "radius";
+  std::string input, output, name = "radius";
+  PointSettings reading;
   PointRadiiSettings settings;
   Precision precision = Precision::automatic;
   RunOptions run;
@@ -24,7 +25,7 @@ struct RadiusOptions {
 
 void run_radius(const RadiusOptions& o) {
   const RunContext context = make_context(o.run, o.output);
-  const auto source = open_point_input(o.input, o.columns, context);
+  const auto source = open_point_input(o.input, o.reading, context);
   if (source->info().geographic)
     throw Error(ExitCode::unreadable, shown_name(o.input) +
                                           ": x and y are degrees of longitude and latitude, in which "
@@ -77,7 +78,7 @@ void add_radius(CLI::App& app) {
       ->check(CLI::IsMember({"radius", "pscale"}).description(""))
       ->type_name("radius|pscale")
       ->group(group);
-  add_columns(*tool, o->columns);
+  add_point_options(*tool, o->reading.columns, o->reading.select);
   add_bad_samples(*tool, s.bad_samples);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

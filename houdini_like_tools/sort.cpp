@@ -22,7 +22,8 @@ namespace {
 
 struct SortOptions {
   std::vector<std::string> inputs;
-  std::string output, columns, store;
+  std::string output, store;
+  PointSettings points;
   SurfaceSettings reading;  ///< of the store
   SortSettings settings;
   Precision precision = Precision::automatic;
@@ -35,7 +36,8 @@ void run_store(const SortOptions& o) {
   SurfaceSettings settings = o.reading;
   settings.input = o.inputs.front();
   settings.more_inputs.assign(o.inputs.begin() + 1, o.inputs.end());
-  settings.columns = o.columns;
+  settings.columns = o.points.columns;
+  settings.select = o.points.select;
   settings.bad_samples = o.settings.bad_samples;
   if (o.tool->count("--strays") == 0) settings.clean.strays = true;
   const RunContext context = make_context(o.run);
@@ -50,7 +52,7 @@ void run_sort(const SortOptions& o) {
   if (o.inputs.size() > 1)
     throw Error(ExitCode::usage, "several inputs go into a --store only; put them into one file first: lamina merge");
   const RunContext context = make_context(o.run, o.output);
-  const auto source = open_point_input(o.inputs.front(), o.columns, context);
+  const auto source = open_point_input(o.inputs.front(), o.points, context);
   const auto writer = open_points_writer(o.output, with_precision(columns_of(source->info()), o.precision),
                                          {.count = {}, .tmp_dir = o.run.tmp_dir});
   const EditReport report = sort_points(*source, *writer, o.settings, context);
@@ -136,7 +138,7 @@ void add_sort(CLI::App& app) {
       ->needs(folder)
       ->group(store);
   add_reading(*tool, *folder, o->reading);
-  add_columns(*tool, o->columns);
+  add_point_options(*tool, o->points.columns, o->points.select);
   add_bad_samples(*tool, o->settings.bad_samples);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

@@ -165,7 +165,7 @@ void add_surface(CLI::App& app) {
   s.prune_triangles.reset();
   tool->add_option(
           "INPUT", o->inputs,
-          "Points with normals: PLY, OBJ, XYZ and other text, PTX, PCD, LAS, E57, points of a .vdb, also gzipped; "
+          "Points with normals: PLY, OBJ, XYZ and other text, PTX, PCD, LAS, LAZ, E57, points of a .vdb, also gzipped; "
           "several "
           "files, folders, patterns or scan lists (.conf) are one cloud; FILE@POSE.txt moves a file by the 4x4 matrix "
           "in POSE.txt. Or a store that lamina sort --store made. - for PLY on standard input")
@@ -178,7 +178,7 @@ void add_surface(CLI::App& app) {
   output->type_name("FILE");
 
   const std::string samples = "Samples";
-  add_columns(*tool, s.columns, samples);
+  add_point_options(*tool, s.columns, s.select, samples);
   tool->add_option("--frame", s.frame,
                    "pca: sweep along the cloud's dominant axis, for the least memory; axis: along the longest input "
                    "axis, so that "

@@ -20,7 +20,8 @@ namespace lamina::tools {
 namespace {
 
 struct TransformOptions {
-  std::string input, output, columns;
+  std::string input, output;
+  PointSettings reading;
   TransformSettings settings;
   Eigen::Matrix4d matrix = Eigen::Matrix4d::Identity();
   bool has_matrix = false, invert = false;
@@ -50,7 +51,7 @@ bool needs_double(PointSource& source, const Eigen::Affine3d& transform, const R
 }
 
 void transform_points(const TransformOptions& o, const Eigen::Affine3d& transform, const RunContext& context) {
-  const auto source = open_point_input(o.input, o.columns, context);
+  const auto source = open_point_input(o.input, o.reading, context);
   PointColumns columns = with_precision(columns_of(source->info()), o.precision);
   if (o.precision == Precision::automatic && !columns.double_positions)
     columns.double_positions = needs_double(*source, transform, context);
@@ -130,7 +131,7 @@ void add_transform(CLI::App& app) {
   matrix->group(group);
   for (const char* other : {"--scale", "--rotate", "--translate", "--pivot"}) matrix->excludes(tool->get_option(other));
   tool->add_flag("--invert", o->invert, "Undo the transform instead")->group(group);
-  add_columns(*tool, o->columns);
+  add_point_options(*tool, o->reading.columns, o->reading.select);
   add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

@@ -2,14 +2,45 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <charconv>
 #include <filesystem>
 #include <map>
 #include <system_error>
+#include <vector>
 
 #include "common/text.h"
 #include "lamina/error.h"
 
 namespace lamina::tools {
+namespace {
+
+/// Whole numbers of 0 to 255 between commas, or none.
+std::vector<int> classes_of(const std::string& option, const std::string& text) {
+  std::vector<int> classes;
+  if (text == "none") return classes;
+  for (std::size_t at = 0; at <= text.size();) {
+    const std::size_t end = std::min(text.find(',', at), text.size());
+    int number = -1;
+    const auto [stop, error] = std::from_chars(text.data() + at, text.data() + end, number);
+    if (error != std::errc{} || stop != text.data() + end || number < 0 || number > 255) {
+      throw CLI::ValidationError(option, fmt::format("'{}' is no list of classes, 0 to 255, as in 2,6", text));
+    }
+    classes.push_back(number);
+    at = end + 1;
+  }
+  return classes;
+}
+
+PointCondition condition_of(const std::string& text) {
+  try {
+    return parse_condition(text);
+  } catch (const Error& e) {
+    throw CLI::ValidationError("--where", e.what());
+  }
+}
+
+}  // namespace
 
 std::string pipe_name(const std::string& name) {
   return name == "stdin.ply" || name == "stdout.ply" ? "-" : name;
@@ -25,18 +56,54 @@ void add_bad_samples(CLI::App& app, BadSamples& bad, const std::string& what) {
       ->group("Input");
 }
 
-void add_columns(CLI::App& app, std::string& columns, const std::string& group) {
+void add_point_options(CLI::App& app, std::string& columns, PointSelection& select, const std::string& group) {
   app.add_option(
          "--columns", columns,
          "What the columns of text files hold: names as in x,y,z,nx,ny,nz,red:uchar,-, where - is a column to skip [by "
          "header line, else by the numbers]")
       ->type_name("NAMES")
       ->group(group);
+  app.add_option_function<std::string>(
+         "--keep-class", [&select](const std::string& text) { select.keep_classes = classes_of("--keep-class", text); },
+         "Points of LAS and LAZ: only those of these classes, as in 2,6")
+      ->type_name("N,...")
+      ->group(group);
+  app.add_option_function<std::string>(
+         "--drop-class", [&select](const std::string& text) { select.drop_classes = classes_of("--drop-class", text); },
+         "Points of LAS and LAZ: none of these classes; none: all stay [7,18, noise]")
+      ->type_name("N,...|none")
+      ->group(group);
+  const std::map<std::string, PointSelection::Returns> returns{{"all", PointSelection::Returns::all},
+                                                               {"first", PointSelection::Returns::first},
+                                                               {"last", PointSelection::Returns::last}};
+  app.add_option_function<std::string>(
+         "--returns", [&select, returns](const std::string& word) { select.returns = returns.at(word); },
+         "Points of LAS and LAZ: of a pulse's returns [all]")
+      ->check(CLI::IsMember({"all", "first", "last"}).description(""))
+      ->type_name("all|first|last")
+      ->group(group);
+  app.add_option("--resolution", select.resolution,
+                 "Points of COPC: levels of its octree until points are at most this far apart [all]")
+      ->check(CLI::PositiveNumber.description(""))
+      ->type_name("LENGTH")
+      ->group(group);
+  app.add_option_function<std::vector<std::string>>(
+         "--where",
+         [&select](const std::vector<std::string>& texts) {
+           for (const std::string& text : texts) select.where.push_back(condition_of(text));
+         },
+         "Only points with such a value, as in 'intensity>10'; of LAS also classification, return_number, "
+         "number_of_returns, scan_angle, user_data, point_source and gps_time. Given again: all must hold")
+      ->type_name("CONDITION")
+      ->allow_extra_args(false)
+      ->group(group);
 }
 
-std::unique_ptr<PointSource> open_point_input(const std::string& path, const std::string& columns,
+std::unique_ptr<PointSource> open_point_input(const std::string& path, const PointSettings& reading,
                                               const RunContext& context) {
-  std::unique_ptr<PointSource> source = open_points(path, PointSettings{context.tmp_dir, columns});
+  PointSettings settings = reading;
+  settings.tmp_dir = context.tmp_dir;
+  std::unique_ptr<PointSource> source = open_points(path, settings);
   for (const std::string& remark : source->info().remarks) context.info(remark);
   return source;
 }

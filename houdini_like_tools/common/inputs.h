@@ -18,11 +18,12 @@ std::string pipe_name(const std::string& name);
 
 /// --bad-samples drop|refuse, in the group "Input"; `what` may be bad.
 void add_bad_samples(CLI::App& app, BadSamples& bad, const std::string& what = "Points");
-/// --columns NAMES: PointSettings::columns.
-void add_columns(CLI::App& app, std::string& columns, const std::string& group = "Input");
+/// What is taken of point files: --columns NAMES (PointSettings::columns), --keep-class, --drop-class, --returns,
+/// --where.
+void add_point_options(CLI::App& app, std::string& columns, PointSelection& select, const std::string& group = "Input");
 
 /// open_points(), saying what the reader found worth saying.
-std::unique_ptr<PointSource> open_point_input(const std::string& path, const std::string& columns,
+std::unique_ptr<PointSource> open_point_input(const std::string& path, const PointSettings& reading,
                                               const RunContext& context);
 
 /// "standard input" for "-".

@@ -3,7 +3,9 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "lamina/attributes.h"
@@ -61,19 +63,51 @@ class PointSource {
   PointSourceInfo info_;
 };
 
+/// What a value of a point must be, as in `intensity>10`.
+struct PointCondition {
+  enum class Relation : std::uint8_t { less, at_most, equal, not_equal, at_least, more };
+  std::string name;  ///< x, y, z or an attribute; of LAS also classification, return_number, number_of_returns,
+                     ///< scan_angle, user_data, point_source and gps_time
+  Relation relation = Relation::equal;
+  double value = 0;
+};
+
+/// NAME, one of < <= = == != >= > and a number. Throws Error(usage) for anything else.
+PointCondition parse_condition(std::string_view text);
+
+/// Which points of a file are taken; all conditions must hold.
+struct PointSelection {
+  enum class Returns : std::uint8_t { all, first, last };
+  /// Of LAS. Kept classes: empty for all. Those dropped are noise, low and high, unless somebody says otherwise.
+  std::vector<int> keep_classes{};
+  std::vector<int> drop_classes{kNoise.begin(), kNoise.end()};
+  Returns returns = Returns::all;       ///< of a pulse's several; of LAS
+  std::vector<PointCondition> where{};  ///< of any format
+  /// Of COPC: levels of the octree from the coarsest to the first whose points are no farther apart than this length.
+  std::optional<double> resolution{};
+  /// Of COPC: nodes that lie outside of this box, low and high, are not read; points outside may still come.
+  std::optional<std::array<std::array<double, 3>, 2>> box{};
+
+  static constexpr std::array<int, 2> kNoise{7, 18};
+};
+
+/// In one line; the same for the same selection alone.
+std::string to_string(const PointSelection& selection);
+
 /// How files are read.
 struct PointSettings {
-  std::string tmp_dir;  ///< folder for what must be spooled or unpacked; empty: the system's
+  std::string tmp_dir{};  ///< folder for what must be spooled or unpacked; empty: the system's
   /// The columns of text files (XYZ, CSV, ...): names separated by commas, as in "x,y,z,red,green,blue,-". `-` skips a
   /// column; NAME:TYPE with a PLY type fixes its type (red:ushort). Empty: taken from the file's header line, else
   /// guessed from the numbers. Other formats ignore it.
-  std::string columns;
+  std::string columns{};
   bool ignore_checksums = false;  ///< of E57: pages are believed whatever their checksums say
+  PointSelection select{};
 };
 
 /// Opens a point file by its content, and by its ending where the content does not tell the format: PLY (also with a
-/// range grid), OBJ, XYZ and other text, PTX, PCD, LAS, E57, OpenVDB points (held in memory); docs/formats.md has the
-/// details.
+/// range grid), OBJ, XYZ and other text, PTX, PCD, LAS, LAZ, E57, OpenVDB points (held in memory); docs/formats.md has
+/// the details.
 /// "-" is standard input. Pipes are spooled to an unnamed file in `tmp_dir`, and .gz files are unpacked to one.
 ///
 /// Properties of PLY's element `vertex`: x y z; nx ny nz; radius (else pscale); quality (else confidence). Every other
@@ -84,7 +118,8 @@ struct PointSettings {
 /// Throws Error(unreadable) naming the file and the place: a file that is missing, a directory, empty or of unknown
 /// format; a malformed header, no points, no x y z, an incomplete normal, a column named twice, a list among a PLY
 /// vertex's properties, a file shorter or longer than its header says (ascii: known when the last row is read). Throws
-/// Error(budget) when `tmp_dir` cannot take what is spooled, Error(usage) for columns that make no sense.
+/// Error(budget) when `tmp_dir` cannot take what is spooled, Error(usage) for columns that make no sense, and for a
+/// selection by a value that the file does not have.
 std::unique_ptr<PointSource> open_points(const std::string& path, const PointSettings& settings);
 std::unique_ptr<PointSource> open_points(const std::string& path, const std::string& tmp_dir = {});
 

@@ -33,6 +33,7 @@ struct SurfaceSettings {
   std::string input;  ///< point file, folder, pattern or scan list (expand_inputs()); "-" is standard input
   std::vector<std::string> more_inputs;  ///< taken together with `input`, as one cloud
   std::string columns;                   ///< of text files (PointSettings::columns)
+  PointSelection select;                 ///< which points of the files are taken
   std::string output;                    ///< mesh file: .obj, .off, .stl, else PLY; "-": standard output
 
   std::optional<FrameMode> frame;  ///< unset: pca, or axis where grids are asked for (they have the input's axes then)

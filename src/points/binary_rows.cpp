@@ -18,23 +18,6 @@ namespace {
 /// Bytes converted column by column at once: they stay in the first-level cache across the columns.
 constexpr std::size_t kConvertBytes = 12 << 10;
 
-/// `n` rows to the places from `at` on.
-void convert(const BinaryRows& layout, const std::vector<PointColumn>& columns, const std::byte* bytes, std::size_t at,
-             std::size_t n, const std::vector<ColumnTarget>& targets) {
-  const std::size_t block = std::max<std::size_t>(1, kConvertBytes / layout.stride);
-  for (std::size_t done = 0; done < n; done += block) {
-    const std::size_t rows = std::min(block, n - done);
-    for (std::size_t c = 0; c < targets.size(); ++c) {
-      const std::byte* from = bytes + done * layout.stride + columns[c].offset;
-      if (targets[c].wide != nullptr) {
-        convert_column(columns[c].type, layout.swapped, from, layout.stride, rows, targets[c].wide + at + done);
-      } else if (targets[c].narrow != nullptr) {
-        convert_column(columns[c].type, layout.swapped, from, layout.stride, rows, targets[c].narrow + at + done);
-      }
-    }
-  }
-}
-
 /// Rows encoded column by column at once: they stay in the first-level cache across the columns.
 constexpr std::size_t kEncodedRows = 256;
 
@@ -87,8 +70,23 @@ void convert_column(ScalarType type, bool swapped, const std::byte* row, std::si
 template void convert_column(ScalarType, bool, const std::byte*, std::size_t, std::size_t, float*);
 template void convert_column(ScalarType, bool, const std::byte*, std::size_t, std::size_t, double*);
 
-void read_binary_rows(const InputFile& file, const BinaryRows& rows, const std::vector<PointColumn>& columns,
-                      RowRange range, const std::vector<ColumnTarget>& targets) {
+void convert_rows(const BinaryRows& layout, const std::vector<PointColumn>& columns, const std::byte* bytes,
+                  std::size_t at, std::size_t count, const std::vector<ColumnTarget>& targets) {
+  const std::size_t block = std::max<std::size_t>(1, kConvertBytes / layout.stride);
+  for (std::size_t done = 0; done < count; done += block) {
+    const std::size_t rows = std::min(block, count - done);
+    for (std::size_t c = 0; c < targets.size(); ++c) {
+      const std::byte* from = bytes + done * layout.stride + columns[c].offset;
+      if (targets[c].wide != nullptr) {
+        convert_column(columns[c].type, layout.swapped, from, layout.stride, rows, targets[c].wide + at + done);
+      } else if (targets[c].narrow != nullptr) {
+        convert_column(columns[c].type, layout.swapped, from, layout.stride, rows, targets[c].narrow + at + done);
+      }
+    }
+  }
+}
+
+void read_row_blocks(const InputFile& file, const BinaryRows& rows, RowRange range, const TakeRows& take) {
   // Read, not mapped: mapped bytes count as resident memory afterwards.
   const std::size_t block = std::max<std::size_t>(1, kReadBytes / rows.stride);
   const auto buffer = std::make_unique_for_overwrite<std::byte[]>(std::min(block, range.count) * rows.stride);
@@ -100,8 +98,15 @@ void read_binary_rows(const InputFile& file, const BinaryRows& rows, const std::
                                                     "being written?",
                                                     file.name, range.first + done + got / rows.stride));
     }
-    convert(rows, columns, buffer.get(), done, n, targets);
+    take(buffer.get(), done, n);
   }
+}
+
+void read_binary_rows(const InputFile& file, const BinaryRows& rows, const std::vector<PointColumn>& columns,
+                      RowRange range, const std::vector<ColumnTarget>& targets) {
+  read_row_blocks(file, rows, range, [&](const std::byte* bytes, std::size_t at, std::size_t count) {
+    convert_rows(rows, columns, bytes, at, count, targets);
+  });
 }
 
 RowCodec::RowCodec(const PointColumns& columns) : columns_(columns) {

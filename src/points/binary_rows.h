@@ -2,6 +2,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,17 @@ struct BinaryRows {
   std::size_t stride = 0;  ///< bytes of a row
   bool swapped = false;    ///< the other byte order than this machine's
 };
+
+/// Called with rows `bytes` on: `count` of them, which are those from `at` on of a range.
+using TakeRows = std::function<void(const std::byte* bytes, std::size_t at, std::size_t count)>;
+
+/// Hands the rows of the range over, in order and a block at a time. From any thread.
+/// Throws Error(unreadable) when the file has become shorter since it was opened.
+void read_row_blocks(const InputFile& file, const BinaryRows& rows, RowRange range, const TakeRows& take);
+
+/// Takes `count` rows apart: their values go to the targets' places from `at` on.
+void convert_rows(const BinaryRows& layout, const std::vector<PointColumn>& columns, const std::byte* bytes,
+                  std::size_t at, std::size_t count, const std::vector<ColumnTarget>& targets);
 
 /// Fills the targets with the rows of the range. From any thread.
 /// Throws Error(unreadable) when the file has become shorter since it was opened.

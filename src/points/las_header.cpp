@@ -12,18 +12,21 @@
 
 #include "base/little_endian.h"
 #include "lamina/error.h"
+#include "points/copc.h"
 #include "points/point_columns.h"
 
 namespace lamina {
 namespace {
 
-struct LasRecords {
+struct LasVariableRecords {
   enum class Coordinates { unknown, projected, geographic };
   Coordinates coordinates = Coordinates::unknown;
   std::vector<std::byte> extra_bytes;  ///< descriptors of 192 bytes each
+  std::vector<std::byte> packing;      ///< LASzip's record
+  std::vector<std::byte> octree;       ///< COPC's
 };
 
-using Coordinates = LasRecords::Coordinates;
+using Coordinates = LasVariableRecords::Coordinates;
 
 constexpr std::size_t kRecordHeader = 54;
 constexpr std::size_t kExtendedHeader = 60;
@@ -57,7 +60,7 @@ Coordinates kind_by_text(std::string_view text) {
   return Coordinates::unknown;
 }
 
-void take_record(std::string_view user, std::uint16_t id, std::vector<std::byte> bytes, LasRecords& records) {
+void take_record(std::string_view user, std::uint16_t id, std::vector<std::byte> bytes, LasVariableRecords& records) {
   constexpr std::uint16_t kKeys = 34735;
   constexpr std::uint16_t kText = 2112;
   constexpr std::uint16_t kExtraBytes = 4;
@@ -65,7 +68,13 @@ void take_record(std::string_view user, std::uint16_t id, std::vector<std::byte>
   if (user == "LASF_Projection" && id == kKeys) kind = kind_by_keys(bytes);
   if (user == "LASF_Projection" && id == kText) kind = kind_by_text(text_of(bytes.data(), bytes.size()));
   if (kind != Coordinates::unknown) records.coordinates = kind;
-  if (user == "LASF_Spec" && id == kExtraBytes) records.extra_bytes = std::move(bytes);
+  if (user == "LASF_Spec" && id == kExtraBytes) {
+    records.extra_bytes = std::move(bytes);
+  } else if (user == kLazUser && id == kLazRecord) {
+    records.packing = std::move(bytes);
+  } else if (user == kCopcUser && id == kCopcRecord) {
+    records.octree = std::move(bytes);
+  }
 }
 
 std::vector<std::byte> bytes_at(const InputFile& file, std::uint64_t offset, std::uint64_t size) {
@@ -76,7 +85,7 @@ std::vector<std::byte> bytes_at(const InputFile& file, std::uint64_t offset, std
 
 /// Both kinds differ in how long their length is.
 void walk(const InputFile& file, std::uint64_t offset, std::uint32_t count, std::uint64_t end, bool extended,
-          LasRecords& records) {
+          LasVariableRecords& records) {
   const std::size_t header_bytes = extended ? kExtendedHeader : kRecordHeader;
   for (std::uint32_t i = 0; i < std::min(count, kMostRecords); ++i) {
     std::array<std::byte, kExtendedHeader> header{};
@@ -87,7 +96,7 @@ void walk(const InputFile& file, std::uint64_t offset, std::uint32_t count, std:
     offset += header_bytes;
     if (length > end - offset) return;
     const std::string_view user = text_of(header.data() + 2, 16);
-    if (user.starts_with("LASF_")) {
+    if (user.starts_with("LASF_") || user == kLazUser || user == kCopcUser) {
       take_record(user, load_little<std::uint16_t>(header.data() + 18), bytes_at(file, offset, length), records);
     }
     offset += length;
@@ -127,18 +136,20 @@ bool looks_geographic(const LasHeader& h) {
 /// The `count` records from `offset` on, as far as they end before `end`; a damaged list ends where it stops making
 /// sense, as no point depends on it.
 void read_las_records(const InputFile& file, std::uint64_t offset, std::uint32_t count, std::uint64_t end,
-                      LasRecords& records) {
+                      LasVariableRecords& records) {
   walk(file, offset, count, end, false, records);
 }
 
 /// The same for those behind the points, which may be longer than 64 kB.
-void read_las_extended_records(const InputFile& file, std::uint64_t offset, std::uint32_t count, LasRecords& records) {
+void read_las_extended_records(const InputFile& file, std::uint64_t offset, std::uint32_t count,
+                               LasVariableRecords& records) {
   walk(file, offset, count, file.bytes, true, records);
 }
 
 /// Where the described extra values lie in a record of `record_bytes` with `standard_bytes` before them. Arrays,
 /// integers of 64 bits and undocumented bytes are passed over.
-std::vector<LasExtra> place_extras(const LasRecords& records, std::size_t standard_bytes, std::size_t record_bytes) {
+std::vector<LasExtra> place_extras(const LasVariableRecords& records, std::size_t standard_bytes,
+                                   std::size_t record_bytes) {
   std::vector<LasExtra> extras;
   std::size_t offset = standard_bytes;
   for (std::size_t at = 0; at + kDescriptor <= records.extra_bytes.size(); at += kDescriptor) {
@@ -178,7 +189,11 @@ std::uint16_t read_layout(const InputFile& file, const std::byte* bytes, std::si
                              header_bytes, major, h.minor));
   }
   h.data = load_little<std::uint32_t>(bytes + 96);
+  // LAZ shares LAS's signature and marks itself in the point format.
+  constexpr int kCompressed = 0xC0;
   h.point_format = std::to_integer<int>(bytes[104]);
+  if ((h.point_format & kCompressed) != 0) h.packing.emplace();
+  h.point_format &= ~kCompressed;
   if (h.point_format >= static_cast<int>(kRecordBytes.size())) {
     refuse(file, fmt::format("point format {} (at byte 104) is not known; 0 to 10 are", h.point_format));
   }
@@ -203,12 +218,22 @@ void read_coordinates(const InputFile& file, const std::byte* bytes, LasHeader& 
   }
 }
 
+/// A compressed point takes a hundredth of a bit at the very least. The chunk table tells more.
+void require_compressed_room(const InputFile& file, const LasHeader& h) {
+  constexpr std::uint64_t kMostPerByte = 1000;
+  if (h.count / kMostPerByte <= file.bytes - h.data) return;
+  refuse(file, fmt::format("the header promises {} points, for which {} compressed bytes are too few: it was cut short "
+                           "or the header's count is wrong",
+                           h.count, file.bytes - h.data));
+}
+
 /// Compares the count with the room there is.
 void require_room(const InputFile& file, const std::byte* bytes, std::uint16_t header_bytes, LasHeader& h) {
   if (h.data < header_bytes || h.data > file.bytes) {
     refuse(file, fmt::format("points begin at byte {}, which is {} (at byte 96)", h.data,
                              h.data < header_bytes ? "inside the header" : "behind the end of the file"));
   }
+  if (h.packing) return require_compressed_room(file, h);
   // Points end where the file does, or what is announced to lie behind them begins.
   std::uint64_t end = file.bytes;
   constexpr std::size_t kWaves = 227;
@@ -251,14 +276,17 @@ LasHeader read_las_header(const InputFile& file) {
   if (const auto wide = load_little<std::uint64_t>(bytes + 247); h.minor >= 4 && wide != 0) h.count = wide;
   read_coordinates(file, bytes, h);
   require_room(file, bytes, header_bytes, h);
-  LasRecords records;
+  LasVariableRecords records;
   read_las_records(file, header_bytes, load_little<std::uint32_t>(bytes + 100), h.data, records);
   if (h.minor >= 4) {
     read_las_extended_records(file, load_little<std::uint64_t>(bytes + kExtendedRecords),
                               load_little<std::uint32_t>(bytes + 243), records);
   }
-  h.geographic = records.coordinates == LasRecords::Coordinates::geographic ||
-                 (records.coordinates == LasRecords::Coordinates::unknown && h.count > 0 && looks_geographic(h));
+  h.geographic =
+      records.coordinates == LasVariableRecords::Coordinates::geographic ||
+      (records.coordinates == LasVariableRecords::Coordinates::unknown && h.count > 0 && looks_geographic(h));
+  if (h.packing) h.packing = parse_laz_packing(records.packing, h.point_format, h.record_bytes, file.name);
+  if (h.packing) h.octree = std::move(records.octree);
   h.extras = place_extras(records, las_record_bytes(h.point_format), h.record_bytes);
   return h;
 }

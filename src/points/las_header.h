@@ -1,14 +1,16 @@
 // The public header block of a LAS file (ASPRS, "LAS Specification", versions 1.0 to 1.4 R15) and what its variable
-// length records say of coordinates and extra bytes.
+// length records say of coordinates, extra bytes and compression.
 #pragma once
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "lamina/attributes.h"
 #include "points/input_file.h"
+#include "points/laz_packing.h"
 
 namespace lamina {
 
@@ -31,10 +33,13 @@ struct LasHeader {
   std::array<double, 3> low{}, high{};  ///< bounding box as the header gives it
   bool geographic = false;              ///< x and y are degrees
   std::vector<LasExtra> extras;         ///< of one value each, of a type this library has
+  std::optional<LazPacking> packing;    ///< of LAZ files
+  std::vector<std::byte> octree;        ///< the record of a COPC file (copc.h)
 };
 
 /// Throws Error(unreadable) for what no version allows: sizes too small, an unknown point format, a scale of 0, more
-/// points than the file has room for; and for a count of 0 before points, which a writer leaves that was stopped.
+/// points than the file has room for; for a count of 0 before points, which a writer leaves that was stopped; and for
+/// LAZ that is compressed in a way not known here.
 LasHeader read_las_header(const InputFile& file);
 
 /// Bytes of the standard values of a point format, 0 to 10.

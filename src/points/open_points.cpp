@@ -15,6 +15,7 @@
 #include "lamina/points_writer.h"
 #include "points/input_file.h"
 #include "points/readers.h"
+#include "points/select_points.h"
 #include "points/sniff.h"
 #include "points/writers.h"
 
@@ -38,9 +39,7 @@ bool is_pipe_or_device(const std::string& path) {
          kind == std::filesystem::file_type::socket;
 }
 
-}  // namespace
-
-std::unique_ptr<PointSource> open_points(const std::string& path, const PointSettings& settings) {
+std::unique_ptr<PointSource> open_all_points(const std::string& path, const PointSettings& settings) {
   require_columns(settings.columns);
   InputFile file = open_input(path, settings.tmp_dir);
   std::string start(kSniffBytes, '\0');
@@ -53,7 +52,7 @@ std::unique_ptr<PointSource> open_points(const std::string& path, const PointSet
     case PointFormat::pcd:
       return open_pcd(std::move(file), path, settings.tmp_dir);
     case PointFormat::las:
-      return open_las(std::move(file), path);
+      return open_las(std::move(file), path, settings.select);
     case PointFormat::ptx:
       return open_ptx(std::move(file), path);
     case PointFormat::e57:
@@ -66,14 +65,22 @@ std::unique_ptr<PointSource> open_points(const std::string& path, const PointSet
   return open_ply(std::move(file), path);
 }
 
+}  // namespace
+
+std::unique_ptr<PointSource> open_points(const std::string& path, const PointSettings& settings) {
+  return select_points(open_all_points(path, settings), settings.select);
+}
+
 std::unique_ptr<PointSource> open_points(const std::string& path, const std::string& tmp_dir) {
-  return open_points(path, PointSettings{tmp_dir, {}});
+  return open_points(path, PointSettings{.tmp_dir = tmp_dir});
 }
 
 std::unique_ptr<PointSource> open_points(const std::vector<std::string>& names, const PointSettings& settings) {
   std::vector<std::unique_ptr<PointSource>> sources;
   for (const PointInput& input : expand_inputs(names)) {
-    std::unique_ptr<PointSource> source = open_points(input.path, settings);
+    PointSettings here = settings;
+    if (input.posed) here.select.box.reset();  // it is a box of where the pose puts the points
+    std::unique_ptr<PointSource> source = open_points(input.path, here);
     if (input.posed) source = pose_points(std::move(source), input.pose, input.seen_along_z);
     sources.push_back(std::move(source));
   }

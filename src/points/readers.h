@@ -20,10 +20,11 @@ std::unique_ptr<PointSource> open_obj(InputFile file, const std::string& path);
 /// Error(unreadable), and Error(budget) when `tmp_dir` has no room.
 std::unique_ptr<PointSource> open_pcd(InputFile file, const std::string& path, const std::string& tmp_dir);
 
-/// LAS, uncompressed. Attributes: intensity, red green blue and nir where any point has them other than 0, and extra
-/// bytes of one value. Colours that never exceed 255 are 8-bit ones in 16 bits, which some programs write, and come as
-/// such.
-std::unique_ptr<PointSource> open_las(InputFile file, const std::string& path);
+/// LAS, and LAZ of point formats 0 to 3 and 6 to 8, whose chunks are decoded as they are wanted. Attributes: intensity,
+/// red green blue and nir where any point has them other than 0, and extra bytes of one value. Colours that never
+/// exceed 255 are 8-bit ones in 16 bits, which some programs write, and come as such. Of the selection it sees to the
+/// octree's nodes of a COPC file.
+std::unique_ptr<PointSource> open_las(InputFile file, const std::string& path, const PointSelection& selection = {});
 
 /// PTX (Leica Cyclone's text format), organised scans with their poses. Points of all scans in the common frame; places
 /// of the grid without a return (0 0 0) are left out. Values after x y z: intensity, and red green blue of 8 bits.

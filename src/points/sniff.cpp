@@ -47,21 +47,16 @@ constexpr std::array kSignatures{
     Signature{"<html", "is a web page (a download that went wrong?)"},
 };
 
-constexpr std::string_view kKnown = "PLY, OBJ, XYZ, PTS, ASC, CSV, PWN, PTX, PCD, LAS, E57 and OpenVDB points are read";
+constexpr std::string_view kKnown =
+    "PLY, OBJ, XYZ, PTS, ASC, CSV, PWN, PTX, PCD, LAS, LAZ, E57 and OpenVDB points are read";
 
 constexpr std::array kTextEndings{".xyz"sv, ".pts"sv,  ".asc"sv,    ".csv"sv, ".pwn"sv, ".txt"sv,
                                   ".neu"sv, ".xyzn"sv, ".xyzrgb"sv, ".3d"sv,  ".dat"sv};
-constexpr std::array kOtherEndings{".ply"sv, ".obj"sv, ".ptx"sv, ".pcd"sv, ".las"sv, ".e57"sv};
+constexpr std::array kOtherEndings{".ply"sv, ".obj"sv, ".ptx"sv, ".pcd"sv, ".las"sv, ".laz"sv, ".e57"sv};
 
 template <class Endings>
 bool is_one_of(const Endings& endings, const std::string& ending) {
   return std::find(endings.begin(), endings.end(), ending) != endings.end();
-}
-
-/// LAZ shares LAS's signature and marks itself in the point format.
-bool is_laz(std::string_view start) {
-  constexpr std::size_t kPointFormat = 104;
-  return start.size() > kPointFormat && (static_cast<unsigned char>(start[kPointFormat]) & 0xC0U) != 0;
 }
 
 /// The next line with something on it, words apart; comments are skipped where `comments` says so.
@@ -169,15 +164,7 @@ PointFormat detect_format(std::string_view start, const std::string& name) {
   if (is_ply(start)) return PointFormat::ply;
   if (start.starts_with("\x20\x42\x44\x56"sv)) return PointFormat::vdb;
   if (start.starts_with("ASTM-E57")) return PointFormat::e57;
-  if (start.starts_with("LASF")) {
-    if (is_laz(start)) {
-      throw Error(ExitCode::unreadable,
-                  fmt::format("{}: is a LAZ file (compressed LAS), which is not read; unpack it: laszip -i FILE.laz -o "
-                              "FILE.las, or pdal translate FILE.laz FILE.las",
-                              name));
-    }
-    return PointFormat::las;
-  }
+  if (start.starts_with("LASF")) return PointFormat::las;
   const bool refused = std::any_of(kSignatures.begin(), kSignatures.end(),
                                    [&](const Signature& s) { return start.starts_with(s.start); });
   if (!refused && !start.empty() && start.find('\0') == std::string_view::npos) {

@@ -156,7 +156,11 @@ FrameMode chosen_frame(const SurfaceSettings& settings) {
 
 std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const std::string& tmp_dir,
                                          const RunContext& run) {
-  std::unique_ptr<PointSource> source = open_points(input_names(settings), {tmp_dir, settings.columns});
+  PointSelection select = settings.select;
+  const RowPick& pick = settings.clean.pick;
+  if (pick.clip && pick.every <= 1) select.box = {pick.clip->low, pick.clip->high};
+  std::unique_ptr<PointSource> source =
+      open_points(input_names(settings), {.tmp_dir = tmp_dir, .columns = settings.columns, .select = select});
   const PointSourceInfo& info = source->info();
   for (const std::string& remark : info.remarks) run.info(remark);
   if (info.geographic) {

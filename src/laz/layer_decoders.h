@@ -1,0 +1,313 @@
+// The layers of LAS 1.4's points, a decoder each. Every value is predicted from the last point of the same scanner
+// channel; a channel that comes up begins with what the point before had.
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include "base/little_endian.h"
+#include "laz/arithmetic_decoder.h"
+#include "laz/colour_decoder.h"
+#include "laz/gps_time_decoder.h"
+#include "laz/integer_decoder.h"
+#include "laz/model_bank.h"
+#include "laz/return_contexts.h"
+#include "laz/running_median.h"
+
+namespace lamina::laz {
+
+/// What the layer of coordinates tells the others of a point.
+struct PointContext {
+  static constexpr std::uint8_t kSingle = 3, kFirst = 2, kLast = 1;
+
+  std::uint8_t channel = 0;      ///< of the scanner, 0 to 3
+  bool channel_changed = false;  ///< from the point before
+  bool time_changed = false;     ///< these three from the last point of the channel
+  bool angle_changed = false;
+  bool source_changed = false;
+  std::uint8_t place = 0;  ///< among the returns of its pulse: kSingle, kFirst, kLast, or 0 between these
+  std::uint8_t level = 0;  ///< return_level()
+  std::uint8_t height_context = 0;
+};
+
+/// What a layer keeps for each channel, made when it comes up. State(v) begins with the value v, state.value() is its
+/// last.
+template <class State>
+class Channels {
+ public:
+  using Value = decltype(std::declval<const State&>().value());
+
+  Channels(unsigned first, const Value& value) : now_(first) { states_[first] = std::make_unique<State>(value); }
+
+  [[nodiscard]] State& now() { return *states_[now_]; }
+  [[nodiscard]] unsigned number() const { return now_; }
+  /// Whether the channel has come up before.
+  [[nodiscard]] bool knows(unsigned channel) const { return states_[channel] != nullptr; }
+  /// The state of `channel`, which becomes the present one.
+  State& go_to(unsigned channel) {
+    if (channel != now_) {
+      if (!knows(channel)) states_[channel] = std::make_unique<State>(now().value());
+      now_ = channel;
+    }
+    return now();
+  }
+
+ private:
+  std::array<std::unique_ptr<State>, 4> states_;
+  unsigned now_;
+};
+
+/// The scanner's channel in a record.
+inline unsigned channel_in(const std::byte* record) {
+  return std::to_integer<unsigned>(record[15]) >> 4 & 3;
+}
+
+/// Returns, x and y, and which other values change.
+class CoreLayer {
+ public:
+  explicit CoreLayer(const std::byte* first);
+  void decode(ArithmeticDecoder& code, std::size_t count, PointContext* contexts, std::byte* to, std::size_t stride);
+
+ private:
+  struct Value {
+    std::uint32_t x = 0, y = 0;
+    unsigned n = 0, r = 0;  ///< number of returns, return number
+  };
+  struct State {
+    explicit State(const Value& first) : last(first) {}
+    [[nodiscard]] const Value& value() const { return last; }
+
+    Value last;
+    bool time_changed = false;
+    std::array<RunningMedian, 12> x_steps, y_steps;
+    std::array<SymbolModel<128>, 8> changed;
+    SymbolModel<3> channel_step;
+    ModelBank<16, 16> numbers_of_returns, return_numbers;
+    SymbolModel<13> return_step;
+    IntegerDecoder<32, 2> x_code;
+    IntegerDecoder<32, 22> y_code;
+  };
+
+  static Value value_in(const std::byte* record);
+  static unsigned return_number(ArithmeticDecoder& code, State& state, unsigned change, bool time_changed);
+  static void decode_place(ArithmeticDecoder& code, State& state, PointContext& context);
+
+  Channels<State> channels_;
+  std::byte flags_;  ///< byte 15 of the first point without its channel
+};
+
+/// A layer of one value a point, which State decodes.
+template <class State>
+class ValueLayer {
+ public:
+  explicit ValueLayer(const std::byte* first) : channels_(channel_in(first), State::value_in(first)) {}
+
+  void decode(ArithmeticDecoder& code, const PointContext* contexts, std::size_t count, std::byte* to,
+              std::size_t stride) {
+    for (std::size_t i = 0; i < count; ++i, to += stride) {
+      channels_.go_to(contexts[i].channel).decode(code, contexts[i], to);
+    }
+  }
+
+ private:
+  Channels<State> channels_;
+};
+
+class HeightState {
+ public:
+  explicit HeightState(std::uint32_t z) : last_(z) { by_level_.fill(z); }
+  static std::uint32_t value_in(const std::byte* record) { return load_little<std::uint32_t>(record + kPlace); }
+  [[nodiscard]] std::uint32_t value() const { return last_; }
+  void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
+    last_ = by_level_[c.level] = code_.decode(code, by_level_[c.level], c.height_context);
+    store_little(record + kPlace, last_);
+  }
+
+ private:
+  static constexpr std::size_t kPlace = 8;
+  std::uint32_t last_;
+  std::array<std::uint32_t, 8> by_level_{};
+  IntegerDecoder<32, 20> code_;
+};
+
+class ClassState {
+ public:
+  explicit ClassState(unsigned value) : last_(value) {}
+  static unsigned value_in(const std::byte* record) { return std::to_integer<unsigned>(record[kPlace]); }
+  [[nodiscard]] unsigned value() const { return last_; }
+  void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
+    last_ = code.symbol(models_[(last_ & 0x1F) * 2 + (c.place == PointContext::kSingle ? 1 : 0)]);
+    record[kPlace] = static_cast<std::byte>(last_);
+  }
+
+ private:
+  static constexpr std::size_t kPlace = 16;
+  unsigned last_;
+  ModelBank<256, 64> models_;
+};
+
+/// Four flags of the class, scan direction and edge of the flight line; the channel stands between them.
+class FlagsState {
+ public:
+  explicit FlagsState(unsigned value) : last_(value) {}
+  static unsigned value_in(const std::byte* record) {
+    const auto flags = std::to_integer<unsigned>(record[kPlace]);
+    return (flags & 0x0F) | (flags >> 2 & 0x30);
+  }
+  [[nodiscard]] unsigned value() const { return last_; }
+  void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
+    last_ = code.symbol(models_[last_]);
+    record[kPlace] = static_cast<std::byte>((last_ & 0x0F) | (last_ & 0x30) << 2 | c.channel << 4);
+  }
+
+ private:
+  static constexpr std::size_t kPlace = 15;
+  unsigned last_;
+  ModelBank<64, 64> models_;
+};
+
+class IntensityState {
+ public:
+  explicit IntensityState(std::uint16_t value) : last_(value) { by_place_.fill(value); }
+  static std::uint16_t value_in(const std::byte* record) { return load_little<std::uint16_t>(record + kPlace); }
+  [[nodiscard]] std::uint16_t value() const { return last_; }
+  void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
+    std::uint16_t& at_place = by_place_[c.place * 2U + (c.time_changed ? 1 : 0)];
+    last_ = at_place = static_cast<std::uint16_t>(code_.decode(code, at_place, c.place));
+    store_little(record + kPlace, last_);
+  }
+
+ private:
+  static constexpr std::size_t kPlace = 12;
+  std::uint16_t last_;
+  std::array<std::uint16_t, 8> by_place_{};
+  IntegerDecoder<16, 4> code_;
+};
+
+class AngleState {
+ public:
+  explicit AngleState(std::uint16_t value) : last_(value) {}
+  static std::uint16_t value_in(const std::byte* record) { return load_little<std::uint16_t>(record + kPlace); }
+  [[nodiscard]] std::uint16_t value() const { return last_; }
+  void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
+    if (c.angle_changed) last_ = static_cast<std::uint16_t>(code_.decode(code, last_, c.time_changed ? 1 : 0));
+    store_little(record + kPlace, last_);
+  }
+
+ private:
+  static constexpr std::size_t kPlace = 18;
+  std::uint16_t last_;
+  IntegerDecoder<16, 2> code_;
+};
+
+class UserState {
+ public:
+  explicit UserState(unsigned value) : last_(value) {}
+  static unsigned value_in(const std::byte* record) { return std::to_integer<unsigned>(record[kPlace]); }
+  [[nodiscard]] unsigned value() const { return last_; }
+  void decode(ArithmeticDecoder& code, const PointContext&, std::byte* record) {
+    last_ = code.symbol(models_[last_ / 4]);
+    record[kPlace] = static_cast<std::byte>(last_);
+  }
+
+ private:
+  static constexpr std::size_t kPlace = 17;
+  unsigned last_;
+  ModelBank<256, 64> models_;
+};
+
+class SourceState {
+ public:
+  explicit SourceState(std::uint16_t value) : last_(value) {}
+  static std::uint16_t value_in(const std::byte* record) { return load_little<std::uint16_t>(record + kPlace); }
+  [[nodiscard]] std::uint16_t value() const { return last_; }
+  void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
+    if (c.source_changed) last_ = static_cast<std::uint16_t>(code_.decode(code, last_, 0));
+    store_little(record + kPlace, last_);
+  }
+
+ private:
+  static constexpr std::size_t kPlace = 20;
+  std::uint16_t last_;
+  IntegerDecoder<16, 1> code_;
+};
+
+class TimeState {
+ public:
+  explicit TimeState(std::uint64_t value) : last_(value), code_(value) {}
+  static std::uint64_t value_in(const std::byte* record) { return load_little<std::uint64_t>(record + kPlace); }
+  [[nodiscard]] std::uint64_t value() const { return last_; }
+  void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
+    if (c.time_changed) last_ = code_.decode(code);
+    store_little(record + kPlace, last_);
+  }
+
+ private:
+  static constexpr std::size_t kPlace = 22;
+  std::uint64_t last_;
+  GpsTimeDecoder<false> code_;
+};
+
+/// A byte that some program put behind the standard values.
+class ExtraByteDecoder {
+ public:
+  std::uint8_t decode(ArithmeticDecoder& code, std::uint8_t last) {
+    return static_cast<std::uint8_t>(last + code.symbol(model_));
+  }
+
+ private:
+  SymbolModel<256> model_;
+};
+
+/// Values at a place that depends on the format. With channels apart (RecordLayout::channels_apart) as the other
+/// layers; else as encoders did before: all points are channel 0's but those where the channel changes, and a channel
+/// that comes up again takes the last value of the channel before, and gives it the new one.
+template <class Decoder, class T>
+class PlacedLayer {
+ public:
+  PlacedLayer(const std::byte* first, std::size_t place, bool channels_apart)
+      : channels_(channel_in(first), load_little<T>(first + place)), place_(place), channels_apart_(channels_apart) {}
+
+  void decode(ArithmeticDecoder& code, const PointContext* contexts, std::size_t count, std::byte* to,
+              std::size_t stride) {
+    to += place_;
+    for (std::size_t i = 0; i < count; ++i, to += stride) {
+      const PointContext& c = contexts[i];
+      const unsigned channel = channels_apart_ || c.channel_changed ? c.channel : 0U;
+      T& before = channels_.now().last;
+      const bool takes_before = !channels_apart_ && channels_.knows(channel);
+      State& state = channels_.go_to(channel);
+      T& last = takes_before ? before : state.last;
+      last = state.decoder.decode(code, last);
+      store_little(to, last);
+    }
+  }
+
+ private:
+  struct State {
+    explicit State(const T& value) : last(value) {}
+    [[nodiscard]] const T& value() const { return last; }
+    T last;
+    Decoder decoder;
+  };
+
+  Channels<State> channels_;
+  std::size_t place_;
+  bool channels_apart_;
+};
+
+using HeightLayer = ValueLayer<HeightState>;
+using ClassLayer = ValueLayer<ClassState>;
+using FlagsLayer = ValueLayer<FlagsState>;
+using IntensityLayer = ValueLayer<IntensityState>;
+using AngleLayer = ValueLayer<AngleState>;
+using UserLayer = ValueLayer<UserState>;
+using SourceLayer = ValueLayer<SourceState>;
+using TimeLayer = ValueLayer<TimeState>;
+using ColourLayer = PlacedLayer<ColourDecoder, Colour>;
+using InfraredLayer = PlacedLayer<InfraredDecoder, std::uint16_t>;
+using ExtraByteLayer = PlacedLayer<ExtraByteDecoder, std::uint8_t>;
+
+}  // namespace lamina::laz
