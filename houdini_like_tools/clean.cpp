@@ -39,7 +39,7 @@ void run_clean(const CleanOptions& o) {
                                           ": x and y are degrees of longitude and latitude, in which no distance can "
                                           "be measured; project them to metres first");
   const auto writer = open_points_writer(o.output, with_precision(columns_of(source->info()), o.precision),
-                                         {.count = {}, .tmp_dir = o.run.tmp_dir});
+                                         {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs});
   const CleanReport report = clean_points(*source, *writer, o.settings, o.bad, context);
   warn_of_bad_rows(report.rows, shown_name(o.input), context);
   const std::string said = describe(report.counts);

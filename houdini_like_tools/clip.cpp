@@ -40,7 +40,7 @@ void clip_points(const ClipOptions& o, const RunContext& context) {
   if (o.region.box && o.keep == Keep::inside) reading.select.box = {o.region.box->low, o.region.box->high};
   const auto source = open_point_input(o.input, reading, context);
   const auto writer = open_points_writer(o.output, with_precision(columns_of(source->info()), o.precision),
-                                         {.count = {}, .tmp_dir = o.run.tmp_dir});
+                                         {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs});
   const EditReport report = edit_points(
       *source, *writer, [&](SampleBatch& batch) { clip_rows(batch, o.region, o.keep); }, o.bad, context);
   warn_of_bad_rows(report, shown_name(o.input), context);

@@ -75,7 +75,7 @@ void convert_points(const ConvertOptions& o, const RunContext& context) {
                                              shown_name(o.input), to));
   const auto source = open_point_input(o.input, o.reading, context);
   const auto writer = open_points_writer(o.output, with_precision(columns_of(source->info()), o.precision),
-                                         {.count = {}, .tmp_dir = o.run.tmp_dir});
+                                         {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs});
   const EditReport report = edit_points(*source, *writer, {}, o.bad, context);
   warn_of_bad_rows(report, shown_name(o.input), context);
   writer->commit();
@@ -186,7 +186,7 @@ void add_convert(CLI::App& app) {
   auto* tool = app.add_subcommand("convert", "Write points or a mesh in another format");
   auto o = std::make_shared<ConvertOptions>();
   add_files(*tool, o->input, "Points (streamed), mesh or volume (.vdb: level set or points)", o->output,
-            "File to write: points (.ply .xyz .csv .pcd .las), mesh (.ply .obj .off .stl) or volume (.vdb)");
+            "File to write: points (.ply .xyz .csv .pcd .las .laz), mesh (.ply .obj .off .stl) or volume (.vdb)");
   tool->add_flag("--vertices", o->vertices, "Write a mesh's vertices as points")->group("Output");
   const std::string volume = "Volume";
   tool->add_option("--grid", o->grid, "Name of the grid to read, or of the points grid to write")

@@ -62,13 +62,8 @@ Json as_json(const std::vector<ColumnRange>& columns) {
 }
 
 Json as_json(const std::string& path, const PointsInfo& info) {
-  Json j{{"file", path},
-         {"content", "points"},
-         {"points", info.count},
-         {"bad_rows", info.bad_rows},
-         {"low", info.low},
-         {"high", info.high},
-         {"attributes", as_json(info.columns)}};
+  Json j{{"file", path},    {"content", "points"}, {"points", info.count}, {"bad_rows", info.bad_rows},
+         {"crs", info.crs}, {"low", info.low},     {"high", info.high},    {"attributes", as_json(info.columns)}};
   j["radii"] = Json::array();
   for (const HistogramBin& b : info.radii) j["radii"].push_back({{"low", b.low}, {"high", b.high}, {"count", b.count}});
   return j;
@@ -110,6 +105,7 @@ void print(const std::string& path, const PointsInfo& info) {
   fmt::print("{}: {} points\n", path, info.count);
   if (info.count == 0) return;
   print_box(info.low, info.high);
+  if (!info.crs.empty()) fmt::print("{:<12} {}\n", "crs", crs_name(info.crs));
   if (info.bad_rows > 0) fmt::print("{:<12} {} rows are not finite; the tools leave them out\n", "bad", info.bad_rows);
   print_columns(info.columns);
   if (info.normal_length_high > 0)

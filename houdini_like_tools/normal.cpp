@@ -61,7 +61,8 @@ void run_normal(const NormalOptions& o) {
   columns.normals = true;
   // An output that cannot be written is better known before the work.
   std::unique_ptr<PointsWriter> writer;
-  if (!o.output.empty()) writer = open_points_writer(o.output, columns, {.count = {}, .tmp_dir = o.run.tmp_dir});
+  if (!o.output.empty())
+    writer = open_points_writer(o.output, columns, {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs});
   std::optional<ResultFile> stats_file;
   if (!o.stats.empty()) stats_file.emplace(o.stats);
   NormalsReport report;
@@ -89,7 +90,8 @@ void add_normal(CLI::App& app) {
       ->type_name("");
   tool->add_option_function<std::string>(
           "-o,--output", [o](const std::string& name) { o->output = pipe_name(name); },
-          "Points to write: .ply .xyz .csv .pcd .las; - for PLY on standard output. Samples that lie on no surface "
+          "Points to write: .ply .xyz .csv .pcd .las .laz; - for PLY on standard output. Samples that lie on no "
+          "surface "
           "have the "
           "normal 0 0 0")
       ->type_name("FILE")

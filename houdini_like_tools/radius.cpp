@@ -37,7 +37,8 @@ void run_radius(const RadiusOptions& o) {
       throw Error(ExitCode::usage, fmt::format("{}: has an attribute '{}' already; choose another name with --name",
                                                shown_name(o.input), o.name));
   }
-  const auto writer = open_points_writer(o.output, columns, {.count = {}, .tmp_dir = o.run.tmp_dir});
+  const auto writer =
+      open_points_writer(o.output, columns, {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs});
   const PointRadiiReport report = write_point_radii(*source, *writer, o.settings, context);
   warn_of_bad_rows(report.rows, shown_name(o.input), context);
   writer->commit();

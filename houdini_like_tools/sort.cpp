@@ -54,7 +54,7 @@ void run_sort(const SortOptions& o) {
   const RunContext context = make_context(o.run, o.output);
   const auto source = open_point_input(o.inputs.front(), o.points, context);
   const auto writer = open_points_writer(o.output, with_precision(columns_of(source->info()), o.precision),
-                                         {.count = {}, .tmp_dir = o.run.tmp_dir});
+                                         {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs});
   const EditReport report = sort_points(*source, *writer, o.settings, context);
   warn_of_bad_rows(report, shown_name(o.inputs.front()), context);
   writer->commit();

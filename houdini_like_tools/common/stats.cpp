@@ -90,6 +90,7 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
   if (!settings.more_inputs.empty()) j["more_inputs"] = settings.more_inputs;
   j["output"] = settings.output;
   j["dry_run"] = settings.dry_run;
+  j["crs"] = s.crs;
   j["samples"] = s.samples_read;
   j["samples_used"] = s.plan.samples;
   j["vertices"] = s.vertices;

@@ -45,6 +45,7 @@ struct PointsInfo {
   std::uint64_t bad_rows = 0;           ///< a position or radius is not finite
   std::array<double, 3> low{}, high{};  ///< box of the finite coordinates
   bool double_precision = false;
+  std::string crs;                                       ///< PointSourceInfo::crs
   std::vector<ColumnRange> columns;                      ///< x y z, nx ny nz, radius, quality, attributes
   double normal_length_low = 0, normal_length_high = 0;  ///< 0 without normals
   std::vector<HistogramBin> radii;  ///< bins of half an octave, from the smallest to the largest radius above 0

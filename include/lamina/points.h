@@ -39,10 +39,14 @@ struct PointSourceInfo {
   bool double_precision = false;     ///< positions need more than float32
   bool geographic = false;           ///< x and y are degrees of longitude and latitude, in which no job can measure
   std::string coordinate_system;     ///< as the file has it, mostly well-known text; empty: none given
+  std::string crs;                   ///< coordinate reference system: well-known text or EPSG:NUMBER; empty: not told
   std::vector<ScanPart> scans;       ///< ascending, the first begins with row 0; empty: one scan, nothing known of it
   AttributeLayout attributes;        ///< every other scalar property, in the file's order and types
   std::vector<std::string> remarks;  ///< what the user should know, one line each: guesses, things left out
 };
+
+/// What people call a coordinate reference system (PointSourceInfo::crs): the name in the text, or the text itself.
+std::string crs_name(const std::string& crs);
 
 /// Rows of points. One thread at a time, unless info().random_access.
 class PointSource {

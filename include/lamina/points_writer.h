@@ -30,11 +30,12 @@ struct PointsWriterSettings {
   std::optional<std::uint64_t> count{};  ///< rows to come, where known: a pipe then gets rows as they are appended
   std::string tmp_dir{};                 ///< for rows that must wait; empty: next to the output (a pipe: the system's)
   std::vector<std::string> comments{};   ///< one line each, where the format has room for them
+  std::string crs{};                     ///< PointSourceInfo::crs, where the format has room for it
 };
 
-/// Takes rows in batches and holds less than a megabyte of them, whatever their number. The bytes written depend on the
-/// rows alone, not on how they were cut into batches or whether their number was known. One thread at a time. After an
-/// error the writer can only be destroyed.
+/// Takes rows in batches and holds less than a megabyte of them, of LAZ 400 000 rows, whatever their number. The bytes
+/// written depend on the rows alone, not on how they were cut into batches or whether their number was known. One
+/// thread at a time. After an error the writer can only be destroyed.
 ///
 /// The file appears under its name when commit() returns; without commit() nothing is left of it. Standard output,
 /// pipes and devices cannot be taken back: where the number of rows is known they get rows at once, else all rows at
@@ -65,12 +66,11 @@ class PointsWriter {
 };
 
 /// Opens a point file for writing. The ending of `path` chooses the format: .ply (binary little-endian), .xyz and .csv
-/// (text below a line of names), .pcd (binary), .las (1.4: rows wait until commit(), and coordinates are rounded to a
-/// power of ten of about 2e-10 of the extent). "-" is standard output; it, pipes and devices get PLY. docs/formats.md
-/// says what becomes of each column.
-/// Throws Error(usage) for another ending, naming the known ones, and when standard output is a terminal; Error(budget)
-/// naming path and reason when the file cannot be written; Error(internal) for column names that the format cannot
-/// hold.
+/// (text below a line of names), .pcd (binary), .las and .laz (1.4: rows wait until commit(), and coordinates are
+/// rounded to a power of ten of about 2e-10 of the extent). "-" is standard output; it, pipes and devices get PLY.
+/// docs/formats.md says what becomes of each column. Throws Error(usage) for another ending, naming the known ones, and
+/// when standard output is a terminal; Error(budget) naming path and reason when the file cannot be written;
+/// Error(internal) for column names that the format cannot hold.
 std::unique_ptr<PointsWriter> open_points_writer(const std::string& path, const PointColumns& columns,
                                                  const PointsWriterSettings& settings = {});
 

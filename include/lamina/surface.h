@@ -128,6 +128,7 @@ struct PruneCounts {
 struct SurfaceStats {
   SurfacePlan plan;
   std::uint64_t samples_read = 0;
+  std::string crs;  ///< coordinate reference system of the input (PointSourceInfo::crs)
   CleanCounts cleaned;
   PruneCounts pruned;
   std::array<double, 3> shift{};          ///< SurfaceSettings::local: add it to the coordinates written

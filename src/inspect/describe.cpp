@@ -89,6 +89,7 @@ PointsInfo describe_points(PointSource& source, const RunContext& run) {
   PointsInfo info;
   info.count = has.count;
   info.double_precision = has.double_precision;
+  info.crs = has.crs;
   const ScalarType position = has.double_precision ? ScalarType::float64 : ScalarType::float32;
   std::vector<RangeOf> ranges;
   for (const char* axis : {"x", "y", "z"}) ranges.emplace_back(axis, position);

@@ -18,6 +18,8 @@ struct Damaged : std::runtime_error {
 /// copy on the stack: the compiler keeps it in registers.
 class ArithmeticDecoder {
  public:
+  static constexpr bool kEncodes = false;
+
   ArithmeticDecoder() = default;
   /// Throws Damaged also for a beginning that no encoder writes.
   explicit ArithmeticDecoder(std::span<const std::byte> code) : next_(code.data()), end_(next_ + code.size()) {
@@ -26,7 +28,7 @@ class ArithmeticDecoder {
   }
 
   template <unsigned kMost>
-  unsigned symbol(SymbolModel<kMost>& model) {
+  unsigned symbol(SymbolModel<kMost>& model, unsigned = 0) {
     const std::uint32_t unit = length_ >> kSymbolBits;
     const unsigned symbol = model.at(value_ / unit);
     const std::uint32_t low = model.start(symbol) * unit;
@@ -38,7 +40,7 @@ class ArithmeticDecoder {
     return symbol;
   }
 
-  unsigned bit(BitModel& model) {
+  unsigned bit(BitModel& model, unsigned = 0) {
     const std::uint32_t split = model.zero() * (length_ >> kBitBits);
     const unsigned bit = value_ >= split ? 1 : 0;
     value_ -= bit != 0 ? split : 0;
@@ -49,7 +51,7 @@ class ArithmeticDecoder {
   }
 
   /// 1 to 32 bits, all values alike.
-  std::uint32_t bits(unsigned count) {
+  std::uint32_t bits(unsigned count, std::uint32_t = 0) {
     constexpr unsigned kAtOnce = 19;
     constexpr unsigned kLow = 16;
     if (count <= kAtOnce) return few_bits(count);

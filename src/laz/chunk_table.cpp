@@ -3,7 +3,7 @@
 #include <memory>
 
 #include "laz/arithmetic_decoder.h"
-#include "laz/integer_decoder.h"
+#include "laz/integer_codec.h"
 
 namespace lamina::laz {
 
@@ -12,11 +12,11 @@ std::vector<TabledChunk> decode_chunk_table(std::span<const std::byte> code, std
   std::vector<TabledChunk> table;
   if (chunks == 0) return table;
   ArithmeticDecoder decoder(code);
-  const auto integers = std::make_unique<IntegerDecoder<32, 2>>();
+  const auto integers = std::make_unique<IntegerCodec<32, 2>>();
   TabledChunk chunk;
   for (std::uint32_t i = 0; i < chunks; ++i) {
-    if (with_points) chunk.points = integers->decode(decoder, chunk.points, 0);
-    chunk.bytes = integers->decode(decoder, chunk.bytes, 1);
+    if (with_points) chunk.points = integers->code(decoder, chunk.points, 0);
+    chunk.bytes = integers->code(decoder, chunk.bytes, 1);
     // No entry without a byte in the file: the table cannot grow by its own word.
     if (chunk.bytes == 0 || chunk.bytes > most_bytes) throw Damaged("its chunk table goes beyond its chunks");
     most_bytes -= chunk.bytes;

@@ -38,12 +38,12 @@ void CoreLayer::decode_place(ArithmeticDecoder& code, State& state, PointContext
   const auto [n, r] = std::pair(state.last.n, state.last.r);
   const unsigned steps = kReturnContext[n][r] * 2U + (context.time_changed ? 1 : 0);
   const unsigned single = n == 1 ? 1 : 0;
-  const std::uint32_t x_step = state.x_code.decode(code, state.x_steps[steps].get(), single);
+  const std::uint32_t x_step = state.x_code.code(code, state.x_steps[steps].get(), single);
   state.last.x += x_step;
   state.x_steps[steps].add(x_step);
   const unsigned x_magnitude = state.x_code.magnitude();
   const std::uint32_t y_step =
-      state.y_code.decode(code, state.y_steps[steps].get(), single + magnitude_context(x_magnitude, 20));
+      state.y_code.code(code, state.y_steps[steps].get(), single + magnitude_context(x_magnitude, 20));
   state.last.y += y_step;
   state.y_steps[steps].add(y_step);
   const unsigned magnitude = (x_magnitude + state.y_code.magnitude()) / 2;

@@ -8,9 +8,9 @@
 
 #include "base/little_endian.h"
 #include "laz/arithmetic_decoder.h"
-#include "laz/colour_decoder.h"
+#include "laz/colour_codec.h"
 #include "laz/gps_time_decoder.h"
-#include "laz/integer_decoder.h"
+#include "laz/integer_codec.h"
 #include "laz/model_bank.h"
 #include "laz/point_chunk.h"
 #include "laz/return_contexts.h"
@@ -38,12 +38,12 @@ class CorePointDecoder {
     const unsigned context = kOldReturnContext[n][r];
     if ((changed & 16) != 0) {
       const unsigned model = context < 3 ? context : 3;
-      intensities_[context] = static_cast<std::uint16_t>(intensity_.decode(code, intensities_[context], model));
+      intensities_[context] = static_cast<std::uint16_t>(intensity_.code(code, intensities_[context], model));
     }
     if ((changed & 8) != 0) last_[kClass] = byte(code.symbol(classes_[at(kClass)]));
     if ((changed & 4) != 0) last_[kAngle] = byte(code.symbol(angles_[at(kReturns) >> 6 & 1]) + at(kAngle));
     if ((changed & 2) != 0) last_[kUser] = byte(code.symbol(users_[at(kUser)]));
-    if ((changed & 1) != 0) source_ = static_cast<std::uint16_t>(sources_.decode(code, source_, 0));
+    if ((changed & 1) != 0) source_ = static_cast<std::uint16_t>(sources_.code(code, source_, 0));
     decode_position(code, context, n, return_level(n, r));
     std::memcpy(to, last_.data(), kBytes);
     for (std::size_t k = 0; k < 3; ++k) store_little(to + 4 * k, position_[k]);
@@ -59,15 +59,14 @@ class CorePointDecoder {
 
   void decode_position(ArithmeticDecoder& code, unsigned context, unsigned n, unsigned level) {
     const unsigned single = n == 1 ? 1 : 0;
-    const std::uint32_t x_step = x_.decode(code, x_steps_[context].get(), single);
+    const std::uint32_t x_step = x_.code(code, x_steps_[context].get(), single);
     position_[0] += x_step;
     x_steps_[context].add(x_step);
-    const std::uint32_t y_step =
-        y_.decode(code, y_steps_[context].get(), single + magnitude_context(x_.magnitude(), 20));
+    const std::uint32_t y_step = y_.code(code, y_steps_[context].get(), single + magnitude_context(x_.magnitude(), 20));
     position_[1] += y_step;
     y_steps_[context].add(y_step);
     const unsigned magnitude = (x_.magnitude() + y_.magnitude()) / 2;
-    position_[2] = heights_[level] = z_.decode(code, heights_[level], single + magnitude_context(magnitude, 18));
+    position_[2] = heights_[level] = z_.code(code, heights_[level], single + magnitude_context(magnitude, 18));
   }
 
   std::array<std::byte, kBytes> last_{};
@@ -79,11 +78,11 @@ class CorePointDecoder {
   SymbolModel<64> changed_;
   ModelBank<256, 256> returns_, classes_, users_;
   std::array<SymbolModel<256>, 2> angles_;
-  IntegerDecoder<16, 4> intensity_;
-  IntegerDecoder<16, 1> sources_;
-  IntegerDecoder<32, 2> x_;
-  IntegerDecoder<32, 22> y_;
-  IntegerDecoder<32, 20> z_;
+  IntegerCodec<16, 4> intensity_;
+  IntegerCodec<16, 1> sources_;
+  IntegerCodec<32, 2> x_;
+  IntegerCodec<32, 22> y_;
+  IntegerCodec<32, 20> z_;
 };
 
 struct PointwiseDecoder {
@@ -107,7 +106,7 @@ struct PointwiseDecoder {
     to += CorePointDecoder::kBytes;
     if (time) to = store_little(to, time->decode(code));
     if (colour) {
-      last_colour = colour->decode(code, last_colour);
+      last_colour = colour->code(code, last_colour);
       to = store_little(to, last_colour);
     }
     for (std::size_t i = 0; i < extra.size(); ++i) {
@@ -118,7 +117,7 @@ struct PointwiseDecoder {
 
   CorePointDecoder core;
   std::optional<GpsTimeDecoder<true>> time;
-  std::optional<ColourDecoder> colour;
+  std::optional<ColourCodec> colour;
   Colour last_colour{};
   std::vector<SymbolModel<256>> extra;
   std::vector<std::byte> last_extra;

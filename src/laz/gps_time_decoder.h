@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "laz/arithmetic_decoder.h"
-#include "laz/integer_decoder.h"
+#include "laz/integer_codec.h"
 
 namespace lamina::laz {
 
@@ -42,7 +42,7 @@ class GpsTimeDecoder {
       --kind;
     }
     if (kind == 0) {
-      differences_[now_] = corrections_.decode(code, 0, 0);
+      differences_[now_] = corrections_.code(code, 0, 0);
       advance(differences_[now_]);
       extremes_[now_] = 0;
       return true;
@@ -62,25 +62,25 @@ class GpsTimeDecoder {
     if (kStays && symbol == kNew - 1) return true;
     const std::uint32_t last = differences_[now_];
     if (symbol == 1) {
-      advance(corrections_.decode(code, last, 1));
+      advance(corrections_.code(code, last, 1));
       extremes_[now_] = 0;
     } else if (symbol == 0) {
-      take_extreme(corrections_.decode(code, 0, 7));
+      take_extreme(corrections_.code(code, 0, 7));
     } else if (symbol < kMostTimes) {
-      advance(corrections_.decode(code, symbol * last, symbol < 10 ? 2 : 3));
+      advance(corrections_.code(code, symbol * last, symbol < 10 ? 2 : 3));
     } else if (symbol == kMostTimes) {
-      take_extreme(corrections_.decode(code, kMostTimes * last, 4));
+      take_extreme(corrections_.code(code, kMostTimes * last, 4));
     } else if (symbol < kMostTimes + kMostTimesBack) {
-      advance(corrections_.decode(code, (kMostTimes - symbol) * last, 5));
+      advance(corrections_.code(code, (kMostTimes - symbol) * last, 5));
     } else {
-      take_extreme(corrections_.decode(code, (0U - kMostTimesBack) * last, 6));
+      take_extreme(corrections_.code(code, (0U - kMostTimesBack) * last, 6));
     }
     return true;
   }
 
   bool begin_sequence(ArithmeticDecoder& code) {
     newest_ = (newest_ + 1) % kSequences;
-    const std::uint64_t high = corrections_.decode(code, static_cast<std::uint32_t>(times_[now_] >> 32), 8);
+    const std::uint64_t high = corrections_.code(code, static_cast<std::uint32_t>(times_[now_] >> 32), 8);
     times_[newest_] = high << 32 | code.bits(32);
     now_ = newest_;
     differences_[now_] = 0;
@@ -104,7 +104,7 @@ class GpsTimeDecoder {
   unsigned now_ = 0, newest_ = 0;
   SymbolModel<kMultiples> multiples_;
   SymbolModel<kNoDifference> no_difference_;
-  IntegerDecoder<32, 9> corrections_;
+  IntegerCodec<32, 9> corrections_;
 };
 
 }  // namespace lamina::laz

@@ -9,9 +9,9 @@
 
 #include "base/little_endian.h"
 #include "laz/arithmetic_decoder.h"
-#include "laz/colour_decoder.h"
+#include "laz/colour_codec.h"
 #include "laz/gps_time_decoder.h"
-#include "laz/integer_decoder.h"
+#include "laz/integer_codec.h"
 #include "laz/model_bank.h"
 #include "laz/return_contexts.h"
 #include "laz/running_median.h"
@@ -86,8 +86,8 @@ class CoreLayer {
     SymbolModel<3> channel_step;
     ModelBank<16, 16> numbers_of_returns, return_numbers;
     SymbolModel<13> return_step;
-    IntegerDecoder<32, 2> x_code;
-    IntegerDecoder<32, 22> y_code;
+    IntegerCodec<32, 2> x_code;
+    IntegerCodec<32, 22> y_code;
   };
 
   static Value value_in(const std::byte* record);
@@ -121,7 +121,7 @@ class HeightState {
   static std::uint32_t value_in(const std::byte* record) { return load_little<std::uint32_t>(record + kPlace); }
   [[nodiscard]] std::uint32_t value() const { return last_; }
   void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
-    last_ = by_level_[c.level] = code_.decode(code, by_level_[c.level], c.height_context);
+    last_ = by_level_[c.level] = code_.code(code, by_level_[c.level], c.height_context);
     store_little(record + kPlace, last_);
   }
 
@@ -129,7 +129,7 @@ class HeightState {
   static constexpr std::size_t kPlace = 8;
   std::uint32_t last_;
   std::array<std::uint32_t, 8> by_level_{};
-  IntegerDecoder<32, 20> code_;
+  IntegerCodec<32, 20> code_;
 };
 
 class ClassState {
@@ -175,7 +175,7 @@ class IntensityState {
   [[nodiscard]] std::uint16_t value() const { return last_; }
   void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
     std::uint16_t& at_place = by_place_[c.place * 2U + (c.time_changed ? 1 : 0)];
-    last_ = at_place = static_cast<std::uint16_t>(code_.decode(code, at_place, c.place));
+    last_ = at_place = static_cast<std::uint16_t>(code_.code(code, at_place, c.place));
     store_little(record + kPlace, last_);
   }
 
@@ -183,7 +183,7 @@ class IntensityState {
   static constexpr std::size_t kPlace = 12;
   std::uint16_t last_;
   std::array<std::uint16_t, 8> by_place_{};
-  IntegerDecoder<16, 4> code_;
+  IntegerCodec<16, 4> code_;
 };
 
 class AngleState {
@@ -192,14 +192,14 @@ class AngleState {
   static std::uint16_t value_in(const std::byte* record) { return load_little<std::uint16_t>(record + kPlace); }
   [[nodiscard]] std::uint16_t value() const { return last_; }
   void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
-    if (c.angle_changed) last_ = static_cast<std::uint16_t>(code_.decode(code, last_, c.time_changed ? 1 : 0));
+    if (c.angle_changed) last_ = static_cast<std::uint16_t>(code_.code(code, last_, c.time_changed ? 1 : 0));
     store_little(record + kPlace, last_);
   }
 
  private:
   static constexpr std::size_t kPlace = 18;
   std::uint16_t last_;
-  IntegerDecoder<16, 2> code_;
+  IntegerCodec<16, 2> code_;
 };
 
 class UserState {
@@ -224,14 +224,14 @@ class SourceState {
   static std::uint16_t value_in(const std::byte* record) { return load_little<std::uint16_t>(record + kPlace); }
   [[nodiscard]] std::uint16_t value() const { return last_; }
   void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
-    if (c.source_changed) last_ = static_cast<std::uint16_t>(code_.decode(code, last_, 0));
+    if (c.source_changed) last_ = static_cast<std::uint16_t>(code_.code(code, last_, 0));
     store_little(record + kPlace, last_);
   }
 
  private:
   static constexpr std::size_t kPlace = 20;
   std::uint16_t last_;
-  IntegerDecoder<16, 1> code_;
+  IntegerCodec<16, 1> code_;
 };
 
 class TimeState {
@@ -250,21 +250,10 @@ class TimeState {
   GpsTimeDecoder<false> code_;
 };
 
-/// A byte that some program put behind the standard values.
-class ExtraByteDecoder {
- public:
-  std::uint8_t decode(ArithmeticDecoder& code, std::uint8_t last) {
-    return static_cast<std::uint8_t>(last + code.symbol(model_));
-  }
-
- private:
-  SymbolModel<256> model_;
-};
-
 /// Values at a place that depends on the format. With channels apart (RecordLayout::channels_apart) as the other
 /// layers; else as encoders did before: all points are channel 0's but those where the channel changes, and a channel
 /// that comes up again takes the last value of the channel before, and gives it the new one.
-template <class Decoder, class T>
+template <class Codec, class T>
 class PlacedLayer {
  public:
   PlacedLayer(const std::byte* first, std::size_t place, bool channels_apart)
@@ -280,7 +269,7 @@ class PlacedLayer {
       const bool takes_before = !channels_apart_ && channels_.knows(channel);
       State& state = channels_.go_to(channel);
       T& last = takes_before ? before : state.last;
-      last = state.decoder.decode(code, last);
+      last = state.codec.code(code, last);
       store_little(to, last);
     }
   }
@@ -290,7 +279,7 @@ class PlacedLayer {
     explicit State(const T& value) : last(value) {}
     [[nodiscard]] const T& value() const { return last; }
     T last;
-    Decoder decoder;
+    Codec codec;
   };
 
   Channels<State> channels_;
@@ -306,8 +295,8 @@ using AngleLayer = ValueLayer<AngleState>;
 using UserLayer = ValueLayer<UserState>;
 using SourceLayer = ValueLayer<SourceState>;
 using TimeLayer = ValueLayer<TimeState>;
-using ColourLayer = PlacedLayer<ColourDecoder, Colour>;
-using InfraredLayer = PlacedLayer<InfraredDecoder, std::uint16_t>;
-using ExtraByteLayer = PlacedLayer<ExtraByteDecoder, std::uint8_t>;
+using ColourLayer = PlacedLayer<ColourCodec, Colour>;
+using InfraredLayer = PlacedLayer<InfraredCodec, std::uint16_t>;
+using ExtraByteLayer = PlacedLayer<ExtraByteCodec, std::uint8_t>;
 
 }  // namespace lamina::laz

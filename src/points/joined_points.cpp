@@ -105,6 +105,14 @@ class JoinedPoints final : public PointSource, public OrganisedPoints {
     info_.random_access = info_.random_access && from.random_access;
     info_.double_precision = info_.double_precision || from.double_precision;
     info_.geographic = info_.geographic || from.geographic;
+    if (info_.crs != from.crs && !from.crs.empty()) {
+      if (!info_.crs.empty()) {
+        info_.remarks.push_back(fmt::format("{} has the coordinate system {}, others have {}: taken as they are",
+                                            from.path, crs_name(from.crs), crs_name(info_.crs)));
+      } else {
+        info_.crs = from.crs;
+      }
+    }
     info_.remarks.insert(info_.remarks.end(), from.remarks.begin(), from.remarks.end());
     for (const AttributeSpec& spec : from.attributes) {
       const auto known = std::find_if(info_.attributes.begin(), info_.attributes.end(),

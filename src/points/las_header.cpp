@@ -13,6 +13,7 @@
 #include "base/little_endian.h"
 #include "lamina/error.h"
 #include "points/copc.h"
+#include "points/ply_header.h"
 #include "points/point_columns.h"
 
 namespace lamina {
@@ -21,6 +22,7 @@ namespace {
 struct LasVariableRecords {
   enum class Coordinates { unknown, projected, geographic };
   Coordinates coordinates = Coordinates::unknown;
+  std::string text, number;            ///< of the coordinate system: well-known text, EPSG:NUMBER
   std::vector<std::byte> extra_bytes;  ///< descriptors of 192 bytes each
   std::vector<std::byte> packing;      ///< LASzip's record
   std::vector<std::byte> octree;       ///< COPC's
@@ -49,6 +51,20 @@ Coordinates kind_by_keys(const std::vector<std::byte>& keys) {
   return Coordinates::unknown;
 }
 
+/// EPSG:NUMBER of the projected system, else of the geographic one; empty where the keys have none.
+std::string number_by_keys(const std::vector<std::byte>& keys) {
+  constexpr std::uint16_t kGeographic = 2048, kProjected = 3072, kOwn = 32767;
+  std::string found;
+  for (std::size_t at = 8; at + 8 <= keys.size(); at += 8) {
+    const auto key = load_little<std::uint16_t>(keys.data() + at);
+    const auto value = load_little<std::uint16_t>(keys.data() + at + 6);
+    const bool in_place = load_little<std::uint16_t>(keys.data() + at + 2) == 0;
+    if (!in_place || value == 0 || value == kOwn || (key != kGeographic && key != kProjected)) continue;
+    if (key == kProjected || found.empty()) found = fmt::format("EPSG:{}", value);
+  }
+  return found;
+}
+
 /// Well-known text, of either generation; a projected system contains a geographic one.
 Coordinates kind_by_text(std::string_view text) {
   for (const char* word : {"PROJCS", "PROJCRS", "PROJECTEDCRS", "GEOCCS", "LOCAL_CS", "ENGCRS", "CS[Cartesian"}) {
@@ -65,8 +81,13 @@ void take_record(std::string_view user, std::uint16_t id, std::vector<std::byte>
   constexpr std::uint16_t kText = 2112;
   constexpr std::uint16_t kExtraBytes = 4;
   Coordinates kind = Coordinates::unknown;
-  if (user == "LASF_Projection" && id == kKeys) kind = kind_by_keys(bytes);
-  if (user == "LASF_Projection" && id == kText) kind = kind_by_text(text_of(bytes.data(), bytes.size()));
+  if (user == "LASF_Projection" && id == kKeys) {
+    kind = kind_by_keys(bytes);
+    records.number = number_by_keys(bytes);
+  } else if (user == "LASF_Projection" && id == kText) {
+    records.text = text_of(bytes.data(), bytes.size());
+    kind = kind_by_text(records.text);
+  }
   if (kind != Coordinates::unknown) records.coordinates = kind;
   if (user == "LASF_Spec" && id == kExtraBytes) {
     records.extra_bytes = std::move(bytes);
@@ -287,6 +308,7 @@ LasHeader read_las_header(const InputFile& file) {
       (records.coordinates == LasVariableRecords::Coordinates::unknown && h.count > 0 && looks_geographic(h));
   if (h.packing) h.packing = parse_laz_packing(records.packing, h.point_format, h.record_bytes, file.name);
   if (h.packing) h.octree = std::move(records.octree);
+  h.crs = one_line(records.text.empty() ? records.number : records.text);
   h.extras = place_extras(records, las_record_bytes(h.point_format), h.record_bytes);
   return h;
 }

@@ -32,6 +32,7 @@ struct LasHeader {
   std::array<double, 3> scale{}, offset{};
   std::array<double, 3> low{}, high{};  ///< bounding box as the header gives it
   bool geographic = false;              ///< x and y are degrees
+  std::string crs;                      ///< PointSourceInfo::crs
   std::vector<LasExtra> extras;         ///< of one value each, of a type this library has
   std::optional<LazPacking> packing;    ///< of LAZ files
   std::vector<std::byte> octree;        ///< the record of a COPC file (copc.h)

@@ -171,6 +171,7 @@ class LasPoints final : public PointSource, public HiddenValues {
     info_.count = records_->count();
     info_.random_access = true;
     info_.geographic = header_.geographic;
+    info_.crs = header_.crs;
     for (std::size_t k = 0; k < 3; ++k) columns_.push_back({std::string(1, "xyz"[k]), ScalarType::int32, 4 * k});
     add_standard_values();
     add_extras();

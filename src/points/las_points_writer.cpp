@@ -1,213 +1,48 @@
-// Points to LAS 1.4.
-#include <fmt/format.h>
-
+// Points to LAS 1.4, and to LAZ.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <set>
 #include <span>
 
 #include "base/background_writer.h"
-#include "base/little_endian.h"
-#include "base/scalar_type.h"
 #include "base/spill_file.h"
-#include "lamina/error.h"
-#include "lamina/run.h"
 #include "points/binary_rows.h"
-#include "points/las_header.h"
+#include "points/las_layout.h"
+#include "points/laz_record_sink.h"
 #include "points/writers.h"
 
 namespace lamina {
 namespace {
 
-constexpr std::size_t kHeaderBytes = 375;
-constexpr std::size_t kRecordHeaderBytes = 54;
-constexpr std::size_t kDescriptorBytes = 192;
-constexpr std::size_t kName = 32;
 constexpr double kMostSteps = 2147483647;
-
-template <class T>
-void put_at(std::string& bytes, std::size_t at, T value) {
-  store_little(reinterpret_cast<std::byte*>(bytes.data()) + at, value);
-}
-
-/// The value in the given type, little-endian.
-std::byte* put_typed(std::byte* to, ScalarType type, double value) {
-  return with_scalar_type(type, [&](auto zero) { return store_little(to, to_scalar<decltype(zero)>(value)); });
-}
-
-/// The specification's number of a type.
-int extra_type(ScalarType type) {
-  switch (type) {
-    case ScalarType::uint8:
-      return 1;
-    case ScalarType::int8:
-      return 2;
-    case ScalarType::uint16:
-      return 3;
-    case ScalarType::int16:
-      return 4;
-    case ScalarType::uint32:
-      return 5;
-    case ScalarType::int32:
-      return 6;
-    case ScalarType::float32:
-      return 9;
-    case ScalarType::float64:
-      break;
-  }
-  return 10;
-}
-
-/// What brings a colour's type to 16 bits.
-double colour_scale(ScalarType type) {
-  return type == ScalarType::uint8 ? 257 : type == ScalarType::uint16 ? 1 : 65535;
-}
-
-struct LasExtraColumn {
-  std::string name;
-  ScalarType type = ScalarType::float32;
-};
-
-class LasLayout {
- public:
-  /// Throws Error(internal) for names that do not fit.
-  explicit LasLayout(const PointColumns& columns);
-
-  [[nodiscard]] bool has_colours() const { return colours_; }
-  [[nodiscard]] std::size_t record_bytes() const { return record_bytes_; }
-  /// Header and records before the points.
-  [[nodiscard]] std::string header(const std::array<LasAxis, 3>& axes, std::uint64_t count) const;
-  /// Rows [first, first + n) as point records.
-  void encode(const SampleBatch& batch, const std::array<LasAxis, 3>& axes, std::size_t first, std::size_t n,
-              std::byte* out) const;
-
- private:
-  PointColumns columns_;
-  bool colours_ = false;
-  std::array<std::size_t, 3> colour_{};  ///< attributes red, green, blue
-  int intensity_ = -1;                   ///< its attribute, -1: none
-  std::vector<std::size_t> others_;      ///< attributes that are extra bytes
-  std::vector<LasExtraColumn> extras_;   ///< all extra bytes
-  std::size_t record_bytes_ = 0;
-};
-
-LasLayout::LasLayout(const PointColumns& columns) : columns_(columns) {
-  const auto find = [&](const char* name) {
-    return std::find_if(columns.attributes.begin(), columns.attributes.end(),
-                        [&](const AttributeSpec& a) { return a.name == name; }) -
-           columns.attributes.begin();
-  };
-  constexpr std::array kColours{"red", "green", "blue"};
-  const auto size = static_cast<std::ptrdiff_t>(columns.attributes.size());
-  colours_ = std::all_of(kColours.begin(), kColours.end(), [&](const char* name) { return find(name) < size; });
-  for (std::size_t k = 0; k < 3 && colours_; ++k) colour_.at(k) = static_cast<std::size_t>(find(kColours.at(k)));
-  if (const auto at = find("intensity"); at < size) {
-    const ScalarType type = columns.attributes[static_cast<std::size_t>(at)].type;
-    if (type == ScalarType::uint8 || type == ScalarType::uint16) intensity_ = static_cast<int>(at);
-  }
-  if (columns.normals) {
-    for (const char* name : {"nx", "ny", "nz"}) extras_.push_back({name});
-  }
-  if (!columns.radius.empty()) extras_.push_back({columns.radius});
-  if (!columns.quality.empty()) extras_.push_back({columns.quality});
-  for (std::size_t a = 0; a < columns.attributes.size(); ++a) {
-    const bool colour = colours_ && std::find(colour_.begin(), colour_.end(), a) != colour_.end();
-    if (colour || intensity_ == static_cast<int>(a)) continue;
-    others_.push_back(a);
-    extras_.push_back({columns.attributes[a].name, columns.attributes[a].type});
-  }
-  std::set<std::string> seen{"x", "y", "z"};
-  record_bytes_ = las_record_bytes(colours_ ? 7 : 6);
-  for (const LasExtraColumn& extra : extras_) {
-    if (extra.name.empty() || extra.name.size() > kName || !seen.insert(extra.name).second) {
-      throw Error(ExitCode::internal,
-                  fmt::format("column '{}' cannot be written to a LAS: its name is empty, longer than {} "
-                              "characters, or there twice",
-                              extra.name, kName));
-    }
-    record_bytes_ += static_cast<std::size_t>(byte_size(extra.type));
-  }
-  if (extras_.size() > 300) throw Error(ExitCode::internal, "a LAS has room for 300 columns besides its own");
-}
-
-std::string LasLayout::header(const std::array<LasAxis, 3>& axes, std::uint64_t count) const {
-  const std::size_t records = extras_.empty() ? 0 : kRecordHeaderBytes + kDescriptorBytes * extras_.size();
-  std::string b(kHeaderBytes + records, '\0');
-  b.replace(0, 4, "LASF");
-  constexpr std::uint16_t kTextProjection = 16;  // these point formats name coordinate systems by text, if at all
-  put_at(b, 6, kTextProjection);
-  b[24] = 1;
-  b[25] = 4;
-  const std::string maker = fmt::format("lamina {}", version()).substr(0, kName);
-  b.replace(26, 10, "EXTRACTION");
-  b.replace(58, maker.size(), maker);
-  put_at(b, 94, static_cast<std::uint16_t>(kHeaderBytes));
-  put_at(b, 96, static_cast<std::uint32_t>(b.size()));
-  put_at(b, 100, static_cast<std::uint32_t>(records == 0 ? 0 : 1));
-  b[104] = colours_ ? 7 : 6;
-  put_at(b, 105, static_cast<std::uint16_t>(record_bytes_));
-  for (std::size_t k = 0; k < 3; ++k) {
-    put_at(b, 131 + 8 * k, axes[k].scale);
-    put_at(b, 155 + 8 * k, axes[k].offset);
-    put_at(b, 179 + 16 * k, axes[k].high);
-    put_at(b, 187 + 16 * k, axes[k].low);
-  }
-  put_at(b, 247, count);
-  put_at(b, 255, count);  // all of them first returns
-  if (records == 0) return b;
-  std::size_t at = kHeaderBytes;
-  b.replace(at + 2, 9, "LASF_Spec");
-  put_at(b, at + 18, std::uint16_t{4});
-  put_at(b, at + 20, static_cast<std::uint16_t>(kDescriptorBytes * extras_.size()));
-  at += kRecordHeaderBytes;
-  for (const LasExtraColumn& extra : extras_) {
-    b[at + 2] = static_cast<char>(extra_type(extra.type));
-    b.replace(at + 4, extra.name.size(), extra.name);
-    at += kDescriptorBytes;
-  }
-  return b;
-}
-
-void LasLayout::encode(const SampleBatch& batch, const std::array<LasAxis, 3>& axes, std::size_t first, std::size_t n,
-                       std::byte* out) const {
-  const auto attribute = [&](std::size_t a, std::size_t i) {
-    const bool exact = a < batch.exact.size() && !batch.exact[a].empty();
-    return exact ? batch.exact[a][i] : double{batch.attributes[a][i]};
-  };
-  const std::array<const std::vector<double>*, 3> position{&batch.x, &batch.y, &batch.z};
-  constexpr std::byte kOnlyReturn{0x11};
-  for (std::size_t i = first; i < first + n; ++i) {
-    std::byte* to = out + (i - first) * record_bytes_;
-    std::fill(to, to + record_bytes_, std::byte{});
-    for (std::size_t k = 0; k < 3; ++k) {
-      store_little(to + 4 * k, to_scalar<std::int32_t>(((*position[k])[i] - axes[k].offset) / axes[k].scale));
-    }
-    if (intensity_ >= 0)
-      store_little(to + 12, to_scalar<std::uint16_t>(attribute(static_cast<std::size_t>(intensity_), i)));
-    to[14] = kOnlyReturn;
-    for (std::size_t k = 0; k < 3 && colours_; ++k) {
-      const std::size_t a = colour_.at(k);
-      store_little(to + las_colour_offset(7) + 2 * k,
-                   to_scalar<std::uint16_t>(attribute(a, i) * colour_scale(columns_.attributes[a].type)));
-    }
-    to += las_record_bytes(colours_ ? 7 : 6);
-    if (columns_.normals) {
-      for (const float v : {batch.nx[i], batch.ny[i], batch.nz[i]}) to = store_little(to, v);
-    }
-    if (!columns_.radius.empty()) to = store_little(to, batch.radius[i]);
-    if (!columns_.quality.empty()) to = store_little(to, batch.quality[i]);
-    for (const std::size_t a : others_) to = put_typed(to, columns_.attributes[a].type, attribute(a, i));
-  }
-}
 
 PointColumns as_doubles(PointColumns columns) {
   columns.double_positions = true;
   return columns;
 }
 
+/// Records as they are.
+class PlainRecordSink {
+ public:
+  explicit PlainRecordSink(const LasLayout& layout) : records_(layout.record_bytes()) {}
+
+  [[nodiscard]] static std::string packing(const LasLayout&) { return {}; }
+  [[nodiscard]] static std::string lead() { return {}; }
+  void begin(std::uint64_t) {}
+  template <class Fill>
+  int append(int fd, std::size_t count, const Fill& fill) {
+    return records_.append(fd, count, fill);
+  }
+  int finish(int fd) { return records_.flush(fd); }
+  [[nodiscard]] std::uint64_t written() const { return records_.written(); }
+
+ private:
+  SoleRecordWriter records_;
+};
+
+template <class RecordSink>
 class LasPointsWriter final : public PointsWriter {
  public:
   LasPointsWriter(const std::string& path, const PointColumns& columns, const PointsWriterSettings& settings)
@@ -217,7 +52,9 @@ class LasPointsWriter final : public PointsWriter {
         codec_(as_doubles(columns)),
         rows_out_(path, settings, false),
         waiting_(settings.tmp_dir.empty() ? system_tmp_dir() : settings.tmp_dir),
-        block_(kBlock * codec_.row_bytes()) {}
+        block_(kBlock * codec_.row_bytes()) {
+    layout_.name_system(settings.crs);
+  }
 
   void append(const SampleBatch& batch) override {
     rows_out_.require_open();
@@ -242,15 +79,17 @@ class LasPointsWriter final : public PointsWriter {
     waiting_.check(disk_.drain());
     std::array<LasAxis, 3> axes{};
     for (std::size_t k = 0; k < 3; ++k) axes[k] = rows_ == 0 ? LasAxis{} : choose_steps(low_[k], high_[k]);
-    const std::string header = layout_.header(axes, rows_);
-    rows_out_.check(write_all(rows_out_.fd(), header.data(), header.size()));
-    SoleRecordWriter records(layout_.record_bytes());
+    RecordSink records(layout_);
+    const std::string header = layout_.header(axes, rows_, RecordSink::packing(layout_));
+    const std::string start = header + records.lead();
+    rows_out_.check(write_all(rows_out_.fd(), start.data(), start.size()));
+    records.begin(start.size());
     write_rows(axes, records);
-    rows_out_.publish(header, header.size() + records.written());
+    rows_out_.publish(header + records.lead(), start.size() + records.written());
   }
 
  private:
-  void write_rows(const std::array<LasAxis, 3>& axes, SoleRecordWriter& records) const {
+  void write_rows(const std::array<LasAxis, 3>& axes, RecordSink& records) const {
     SampleBatch batch;
     waiting_.read_through(block_.size(), [&](std::span<const std::byte> rows) {
       const std::size_t n = rows.size() / codec_.row_bytes();
@@ -259,7 +98,7 @@ class LasPointsWriter final : public PointsWriter {
         layout_.encode(batch, axes, at, count, to);
       }));
     });
-    rows_out_.check(records.flush(rows_out_.fd()));
+    rows_out_.check(records.finish(rows_out_.fd()));
   }
 
   static constexpr std::size_t kBlock = 4096;  ///< rows encoded or decoded at once
@@ -290,7 +129,12 @@ LasAxis choose_steps(double low, double high) {
 
 std::unique_ptr<PointsWriter> open_las_points_writer(const std::string& path, const PointColumns& columns,
                                                      const PointsWriterSettings& settings) {
-  return std::make_unique<LasPointsWriter>(path, columns, settings);
+  return std::make_unique<LasPointsWriter<PlainRecordSink>>(path, columns, settings);
+}
+
+std::unique_ptr<PointsWriter> open_laz_points_writer(const std::string& path, const PointColumns& columns,
+                                                     const PointsWriterSettings& settings) {
+  return std::make_unique<LasPointsWriter<LazRecordSink>>(path, columns, settings);
 }
 
 }  // namespace lamina

@@ -112,4 +112,33 @@ LazPacking parse_laz_packing(std::span<const std::byte> record, int point_format
   return packing;
 }
 
+std::string laz_packing_record(int point_format, std::size_t record_bytes, std::uint32_t chunk_points) {
+  const std::vector<LazItem> items = items_of(point_format, record_bytes - standard_bytes(point_format));
+  constexpr std::uint16_t kLayered = 3, kArithmetic = 0;
+  constexpr std::uint16_t kVersion = 3;  // of items; any program of the last years reads it
+  std::string data;
+  append_little(data, kLayered);
+  append_little(data, kArithmetic);
+  data += {3, 4};  // LASzip's version that this is like
+  append_little(data, std::uint16_t{3});
+  append_little(data, std::uint32_t{0});  // options
+  append_little(data, chunk_points);
+  append_little(data, std::int64_t{-1});  // no special records behind the points
+  append_little(data, std::int64_t{-1});
+  append_little(data, static_cast<std::uint16_t>(items.size()));
+  for (const LazItem& item : items) {
+    append_little(data, item.kind);
+    append_little(data, item.size);
+    append_little(data, kVersion);
+  }
+  std::string record(2, '\0');
+  std::string user = kLazUser;
+  user.resize(16);
+  record += user;
+  append_little(record, kLazRecord);
+  append_little(record, static_cast<std::uint16_t>(data.size()));
+  record += std::string(32, '\0');
+  return record + data;
+}
+
 }  // namespace lamina

@@ -27,4 +27,7 @@ inline constexpr std::uint16_t kLazRecord = 22204;
 LazPacking parse_laz_packing(std::span<const std::byte> record, int point_format, std::size_t record_bytes,
                              const std::string& name);
 
+/// The record, with its own header, for points of format 6 or 7 in chunks of `chunk_points`.
+std::string laz_packing_record(int point_format, std::size_t record_bytes, std::uint32_t chunk_points);
+
 }  // namespace lamina

@@ -180,6 +180,7 @@ PlyRows understand_vertices(const PlyHeader& header, const std::string& path, co
   require_scalars(vertices, name);
   rows.info.path = path;
   rows.info.count = vertices.count;
+  rows.info.crs = header.crs;
   for (const PlyProperty& property : vertices.properties) {
     rows.columns.push_back({property.name, property.type, rows.stride});
     rows.stride += static_cast<std::size_t>(byte_size(property.type));

@@ -51,7 +51,9 @@ class PlyHeaderParser {
       } else if (keyword == "end_header") {
         if (!has_format_) fail("the header ends without a format line");
         return std::move(header_);
-      } else if (!keyword.empty() && keyword != "comment" && keyword != "obj_info") {
+      } else if (keyword == "comment") {
+        if (word() == "crs") header_.crs = trimmed(line_);
+      } else if (!keyword.empty() && keyword != "obj_info") {
         fail(fmt::format("{} is no keyword of a PLY header", quoted_word(keyword)));
       }
     }

@@ -35,6 +35,7 @@ struct PlyHeader {
   std::vector<PlyElement> elements;
   std::uint64_t bytes = 0;  ///< where the data begins
   std::uint64_t lines = 0;  ///< lines of the header
+  std::string crs;          ///< of a comment `crs ...` (PointSourceInfo::crs)
   char line_end = '\n';     ///< '\n' (also for CRLF) or '\r'
 };
 

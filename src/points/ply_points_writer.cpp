@@ -37,6 +37,7 @@ class PlyPointsWriter final : public PointsWriter {
         codec_(columns),
         rows_out_(path, settings, settings.count.has_value()),
         writer_(codec_.row_bytes()) {
+    if (!settings_.crs.empty()) settings_.comments.push_back("crs " + settings_.crs);
     const std::string header = ply_points_header(columns_, settings_.comments, settings_.count.value_or(0));
     rows_out_.check(write_all(rows_out_.fd(), header.data(), header.size()));
   }

@@ -32,6 +32,7 @@ class PosedPoints final : public PointSource, public OrganisedPoints {
       : source_(std::move(source)), transform_(pose, source_->info().path) {
     info_ = source_->info();
     info_.double_precision = true;
+    info_.crs.clear();  // it is the system of the source's own coordinates
     if (info_.scans.empty()) info_.scans.resize(1);
     for (ScanPart& scan : info_.scans) {
       if (scan.scanner == ScanPart::Scanner::unknown) {

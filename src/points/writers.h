@@ -69,6 +69,10 @@ LasAxis choose_steps(double low, double high);
 std::unique_ptr<PointsWriter> open_las_points_writer(const std::string& path, const PointColumns& columns,
                                                      const PointsWriterSettings& settings);
 
+/// The same compressed: LAZ in chunks of 50 000 points.
+std::unique_ptr<PointsWriter> open_laz_points_writer(const std::string& path, const PointColumns& columns,
+                                                     const PointsWriterSettings& settings);
+
 /// Text with blanks (XYZ) or commas (CSV), below a line of names. Numbers have as many digits as their type needs to
 /// come back the same. As open_points_writer() describes.
 std::unique_ptr<PointsWriter> open_xyz_points_writer(const std::string& path, const PointColumns& columns,

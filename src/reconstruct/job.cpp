@@ -125,6 +125,7 @@ double expected_seconds(const ReconstructionPlan& plan, const PointSourceInfo& s
 void note_input(const StoredCloud& cloud, SurfaceStats& stats) {
   const Census& census = cloud.ingested.census;
   stats.samples_read = cloud.info.count;
+  stats.crs = cloud.info.crs;
   stats.replaced_attributes = census.unusable_attributes;
   for (int k = 1; k < kDefects; ++k) {
     if (census.rejected[k] > 0)

@@ -37,11 +37,8 @@ Eigen::Vector3d vector_from(const Json& j) {
 Json to_json(const PointSourceInfo& info) {
   Json attributes = Json::array();
   for (const AttributeSpec& a : info.attributes) attributes.push_back({{"name", a.name}, {"type", ply_name(a.type)}});
-  return {{"path", info.path},
-          {"rows", info.count},
-          {"radius", info.has_radius},
-          {"quality", info.has_quality},
-          {"attributes", attributes}};
+  return {{"path", info.path},           {"rows", info.count}, {"radius", info.has_radius},
+          {"quality", info.has_quality}, {"crs", info.crs},    {"attributes", attributes}};
 }
 
 PointSourceInfo info_from(const Json& j) {
@@ -51,6 +48,7 @@ PointSourceInfo info_from(const Json& j) {
   info.has_normals = true;
   info.has_radius = j.at("radius").get<bool>();
   info.has_quality = j.at("quality").get<bool>();
+  info.crs = j.value("crs", std::string());  // older stores have none
   for (const Json& a : j.at("attributes")) {
     const auto type = ply_type(a.at("type").get<std::string>());
     if (!type) throw std::invalid_argument("type");
@@ -96,6 +94,7 @@ Json reading(const SurfaceSettings& settings, bool has_radius) {
           {"bad_samples", settings.bad_samples == BadSamples::drop ? "drop" : "refuse"},
           {"normals", normals_words(settings)},
           {"cleaning", cleaning_words(settings.clean)},
+          {"select", to_string(settings.select)},
           {"particlescale", has_radius ? settings.radius_scale : 1.0}};
 }
 
@@ -103,6 +102,7 @@ bool is_asked_for(const std::string& key, const SurfaceSettings& settings) {
   if (key == "bad_samples") return false;
   if (key == "normals") return settings.normals && settings.normals != NormalsChoice::file;
   if (key == "cleaning") return !cleaning_words(settings.clean).empty();
+  if (key == "select") return to_string(settings.select) != to_string(PointSelection{});
   return key != "frame" || settings.frame || settings.volume.wanted();
 }
 
@@ -120,6 +120,12 @@ void require_same_reading(const Json& stored, const SurfaceSettings& settings, b
                   fmt::format("{}: was stored {}, not with {}; give 'lamina sort --store' these "
                               "options for another store, or leave them away",
                               directory, words.empty() ? "uncleaned" : "with " + words, value.get<std::string>()));
+    }
+    if (key == "select") {
+      throw Error(ExitCode::usage,
+                  fmt::format("{}: holds other points than are asked for; give 'lamina sort --store' the "
+                              "options that select them, or leave them away",
+                              directory));
     }
     throw Error(ExitCode::usage,
                 fmt::format("{}: was stored with --{} {}, not {}; make another store, or leave the option away",

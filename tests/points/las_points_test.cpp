@@ -225,6 +225,10 @@ TEST_F(LasPoints, DegreesAreTold) {
     return k;
   };
   EXPECT_FALSE(geographic_with("LASF_Projection", 34735, keys(1)));
+  std::string numbered = keys(1);
+  for (const int v : {3072, 0, 1, 32616}) put(numbered, static_cast<std::uint16_t>(v));
+  EXPECT_FALSE(geographic_with("LASF_Projection", 34735, numbered));
+  EXPECT_EQ(open(file)->info().crs, "EPSG:32616");
   EXPECT_TRUE(geographic_with("LASF_Projection", 34735, keys(2)));
   EXPECT_FALSE(geographic_with("LASF_Projection", 34735, keys(3)));  // geocentric metres
   EXPECT_FALSE(geographic_with("somebody", 34735, keys(2)));

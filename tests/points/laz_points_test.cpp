@@ -13,6 +13,7 @@
 #include <random>
 
 #include "base/temporary_folder.h"
+#include "lamina/points_writer.h"
 #include "points/las_records.h"
 #include "points/point_rows.h"
 #include "points/readers.h"
@@ -223,6 +224,51 @@ TEST_F(LazPoints, FewerPointsThanThereAre) {
   EXPECT_THAT(fewer.records->remarks(), ElementsAre(HasSubstr("the header counts 100 points")));
   EXPECT_GT(count, 100U);
   EXPECT_TRUE(fewer.all() == Opened(las_of("f7_x3")).read(0, 100));
+}
+
+TEST_F(LazPoints, WrittenAsTheRecordsOfLas) {
+  PointColumns columns{.double_positions = true, .normals = true, .radius = "radius"};
+  columns.attributes = {{"intensity", ScalarType::uint16}, {"label", ScalarType::int32}};
+  PointColumns coloured = columns;
+  for (const char* name : {"red", "green", "blue"}) coloured.attributes.push_back({name, ScalarType::uint8});
+  const std::string crs = "PROJCS[\"somewhere / zone 3\",GEOGCS[\"globe\"]]";
+  for (const PointColumns& c : {PointColumns{.double_positions = true}, columns, coloured}) {
+    for (const std::size_t n : {0U, 1U, 2U, 50'000U, 50'001U, 130'007U}) {
+      SCOPED_TRACE(fmt::format("{} rows, {} attributes", n, c.attributes.size()));
+      const SampleBatch rows = test::random_rows(c, n, 3);
+      const std::string las = folder_ / "a.las";
+      const std::string laz = folder_ / "a.laz";
+      for (const std::string& path : {las, laz}) {
+        const auto writer = open_points_writer(path, c, {.crs = crs});
+        writer->append(rows);
+        writer->commit();
+      }
+      const Opened written(laz);
+      EXPECT_EQ(written.header.point_format, c.attributes.size() > 2 ? 7 : 6);
+      EXPECT_EQ(written.header.crs, crs);
+      EXPECT_THAT(written.records->remarks(), IsEmpty());
+      EXPECT_EQ(written.records->count(), n);
+      EXPECT_TRUE(written.all() == Opened(las).all());
+    }
+  }
+}
+
+TEST_F(LazPoints, TheCoordinateSystemGoesAlong) {
+  const std::string crs = "COMPD_CS[\"town grid + heights\",PROJCS[\"town grid\"]]";
+  const std::string laz = folder_ / "a.laz";
+  const SampleBatch rows = test::random_rows({.double_positions = true}, 10, 3);
+  for (const char* name : {"a.laz", "a.las", "a.ply"}) {
+    const std::string path = folder_ / name;
+    const auto writer = open_points_writer(path, {.double_positions = true}, {.crs = crs});
+    writer->append(rows);
+    writer->commit();
+    const auto source = open_points(path);
+    EXPECT_EQ(source->info().crs, crs);
+    EXPECT_EQ(crs_name(source->info().crs), "town grid + heights");
+  }
+  EXPECT_EQ(crs_name("EPSG:32616"), "EPSG:32616");
+  const auto joined = open_points({laz, las_of("f0"), folder_ / "a.ply"}, PointSettings{});
+  EXPECT_EQ(joined->info().crs, crs);
 }
 
 TEST_F(LazPoints, PairsOfOtherPrograms) {

@@ -1,0 +1,185 @@
+#include "points/las_layout.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "base/little_endian.h"
+#include "base/scalar_type.h"
+#include "lamina/error.h"
+#include "lamina/run.h"
+#include "points/las_header.h"
+
+namespace lamina {
+namespace {
+
+constexpr std::size_t kHeaderBytes = 375;
+constexpr std::size_t kRecordHeaderBytes = 54;
+constexpr std::size_t kDescriptorBytes = 192;
+constexpr std::size_t kName = 32;
+
+template <class T>
+void put_at(std::string& bytes, std::size_t at, T value) {
+  store_little(reinterpret_cast<std::byte*>(bytes.data()) + at, value);
+}
+
+/// The value in the given type, little-endian.
+std::byte* put_typed(std::byte* to, ScalarType type, double value) {
+  return with_scalar_type(type, [&](auto zero) { return store_little(to, to_scalar<decltype(zero)>(value)); });
+}
+
+/// The specification's number of a type.
+int extra_type(ScalarType type) {
+  switch (type) {
+    case ScalarType::uint8:
+      return 1;
+    case ScalarType::int8:
+      return 2;
+    case ScalarType::uint16:
+      return 3;
+    case ScalarType::int16:
+      return 4;
+    case ScalarType::uint32:
+      return 5;
+    case ScalarType::int32:
+      return 6;
+    case ScalarType::float32:
+      return 9;
+    case ScalarType::float64:
+      break;
+  }
+  return 10;
+}
+
+/// What brings a colour's type to 16 bits.
+double colour_scale(ScalarType type) {
+  return type == ScalarType::uint8 ? 257 : type == ScalarType::uint16 ? 1 : 65535;
+}
+
+}  // namespace
+
+LasLayout::LasLayout(const PointColumns& columns) : columns_(columns) {
+  const auto find = [&](const char* name) {
+    return std::find_if(columns.attributes.begin(), columns.attributes.end(),
+                        [&](const AttributeSpec& a) { return a.name == name; }) -
+           columns.attributes.begin();
+  };
+  constexpr std::array kColours{"red", "green", "blue"};
+  const auto size = static_cast<std::ptrdiff_t>(columns.attributes.size());
+  colours_ = std::all_of(kColours.begin(), kColours.end(), [&](const char* name) { return find(name) < size; });
+  for (std::size_t k = 0; k < 3 && colours_; ++k) colour_.at(k) = static_cast<std::size_t>(find(kColours.at(k)));
+  if (const auto at = find("intensity"); at < size) {
+    const ScalarType type = columns.attributes[static_cast<std::size_t>(at)].type;
+    if (type == ScalarType::uint8 || type == ScalarType::uint16) intensity_ = static_cast<int>(at);
+  }
+  if (columns.normals) {
+    for (const char* name : {"nx", "ny", "nz"}) extras_.push_back({name});
+  }
+  if (!columns.radius.empty()) extras_.push_back({columns.radius});
+  if (!columns.quality.empty()) extras_.push_back({columns.quality});
+  for (std::size_t a = 0; a < columns.attributes.size(); ++a) {
+    const bool colour = colours_ && std::find(colour_.begin(), colour_.end(), a) != colour_.end();
+    if (colour || intensity_ == static_cast<int>(a)) continue;
+    others_.push_back(a);
+    extras_.push_back({columns.attributes[a].name, columns.attributes[a].type});
+  }
+  std::set<std::string> seen{"x", "y", "z"};
+  record_bytes_ = las_record_bytes(point_format());
+  for (const LasExtraColumn& extra : extras_) {
+    if (extra.name.empty() || extra.name.size() > kName || !seen.insert(extra.name).second) {
+      throw Error(ExitCode::internal,
+                  fmt::format("column '{}' cannot be written to a LAS: its name is empty, longer than {} "
+                              "characters, or there twice",
+                              extra.name, kName));
+    }
+    record_bytes_ += static_cast<std::size_t>(byte_size(extra.type));
+  }
+  if (extras_.size() > 300) throw Error(ExitCode::internal, "a LAS has room for 300 columns besides its own");
+}
+
+std::string LasLayout::header(const std::array<LasAxis, 3>& axes, std::uint64_t count,
+                              const std::string& packing) const {
+  const std::size_t records = extras_.empty() ? 0 : kRecordHeaderBytes + kDescriptorBytes * extras_.size();
+  std::string b(kHeaderBytes + records, '\0');
+  b.replace(0, 4, "LASF");
+  constexpr std::uint16_t kTextProjection = 16;  // these point formats name coordinate systems by text, if at all
+  put_at(b, 6, kTextProjection);
+  b[24] = 1;
+  b[25] = 4;
+  const std::string maker = fmt::format("lamina {}", version()).substr(0, kName);
+  b.replace(26, 10, "EXTRACTION");
+  b.replace(58, maker.size(), maker);
+  put_at(b, 94, static_cast<std::uint16_t>(kHeaderBytes));
+  put_at(b, 96, static_cast<std::uint32_t>(b.size() + system_.size() + packing.size()));
+  put_at(b, 100,
+         static_cast<std::uint32_t>((records == 0 ? 0 : 1) + (system_.empty() ? 0 : 1) + (packing.empty() ? 0 : 1)));
+  constexpr int kCompressed = 0x80;
+  b[104] = static_cast<char>(point_format() | (packing.empty() ? 0 : kCompressed));
+  put_at(b, 105, static_cast<std::uint16_t>(record_bytes_));
+  for (std::size_t k = 0; k < 3; ++k) {
+    put_at(b, 131 + 8 * k, axes[k].scale);
+    put_at(b, 155 + 8 * k, axes[k].offset);
+    put_at(b, 179 + 16 * k, axes[k].high);
+    put_at(b, 187 + 16 * k, axes[k].low);
+  }
+  put_at(b, 247, count);
+  put_at(b, 255, count);  // all of them first returns
+  if (records == 0) return b + system_ + packing;
+  std::size_t at = kHeaderBytes;
+  b.replace(at + 2, 9, "LASF_Spec");
+  put_at(b, at + 18, std::uint16_t{4});
+  put_at(b, at + 20, static_cast<std::uint16_t>(kDescriptorBytes * extras_.size()));
+  at += kRecordHeaderBytes;
+  for (const LasExtraColumn& extra : extras_) {
+    b[at + 2] = static_cast<char>(extra_type(extra.type));
+    b.replace(at + 4, extra.name.size(), extra.name);
+    at += kDescriptorBytes;
+  }
+  return b + system_ + packing;
+}
+
+void LasLayout::encode(const SampleBatch& batch, const std::array<LasAxis, 3>& axes, std::size_t first, std::size_t n,
+                       std::byte* out) const {
+  const auto attribute = [&](std::size_t a, std::size_t i) {
+    const bool exact = a < batch.exact.size() && !batch.exact[a].empty();
+    return exact ? batch.exact[a][i] : double{batch.attributes[a][i]};
+  };
+  const std::array<const std::vector<double>*, 3> position{&batch.x, &batch.y, &batch.z};
+  constexpr std::byte kOnlyReturn{0x11};
+  for (std::size_t i = first; i < first + n; ++i) {
+    std::byte* to = out + (i - first) * record_bytes_;
+    std::fill(to, to + record_bytes_, std::byte{});
+    for (std::size_t k = 0; k < 3; ++k) {
+      store_little(to + 4 * k, to_scalar<std::int32_t>(((*position[k])[i] - axes[k].offset) / axes[k].scale));
+    }
+    if (intensity_ >= 0)
+      store_little(to + 12, to_scalar<std::uint16_t>(attribute(static_cast<std::size_t>(intensity_), i)));
+    to[14] = kOnlyReturn;
+    for (std::size_t k = 0; k < 3 && colours_; ++k) {
+      const std::size_t a = colour_.at(k);
+      store_little(to + las_colour_offset(7) + 2 * k,
+                   to_scalar<std::uint16_t>(attribute(a, i) * colour_scale(columns_.attributes[a].type)));
+    }
+    to += las_record_bytes(point_format());
+    if (columns_.normals) {
+      for (const float v : {batch.nx[i], batch.ny[i], batch.nz[i]}) to = store_little(to, v);
+    }
+    if (!columns_.radius.empty()) to = store_little(to, batch.radius[i]);
+    if (!columns_.quality.empty()) to = store_little(to, batch.quality[i]);
+    for (const std::size_t a : others_) to = put_typed(to, columns_.attributes[a].type, attribute(a, i));
+  }
+}
+
+void LasLayout::name_system(const std::string& crs) {
+  constexpr std::size_t kMostBytes = 65535;
+  if (crs.find('[') == std::string::npos || crs.size() + 1 > kMostBytes) return;
+  system_.assign(kRecordHeaderBytes, '\0');
+  system_.replace(2, 15, "LASF_Projection");
+  put_at(system_, 18, std::uint16_t{2112});
+  put_at(system_, 20, static_cast<std::uint16_t>(crs.size() + 1));
+  system_ += crs;
+  system_ += '\0';
+}
+
+}  // namespace lamina

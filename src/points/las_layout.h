@@ -1,0 +1,47 @@
+// Points as records of LAS 1.4: which column stands where, and the header before them.
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "lamina/points_writer.h"
+#include "points/writers.h"
+
+namespace lamina {
+
+struct LasExtraColumn {
+  std::string name;
+  ScalarType type = ScalarType::float32;
+};
+
+class LasLayout {
+ public:
+  /// Throws Error(internal) for names that do not fit.
+  explicit LasLayout(const PointColumns& columns);
+
+  [[nodiscard]] bool has_colours() const { return colours_; }
+  [[nodiscard]] int point_format() const { return colours_ ? 7 : 6; }
+  [[nodiscard]] std::size_t record_bytes() const { return record_bytes_; }
+  /// Header and records before the points; `packing` is LAZ's record, empty for LAS.
+  [[nodiscard]] std::string header(const std::array<LasAxis, 3>& axes, std::uint64_t count,
+                                   const std::string& packing) const;
+  /// The coordinate system to name in the header: well-known text. Anything else has no place there.
+  void name_system(const std::string& crs);
+  /// Rows [first, first + n) as point records.
+  void encode(const SampleBatch& batch, const std::array<LasAxis, 3>& axes, std::size_t first, std::size_t n,
+              std::byte* out) const;
+
+ private:
+  PointColumns columns_;
+  bool colours_ = false;
+  std::array<std::size_t, 3> colour_{};  ///< attributes red, green, blue
+  int intensity_ = -1;                   ///< its attribute, -1: none
+  std::vector<std::size_t> others_;      ///< attributes that are extra bytes
+  std::vector<LasExtraColumn> extras_;   ///< all extra bytes
+  std::size_t record_bytes_ = 0;
+  std::string system_;  ///< the record of the coordinate system
+};
+
+}  // namespace lamina
