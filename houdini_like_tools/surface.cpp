@@ -79,6 +79,7 @@ void choose_what_is_not_given(const SurfaceOptions& o, SurfaceSettings& settings
     if (!given("--normals")) settings.normals = NormalsChoice::file;
     if (!given("--blend")) settings.blend = SurfaceSettings{}.blend;
     if (!given("--prune")) settings.prune_triangles = 0;
+    if (!given("--close-holes")) settings.close_holes = SurfaceSettings{}.close_holes;
     return;
   }
   if (is_store(o.inputs.front())) return;

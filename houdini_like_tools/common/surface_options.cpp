@@ -65,19 +65,25 @@ void add_fit_options(CLI::App& tool, SurfaceSettings& s) {
 }
 
 void add_hole_options(CLI::App& tool, SurfaceSettings& settings, const std::string& group) {
-  tool.add_option("--close-holes", settings.close_holes,
-                  "Close holes with a rim shorter than so many influence radii R where the surface around shows how it "
-                  "continues; 0: none. Grids keep their holes")
-      ->type_name("RADII")
-      ->capture_default_str()
+  settings.close_holes = std::nullopt;
+  add_number_or_auto(tool, "--close-holes", "auto",
+                     "Close holes with a rim shorter than so many influence radii R where the surface around shows how "
+                     "it continues; 0: none; auto: 300, or 8 with --raw. Grids keep their holes",
+                     [&settings](const std::optional<double>& radii) { settings.close_holes = radii; })
+      ->option_text("RADII|auto [auto]")
+      ->group(group);
+  tool.add_flag("--filled", settings.vertex_filled,
+                "Give vertices a property filled: 1 where one was added to close a hole, else 0: 'lamina render "
+                "mesh.ply --paint filled'")
       ->group(group);
   tool.add_option_function<std::string>(
           "--watertight",
           [&settings](const std::string& word) {
             settings.watertight = word == "auto" ? std::nullopt : std::optional(word == "yes");
           },
-          "Close all holes, whatever lies around, unless a rim longer than three times --close-holes shows that the "
-          "surface is an open one; auto: where --blend auto finds a clean, even cloud")
+          "Close all holes, whatever lies around, unless a rim longer than 24 influence radii shows that the surface "
+          "is "
+          "an open one; auto: where --blend auto finds a clean, even cloud")
       ->check(CLI::IsMember({"auto", "yes", "no"}).description(""))
       ->type_name("auto|yes|no")
       ->default_str("auto")

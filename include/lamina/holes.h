@@ -22,10 +22,12 @@ struct OpenLoop {
 struct HoleSettings {
   /// Local influence radii: loops up to this length are closed where the surface around them tells how. 0: none.
   double longest = 8;
-  /// Where no loop is longer than kWatertight times `longest`, the scanned object is taken to be closed: all loops are
-  /// closed, whatever lies around them, by the triangulation of least area.
+  /// Where no loop longer than kWatertight (local influence radii) is left, the scanned object is taken to be closed:
+  /// all loops are closed, whatever lies around them, by the triangulation of least area.
   bool watertight = false;
-  static constexpr double kWatertight = 3;
+  static constexpr double kWatertight = 24;
+  /// Vertices' last attribute says which of them were added: those that are get 1.
+  bool mark = false;
 };
 
 /// Loops closed and left open; edges are boundary edges.

@@ -67,10 +67,12 @@ struct SurfaceSettings {
   /// Give vertices an attribute `curvature`: mean curvature of the fitted sphere, 1 / input unit, positive where the
   /// surface is convex.
   bool vertex_curvature = false;
-  /// Boundary loops shorter than this, in local influence radii R, are closed where the surface around them tells how.
-  /// 0, or ClusterMode::free: none are. R is taken from the cells of the octree, which follow it by powers of two.
-  double close_holes = 8;
-  /// Close all loops where none is longer than three times close_holes: the scanned object is taken to be closed then.
+  bool vertex_filled = false;  ///< give vertices an attribute `filled`: 1 where one was added to close a hole, else 0
+  /// Boundary loops shorter than this, in local influence radii R, are closed where the surface around them tells how
+  /// (boundary/fill.h). 0, or ClusterMode::free: none are. R is taken from the cells of the octree, which follow it by
+  /// powers of two. Unset: 300, gaps up to some hundred radii wide.
+  std::optional<double> close_holes = 8;
+  /// Close all loops where none longer than 24 R is left: the scanned object is taken to be closed then.
   /// Unset: chosen where `blend` is, else false.
   std::optional<bool> watertight;
   /// R, 0 <= trim < 1: the mesh is cut along the curve where it reaches so far beyond the samples that carry it (where

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "meshes/mesh_sink.h"
@@ -58,6 +59,8 @@ struct Loop {
   std::vector<float> attributes;  ///< as BoundaryBatch
   std::vector<std::array<double, 3>> facing;
   std::vector<std::array<std::uint32_t, 2>> taken;  ///< other pairs (i < j) that are joined by an edge of the mesh
+  /// Vertex i and the number of one of another loop, or of none, that are: of two loops, one at least knows.
+  std::vector<std::pair<std::uint32_t, Number>> leaving;
 };
 
 /// Appends a batch.

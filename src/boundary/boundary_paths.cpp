@@ -54,9 +54,9 @@ void BoundaryPaths::add(const BoundaryBatch& batch, Number first) {
   for (const InnerEdge& e : batch.inner) {
     const auto a = nodes_.find(e.a + first);
     const auto b = nodes_.find(e.b + first);
-    if (a == nodes_.end() || b == nodes_.end()) continue;
-    a->second.inner.push_back(b->first);
-    b->second.inner.push_back(a->first);
+    // One of them may be of a boundary loop that has been dealt with.
+    if (a != nodes_.end()) a->second.inner.push_back(e.b + first);
+    if (b != nodes_.end()) b->second.inner.push_back(e.a + first);
   }
   for (BoundaryEdge e : batch.edges) {
     e.from += first;
@@ -164,7 +164,11 @@ Loop BoundaryPaths::take_loop(const Path& path) {
     loop.facing.push_back(nodes_.at(order[(i + 1) % n]).facing);
     for (const Number other : node.inner) {
       const auto j = place.find(other);
-      if (j != place.end() && j->second > i) loop.taken.push_back({i, j->second});
+      if (j == place.end()) {
+        loop.leaving.emplace_back(i, other);
+      } else if (j->second > i) {
+        loop.taken.push_back({i, j->second});
+      }
     }
   }
   std::sort(loop.taken.begin(), loop.taken.end());

@@ -31,7 +31,7 @@ class BoundaryPaths {
   /// `attributes`: of each vertex.
   BoundaryPaths(double longest, std::size_t attributes, std::function<void(Loop&&, const LoopExtent&)> closed,
                 std::function<void(const LoopExtent&)> left);
-  static constexpr std::uint64_t kMostEdges = 512;
+  static constexpr std::uint64_t kMostEdges = 4096;
 
   /// `first`: what the batch's numbers count from. Loose edges are not looked at.
   void add(const BoundaryBatch& batch, Number first);

@@ -4,17 +4,24 @@
 #include <cstdint>
 #include <vector>
 
+#include <Eigen/Core>
+
 #include "boundary/boundary.h"
+#include "boundary/gap_rim.h"
 
 namespace lamina::boundary {
 
-/// Normals around a gap lie within 75 degrees of their mean (the cosine): beyond, no plane shows the gap without folds.
-inline constexpr double kLeastNormalCosine = 0.26;
-/// The loop lies this near to one sphere (influence radii R), about as far as the fit itself may err at a boundary.
-inline constexpr double kFarthestFromSphere = 0.4;
+/// A rim belongs to one surface where its vertices face its way and lie this near to one quadric (influence radii R),
+/// about as far as the fit itself may err at a boundary, or this near for the gap's width where that is wide: all but
+/// so many of them, since rims are where scans are worst.
+inline constexpr double kFarthestFromQuadric = 0.4;
+inline constexpr double kFarthestOfWidth = 0.05;
+inline constexpr double kMostUnfit = 0.3;
+/// Rims of more vertices are triangulated by ears and flips, not by the best of all plans (n^3 steps).
+inline constexpr std::size_t kMostPlanned = 100;
 /// Facets fold by less than 100 degrees (one less the cosine), with each other and with those around.
 inline constexpr double kMostFold = 1.17;
-/// Loops no longer than this (R), hardly wider than one sample acts, need no sphere: ends of thin things. Facets there
+/// Loops no longer than this (R), hardly wider than one sample acts, need no quadric: ends of thin things. Facets there
 /// fold by less than 140 degrees, which still tells a gap from the outer boundary of a flake.
 inline constexpr double kSmallLoop = 5;
 inline constexpr double kMostSmallFold = 1.77;
@@ -25,8 +32,9 @@ enum class Verdict : std::uint8_t {
   filled,
   too_long,        ///< longer than the bound, or of too many edges
   outer_boundary,  ///< the surface lies inside of it
-  bent,            ///< normals around it do not agree, or do not belong to one sphere: nothing says what lies between
+  bent,            ///< normals around it do not agree, or do not belong to one quadric: nothing says what lies between
   occupied,        ///< other boundary loops run through the gap
+  joined,          ///< an island's outer boundary: the filling around it goes on to it
 };
 
 /// For stats and messages.
@@ -45,13 +53,30 @@ struct Filling {
 /// the triangles around, and uses no edge that the mesh has already. Depends on the loop alone.
 Filling fill_loop(const Loop& loop, double longest);
 
+/// The same around islands: parts of the surface that lie in the gap. Triangles name the islands' vertices after the
+/// loop's.
+Filling fill_around(const Loop& loop, const std::vector<const Loop*>& islands);
+
 /// The filling of least area, whatever lies around: for boundary loops of which is known that they are none of the
 /// thing itself. Around a new vertex in the middle where the mesh has too many of the edges that would be needed. A
 /// lone triangle's back is no filling.
 Filling fill_any(const Loop& loop);
 
-/// Whether a vertex of another boundary loop lies in the filling, or so near (in R) that the two would be one surface
-/// twice.
-bool occupies(const BoundaryVertex& other, const Loop& loop, const Filling& filling);
+/// What a filling takes up, to find other boundary loops in it.
+class FilledPlace {
+ public:
+  FilledPlace(const Loop& loop, const Filling& filling);
+  /// Whether a vertex of another boundary loop lies in the filling, or so near (kOccupied) that the two would be one
+  /// surface twice.
+  [[nodiscard]] bool holds(const BoundaryVertex& other) const;
+  /// Whether another loop lies inside of this one.
+  [[nodiscard]] bool surrounds(const Loop& other) const;
+
+ private:
+  Base base_;
+  std::vector<Eigen::Vector2d> outline_;
+  std::vector<Eigen::Vector3d> points_;
+  std::vector<std::array<std::uint32_t, 3>> triangles_;
+};
 
 }  // namespace lamina::boundary

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <set>
 
 #include "lamina/error.h"
 
@@ -29,7 +30,7 @@ HoleCloser::HoleCloser(const HoleSettings& settings, std::size_t attributes, boo
       attributes_(attributes),
       distinct_(double_positions),
       paths_(
-          settings.longest * (settings.watertight ? HoleSettings::kWatertight : 1), attributes,
+          settings.watertight ? std::max(settings.longest, HoleSettings::kWatertight) : settings.longest, attributes,
           [this](Loop&& loop, const LoopExtent& extent) { loops_.emplace_back(std::move(loop), extent); },
           [this](const LoopExtent& extent) { leave(extent, Verdict::too_long); }) {}
 
@@ -80,12 +81,12 @@ void HoleCloser::add_part(const BoundaryBatch& batch, std::uint64_t first) {
   paths_.forget_below(needed);
 }
 
-void HoleCloser::fill_all(std::vector<Filling>& fillings) const {
+void HoleCloser::fill_all(std::vector<Closing>& closings) const {
   tbb::parallel_for(std::size_t{0}, loops_.size(),
-                    [&](std::size_t i) { fillings[i] = fill_loop(loops_[i].first, settings_.longest); });
+                    [&](std::size_t i) { closings[i].filling = fill_loop(loops_[i].first, settings_.longest); });
 }
 
-void HoleCloser::refuse_occupied(std::vector<Filling>& fillings) const {
+std::vector<std::vector<std::size_t>> HoleCloser::find_occupants(const std::vector<Closing>& closings) const {
   struct Seat {
     double x;
     std::size_t loop, vertex;
@@ -96,45 +97,101 @@ void HoleCloser::refuse_occupied(std::vector<Filling>& fillings) const {
     for (std::size_t v = 0; v < vertices.size(); ++v) seats.push_back({vertices[v].position[0], l, v});
   }
   std::sort(seats.begin(), seats.end(), [](const Seat& a, const Seat& b) { return a.x < b.x; });
-  std::vector<std::uint8_t> occupied(loops_.size(), 0);
+  std::vector<std::vector<std::size_t>> occupants(loops_.size());
   tbb::parallel_for(std::size_t{0}, loops_.size(), [&](std::size_t l) {
-    if (fillings[l].verdict != Verdict::filled) return;
+    if (closings[l].filling.verdict != Verdict::filled) return;
     const auto& [loop, extent] = loops_[l];
+    const FilledPlace place(loop, closings[l].filling);
     float radius = 0;
     for (const BoundaryVertex& v : loop.vertices) radius = std::max(radius, v.radius);
     const double margin = static_cast<double>(radius);
+    std::set<std::size_t> found;
     auto seat = std::lower_bound(seats.begin(), seats.end(), extent.low[0] - margin,
                                  [](const Seat& s, double x) { return s.x < x; });
     for (; seat != seats.end() && seat->x <= extent.high[0] + margin; ++seat) {
-      if (seat->loop == l) continue;
+      if (seat->loop == l || found.contains(seat->loop)) continue;
       const BoundaryVertex& v = loops_[seat->loop].first.vertices[seat->vertex];
       bool inside = true;
       for (std::size_t k = 1; k < 3; ++k)
         inside = inside && v.position[k] >= extent.low[k] - margin && v.position[k] <= extent.high[k] + margin;
-      if (inside && occupies(v, loop, fillings[l])) {
-        occupied[l] = 1;
-        return;
-      }
+      if (inside && place.holds(v)) found.insert(seat->loop);
     }
+    occupants[l].assign(found.begin(), found.end());
   });
-  for (std::size_t l = 0; l < loops_.size(); ++l) {
-    if (occupied[l] != 0) fillings[l].verdict = Verdict::occupied;
-  }
+  return occupants;
 }
 
-bool HoleCloser::is_closed_thing(std::uint64_t vertices) const {
+bool HoleCloser::take_islands(std::size_t outer, const std::vector<std::size_t>& occupants,
+                              const std::vector<Closing>& closings, Closing& out) const {
+  const Loop& loop = loops_[outer].first;
+  const FilledPlace place(loop, closings[outer].filling);
+  std::vector<const Loop*> islands;
+  std::vector<std::size_t> others;
+  for (const std::size_t o : occupants) {
+    if (closings[o].filling.verdict == Verdict::outer_boundary && place.surrounds(loops_[o].first)) {
+      islands.push_back(&loops_[o].first);
+      out.islands.push_back(o);
+    } else {
+      others.push_back(o);
+    }
+  }
+  // What else is there must be holes in the islands themselves.
+  for (const std::size_t o : others) {
+    if (std::none_of(islands.begin(), islands.end(),
+                     [&](const Loop* island) { return FilledPlace(*island, {}).surrounds(loops_[o].first); }))
+      return false;
+  }
+  if (islands.empty()) return false;
+  out.filling = fill_around(loop, islands);
+  return out.filling.verdict == Verdict::filled;
+}
+
+void HoleCloser::settle_occupied(std::vector<Closing>& closings) const {
+  const std::vector<std::vector<std::size_t>> occupants = find_occupants(closings);
+  const std::vector<Closing> before = closings;
+  tbb::parallel_for(std::size_t{0}, loops_.size(), [&](std::size_t l) {
+    if (occupants[l].empty()) return;
+    Closing with;
+    if (take_islands(l, occupants[l], before, with)) {
+      closings[l] = std::move(with);
+    } else {
+      closings[l].filling = {};
+      closings[l].filling.verdict = Verdict::occupied;
+    }
+  });
+  // An island belongs to the first gap that has it.
+  std::set<std::size_t> taken;
+  for (Closing& closing : closings) {
+    const bool free = std::none_of(closing.islands.begin(), closing.islands.end(),
+                                   [&](std::size_t island) { return taken.contains(island); });
+    if (free) {
+      taken.insert(closing.islands.begin(), closing.islands.end());
+    } else {
+      closing = {};
+      closing.filling.verdict = Verdict::occupied;
+    }
+  }
+  for (const std::size_t island : taken) closings[island].filling.verdict = Verdict::joined;
+}
+
+bool HoleCloser::is_closed_thing(std::uint64_t vertices, const std::vector<Closing>& closings) const {
   std::uint64_t edges = 0;
-  for (const auto& [loop, extent] : loops_) edges += extent.edges;
+  for (std::size_t l = 0; l < loops_.size(); ++l) {
+    if (closings[l].is_closed()) continue;
+    if (loops_[l].second.radii > HoleSettings::kWatertight) return false;
+    edges += loops_[l].second.edges;
+  }
   return settings_.watertight && stats_.open == 0 && edges * kLeastVerticesPerEdge <= vertices;
 }
 
-void HoleCloser::fill_rest(std::vector<Filling>& fillings) const {
+void HoleCloser::fill_rest(std::vector<Closing>& closings) const {
   tbb::parallel_for(std::size_t{0}, loops_.size(), [&](std::size_t i) {
-    if (fillings[i].verdict != Verdict::filled) fillings[i] = fill_any(loops_[i].first);
+    if (!closings[i].is_closed()) closings[i].filling = fill_any(loops_[i].first);
   });
 }
 
-void HoleCloser::append(const Loop& loop, const Filling& filling, std::uint64_t vertices, Addition& out) const {
+void HoleCloser::append(std::size_t l, const Closing& closing, std::uint64_t vertices, Addition& out) {
+  const Filling& filling = closing.filling;
   const std::uint64_t fresh = vertices + out.vertices.size();
   constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
   if (fresh + filling.positions.size() > kMost) {
@@ -143,13 +200,22 @@ void HoleCloser::append(const Loop& loop, const Filling& filling, std::uint64_t 
                             "cell or cut the cloud",
                             kMost));
   }
-  const std::size_t n = loop.vertices.size();
+  std::vector<std::size_t> loops{l};
+  loops.insert(loops.end(), closing.islands.begin(), closing.islands.end());
+  std::vector<std::uint32_t> rim;
+  for (const std::size_t one : loops) {
+    for (const BoundaryVertex& v : loops_[one].first.vertices) {
+      rim.push_back(static_cast<std::uint32_t>(v.number));
+      distinct_.occupy(v.position[0], v.position[1], v.position[2]);
+    }
+    ++stats_.closed;
+    stats_.closed_edges += loops_[one].second.edges;
+  }
+  const std::size_t n = rim.size();
   for (const auto& t : filling.triangles) {
     std::array<std::uint32_t, 3> triangle{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      triangle[k] = t[k] < n ? static_cast<std::uint32_t>(loop.vertices[t[k]].number)
-                             : static_cast<std::uint32_t>(fresh + t[k] - n);
-    }
+    for (std::size_t k = 0; k < 3; ++k)
+      triangle[k] = t[k] < n ? rim[t[k]] : static_cast<std::uint32_t>(fresh + t[k] - n);
     out.triangles.push_back(triangle);
   }
   VertexBatch& v = out.vertices;
@@ -161,6 +227,7 @@ void HoleCloser::append(const Loop& loop, const Filling& filling, std::uint64_t 
     v.ny.push_back(filling.normals[i][1]);
     v.nz.push_back(filling.normals[i][2]);
     for (std::size_t a = 0; a < attributes_; ++a) v.attributes[a].push_back(filling.attributes[i * attributes_ + a]);
+    if (settings_.mark) v.attributes.back().back() = 1;
   }
 }
 
@@ -173,22 +240,19 @@ Addition HoleCloser::finish(std::uint64_t vertices) {
   std::sort(loops_.begin(), loops_.end(), [](const auto& a, const auto& b) {
     return a.first.vertices.front().number < b.first.vertices.front().number;
   });
-  std::vector<Filling> fillings(loops_.size());
-  fill_all(fillings);
-  refuse_occupied(fillings);
-  if (is_closed_thing(vertices)) fill_rest(fillings);
+  std::vector<Closing> closings(loops_.size());
+  fill_all(closings);
+  settle_occupied(closings);
+  if (is_closed_thing(vertices, closings)) fill_rest(closings);
   Addition out;
   out.vertices.attributes.resize(attributes_);
   for (std::size_t l = 0; l < loops_.size(); ++l) {
-    const auto& [loop, extent] = loops_[l];
-    if (fillings[l].verdict != Verdict::filled) {
-      leave(extent, fillings[l].verdict);
-      continue;
+    const Verdict verdict = closings[l].filling.verdict;
+    if (verdict == Verdict::filled) {
+      append(l, closings[l], vertices, out);
+    } else if (verdict != Verdict::joined) {
+      leave(loops_[l].second, verdict);
     }
-    append(loop, fillings[l], vertices, out);
-    for (const BoundaryVertex& v : loop.vertices) distinct_.occupy(v.position[0], v.position[1], v.position[2]);
-    ++stats_.closed;
-    stats_.closed_edges += extent.edges;
   }
   distinct_.separate(out.vertices);
   stats_.vertices = out.vertices.size();

@@ -43,11 +43,24 @@ class HoleCloser {
 
  private:
   void leave(const LoopExtent& extent, Verdict why);
-  void fill_all(std::vector<Filling>& fillings) const;
-  void refuse_occupied(std::vector<Filling>& fillings) const;
-  [[nodiscard]] bool is_closed_thing(std::uint64_t vertices) const;
-  void fill_rest(std::vector<Filling>& fillings) const;
-  void append(const Loop& loop, const Filling& filling, std::uint64_t vertices, Addition& out) const;
+  /// What becomes of a loop.
+  struct Closing {
+    Filling filling;
+    std::vector<std::size_t> islands;  ///< loops that the filling joins
+    [[nodiscard]] bool is_closed() const {
+      return filling.verdict == Verdict::filled || filling.verdict == Verdict::joined;
+    }
+  };
+  void fill_all(std::vector<Closing>& closings) const;
+  /// By loop, the other loops that run through its filling.
+  [[nodiscard]] std::vector<std::vector<std::size_t>> find_occupants(const std::vector<Closing>& closings) const;
+  /// Fills around the occupants where they are islands; false where they are not, or no filling goes around them.
+  bool take_islands(std::size_t outer, const std::vector<std::size_t>& occupants, const std::vector<Closing>& closings,
+                    Closing& out) const;
+  void settle_occupied(std::vector<Closing>& closings) const;
+  [[nodiscard]] bool is_closed_thing(std::uint64_t vertices, const std::vector<Closing>& closings) const;
+  void fill_rest(std::vector<Closing>& closings) const;
+  void append(std::size_t l, const Closing& closing, std::uint64_t vertices, Addition& out);
 
   HoleSettings settings_;
   std::size_t attributes_;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <map>
+#include <set>
 
 #include <Eigen/Geometry>
 
@@ -12,6 +12,9 @@ namespace {
 
 using Vec2 = Eigen::Vector2d;
 using Vec3 = Eigen::Vector3d;
+
+/// Triangles inside a gap grow by so much with the distance from its rim.
+constexpr double kGrading = 0.2;
 
 /// A triangle of the plane counts as one when it is this high for its longest side.
 constexpr double kLeastHeight = 1e-3;
@@ -120,6 +123,65 @@ Edge edge_of(std::uint32_t a, std::uint32_t b) {
   return {std::min(a, b), std::max(a, b)};
 }
 
+/// What is left of a polygon while its ears are cut off: corners that stick out, whose chord no other corner is in the
+/// way of.
+class Ears {
+ public:
+  Ears(const std::vector<Vec2>& points, const std::vector<std::uint32_t>& polygon,
+       const std::function<bool(std::uint32_t, std::uint32_t)>& allowed)
+      : points_(points), polygon_(polygon), allowed_(allowed) {
+    const std::size_t n = polygon.size();
+    for (std::size_t i = 0; i < n; ++i) {
+      next_.push_back((i + 1) % n);
+      before_.push_back((i + n - 1) % n);
+      edges_.insert(edge_of(polygon[i], polygon[(i + 1) % n]));
+    }
+  }
+  /// False where corners are left that are no ears.
+  bool cut(std::vector<PlaneTriangle>& out) {
+    std::size_t left = polygon_.size();
+    std::size_t at = 0;
+    for (std::size_t tries = 0; left > 3; ++tries) {
+      if (tries > left) return false;
+      if (!is_ear(at)) {
+        at = next_[at];
+        continue;
+      }
+      out.push_back({polygon_[before_[at]], polygon_[at], polygon_[next_[at]]});
+      edges_.insert(edge_of(polygon_[before_[at]], polygon_[next_[at]]));
+      next_[before_[at]] = next_[at];
+      before_[next_[at]] = before_[at];
+      // Not its neighbour, lest all ears be cut from one corner.
+      at = next_[next_[at]];
+      --left;
+      tries = 0;
+    }
+    out.push_back({polygon_[before_[at]], polygon_[at], polygon_[next_[at]]});
+    return is_proper(point(before_[at]), point(at), point(next_[at]));
+  }
+
+ private:
+  [[nodiscard]] const Vec2& point(std::size_t corner) const { return points_[polygon_[corner]]; }
+  [[nodiscard]] bool is_ear(std::size_t at) const {
+    const std::size_t from = before_[at], to = next_[at];
+    const Vec2 &a = point(from), &b = point(at), &c = point(to);
+    const Edge chord = edge_of(polygon_[from], polygon_[to]);
+    if (!is_proper(a, b, c) || edges_.contains(chord) || !allowed_(chord[0], chord[1])) return false;
+    for (std::size_t i = next_[to]; i != from; i = next_[i]) {
+      const std::uint32_t v = polygon_[i];
+      if (v == polygon_[from] || v == polygon_[at] || v == polygon_[to]) continue;
+      const Vec2& p = point(i);
+      if (twice_area(a, b, p) >= 0 && twice_area(b, c, p) >= 0 && twice_area(c, a, p) >= 0) return false;
+    }
+    return true;
+  }
+  const std::vector<Vec2>& points_;
+  const std::vector<std::uint32_t>& polygon_;
+  const std::function<bool(std::uint32_t, std::uint32_t)>& allowed_;
+  std::vector<std::size_t> next_, before_;
+  std::set<Edge> edges_;  ///< of the polygon and of all triangles
+};
+
 /// d lies in the circle around the anticlockwise triangle abc.
 bool in_circle(const Vec2& a, const Vec2& b, const Vec2& c, const Vec2& d) {
   const Vec2 p = a - d, q = b - d, r = c - d;
@@ -128,13 +190,22 @@ bool in_circle(const Vec2& a, const Vec2& b, const Vec2& c, const Vec2& d) {
   return det > 1e-9 * size * size;
 }
 
-/// The triangles beside each edge.
-std::map<Edge, std::vector<std::uint32_t>> edges_of(const std::vector<PlaneTriangle>& triangles) {
-  std::map<Edge, std::vector<std::uint32_t>> edges;
-  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-    for (std::size_t k = 0; k < 3; ++k) edges[edge_of(triangles[t][k], triangles[t][(k + 1) % 3])].push_back(t);
+/// An edge and a triangle beside it; sorted, those of one edge follow one another.
+struct Side {
+  Edge edge;
+  std::uint32_t triangle;
+  friend bool operator<(const Side& a, const Side& b) {
+    return a.edge != b.edge ? a.edge < b.edge : a.triangle < b.triangle;
   }
-  return edges;
+};
+
+std::vector<Side> sides_of(const std::vector<PlaneTriangle>& triangles) {
+  std::vector<Side> sides;
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) sides.push_back({edge_of(triangles[t][k], triangles[t][(k + 1) % 3]), t});
+  }
+  std::sort(sides.begin(), sides.end());
+  return sides;
 }
 
 std::uint32_t opposite(const PlaneTriangle& t, const Edge& e) {
@@ -147,24 +218,30 @@ std::uint32_t opposite(const PlaneTriangle& t, const Edge& e) {
 /// Flips what it can in one pass; false: all edges are Delaunay's.
 bool flip_once(const std::vector<Vec2>& points, std::vector<PlaneTriangle>& triangles,
                const std::function<bool(std::uint32_t, std::uint32_t)>& allowed) {
-  const auto edges = edges_of(triangles);
+  const std::vector<Side> sides = sides_of(triangles);
+  const auto is_edge = [&](const Edge& e) {
+    const auto at = std::lower_bound(sides.begin(), sides.end(), Side{e, 0});
+    return at != sides.end() && at->edge == e;
+  };
   std::vector<bool> touched(triangles.size(), false);
-  bool any = false;
-  for (const auto& [e, beside] : edges) {
-    if (beside.size() != 2 || touched[beside[0]] || touched[beside[1]]) continue;
-    std::uint32_t c = opposite(triangles[beside[0]], e);
-    std::uint32_t d = opposite(triangles[beside[1]], e);
+  std::set<Edge> made;
+  for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
+    const Edge& e = sides[i].edge;
+    const std::uint32_t left = sides[i].triangle, right = sides[i + 1].triangle;
+    if (sides[i + 1].edge != e || touched[left] || touched[right]) continue;
+    std::uint32_t c = opposite(triangles[left], e);
+    std::uint32_t d = opposite(triangles[right], e);
     // Anticlockwise: e[0], e[1], c on the left.
     if (twice_area(points[e[0]], points[e[1]], points[c]) < 0) std::swap(c, d);
     if (!in_circle(points[e[0]], points[e[1]], points[c], points[d])) continue;
     if (!is_proper(points[c], points[e[0]], points[d]) || !is_proper(points[d], points[e[1]], points[c])) continue;
     const Edge flipped = edge_of(c, d);
-    if (edges.contains(flipped) || !allowed(flipped[0], flipped[1])) continue;
-    triangles[beside[0]] = {c, e[0], d};
-    triangles[beside[1]] = {d, e[1], c};
-    touched[beside[0]] = touched[beside[1]] = any = true;
+    if (is_edge(flipped) || !allowed(flipped[0], flipped[1]) || !made.insert(flipped).second) continue;
+    triangles[left] = {c, e[0], d};
+    triangles[right] = {d, e[1], c};
+    touched[left] = touched[right] = true;
   }
-  return any;
+  return !made.empty();
 }
 
 void flip_all(const std::vector<Vec2>& points, std::vector<PlaneTriangle>& triangles,
@@ -179,7 +256,8 @@ bool split_large(std::vector<Vec2>& points, std::vector<double>& scale, std::vec
   for (std::size_t t = 0; t < count; ++t) {
     const auto [a, b, c] = triangles[t];
     const Vec2 centre = (points[a] + points[b] + points[c]) / 3;
-    const double wanted = (scale[a] + scale[b] + scale[c]) / 3;
+    const auto graded = [&](std::uint32_t v) { return scale[v] + kGrading * (points[v] - centre).norm(); };
+    const double wanted = std::min({graded(a), graded(b), graded(c)});
     const auto far = [&](std::uint32_t v) {
       const double d = std::sqrt(2.0) * (points[v] - centre).norm();
       return d > wanted && d > scale[v];
@@ -217,9 +295,20 @@ std::optional<std::vector<PlaneTriangle>> triangulate_by_area(
        }});
 }
 
+std::optional<std::vector<PlaneTriangle>> triangulate_by_ears(
+    const std::vector<Vec2>& points, const std::vector<std::uint32_t>& polygon,
+    const std::function<bool(std::uint32_t, std::uint32_t)>& allowed) {
+  if (polygon.size() < 3) return std::nullopt;
+  Ears ears(points, polygon, allowed);
+  std::vector<PlaneTriangle> triangles;
+  if (!ears.cut(triangles)) return std::nullopt;
+  return triangles;
+}
+
 void refine_triangles(std::vector<Vec2>& points, std::vector<double>& scale, std::vector<PlaneTriangle>& triangles,
                       const std::function<bool(std::uint32_t, std::uint32_t)>& allowed) {
-  constexpr int kMostRounds = 12;
+  constexpr int kMostRounds = 40;
+  flip_all(points, triangles, allowed);
   for (int round = 0; round < kMostRounds && split_large(points, scale, triangles); ++round)
     flip_all(points, triangles, allowed);
 }

@@ -30,9 +30,16 @@ std::optional<std::vector<PlaneTriangle>> triangulate_polygon(
 std::optional<std::vector<PlaneTriangle>> triangulate_by_area(
     const std::vector<Eigen::Vector3d>& corners, const std::function<bool(std::uint32_t, std::uint32_t)>& allowed);
 
-/// Adds points inside until triangles are about as large as the edges of the polygon around them (Liepa 2003), and
-/// flips edges to Delaunay's in the plane. `points`: the polygon's corners, then what is added; `scale`: the length of
-/// edges wanted at each.
+/// Some triangulation of a polygon of the plane, anticlockwise, by cutting off ears (n^2 steps): for those too long to
+/// plan, before edges are flipped. `polygon`: its corners, numbers of `points`, which may run along an edge there and
+/// back. Nothing where chords that are not allowed leave none.
+std::optional<std::vector<PlaneTriangle>> triangulate_by_ears(
+    const std::vector<Eigen::Vector2d>& points, const std::vector<std::uint32_t>& polygon,
+    const std::function<bool(std::uint32_t, std::uint32_t)>& allowed);
+
+/// Adds points inside until triangles are about as large as the edges of the polygon around them (Liepa 2003), larger
+/// ones farther inside, and flips edges to Delaunay's in the plane. `points`: the polygon's corners, then what is
+/// added; `scale`: the length of edges wanted at each.
 void refine_triangles(std::vector<Eigen::Vector2d>& points, std::vector<double>& scale,
                       std::vector<PlaneTriangle>& triangles,
                       const std::function<bool(std::uint32_t, std::uint32_t)>& allowed);

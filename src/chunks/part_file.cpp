@@ -65,6 +65,7 @@ nlohmann::json to_json(const PartInfo& info) {
           {"comments", info.comments},
           {"close_holes", info.holes.longest},
           {"watertight", info.holes.watertight},
+          {"mark_filled", info.holes.mark},
           {"vertices", info.vertices},
           {"triangles", info.triangles},
           {"below", to_json(info.below)},
@@ -84,7 +85,7 @@ PartInfo info_from(const nlohmann::json& j) {
     info.attributes.push_back({a.at("name").get<std::string>(), *type});
   }
   info.comments = j.at("comments").get<std::vector<std::string>>();
-  info.holes = {j.at("close_holes").get<double>(), j.at("watertight").get<bool>()};
+  info.holes = {j.at("close_holes").get<double>(), j.at("watertight").get<bool>(), j.at("mark_filled").get<bool>()};
   info.vertices = j.at("vertices").get<std::uint64_t>();
   info.triangles = j.at("triangles").get<std::uint64_t>();
   info.below = mark_from(j.at("below"));

@@ -14,8 +14,8 @@ std::string mesh_settings(const SurfaceSettings& settings) {
   // does not change the mesh; names of files are not settings of it.
   const auto& [input, more_inputs, columns, select, output, frame, bad_samples, normals, normal_search, radius_scale,
                density, clean, max_radius, blend, refit, steps, step_tolerance, fit, diffuse, cell, levels, boundary,
-               cluster, chord, vertex_levels, vertex_curvature, close_holes, watertight, trim, prune_triangles,
-               prune_size, local, window, dry_run, volume] = settings;
+               cluster, chord, vertex_levels, vertex_curvature, vertex_filled, close_holes, watertight, trim,
+               prune_triangles, prune_size, local, window, dry_run, volume] = settings;
   // Jobs of several runs refuse these: require_mesh_alone().
   (void)prune_triangles, (void)prune_size, (void)local;
   (void)input, (void)more_inputs, (void)output, (void)normals, (void)normal_search, (void)window, (void)dry_run;
@@ -28,11 +28,11 @@ std::string mesh_settings(const SurfaceSettings& settings) {
       "{}\nmax_radius {}\n"
       "blend {}\nrefit {}\nsteps {}\nstep_tolerance {}\nfit {}\ndiffuse {}\ncell {}\nlevels {}\nboundary {}\ncluster "
       "{}\n"
-      "chord {}\nlevel {}\ncurvature {}\nclose_holes {}\nwatertight {}\ntrim {}\n",
+      "chord {}\nlevel {}\ncurvature {}\nfilled {}\nclose_holes {}\nwatertight {}\ntrim {}\n",
       columns, to_string(select), frame_word, static_cast<int>(bad_samples), normals_words(settings),
       cleaning_words(clean), radius_scale, density, to_string(max_radius), number(blend), number(refit), steps,
       step_tolerance, static_cast<int>(fit), diffuse, cell ? to_string(*cell) : "auto", levels, boundary,
-      static_cast<int>(cluster), chord, vertex_levels, vertex_curvature, close_holes,
+      static_cast<int>(cluster), chord, vertex_levels, vertex_curvature, vertex_filled, number(close_holes),
       watertight ? (*watertight ? "yes" : "no") : "auto", number(trim));
 }
 

@@ -42,6 +42,10 @@ inline constexpr int kEvenTrustedSamples = 4;
 inline constexpr double kRimOverhang = 0.18;
 inline constexpr double kCleanRimOverhang = 0.35;
 
+/// Rims up to this long (R) are closed where nobody says otherwise and the surface around tells how: gaps some hundred
+/// radii wide, as dark, shiny or hidden places leave. The bound keeps what a run remembers of rims small.
+inline constexpr double kLongestRim = 300;
+
 /// Connected parts of fewer triangles are left out where nobody says otherwise: one in so many of the samples, at most
 /// so many. A scan's samples carry about as many triangles.
 inline constexpr std::uint64_t kSpeckShare = 2000;

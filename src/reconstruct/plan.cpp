@@ -158,7 +158,8 @@ bool needs_double(const Census& census, double finest_cell) {
 
 void refuse_two_alike(const SurfaceSettings& settings, const ReconstructionPlan& plan) {
   for (const AttributeSpec& a : plan.attributes) {
-    if ((settings.vertex_levels && a.name == "level") || (settings.vertex_curvature && a.name == "curvature")) {
+    if ((settings.vertex_levels && a.name == "level") || (settings.vertex_curvature && a.name == "curvature") ||
+        (settings.vertex_filled && a.name == "filled")) {
       throw Error(ExitCode::usage, fmt::format("{}: the points have an attribute called {} already; leave out --{}",
                                                plan.input, a.name, a.name));
     }
@@ -173,6 +174,7 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
   plan.vertices.chord = static_cast<float>(s.chord);
   plan.vertices.levels = s.vertex_levels;
   plan.vertices.curvature = s.vertex_curvature;
+  plan.vertices.filled = s.vertex_filled;
   plan.vertices.finest_cell = plan.lattice.cell_size(0);
   // Cells follow the radii, so most cells tell the median radius and larger ones as much more. Cells that are smaller
   // between sheets tell nothing.
@@ -183,6 +185,7 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
   plan.mesh_attributes = plan.attributes;
   if (s.vertex_levels) plan.mesh_attributes.push_back({"level", ScalarType::uint8});
   if (s.vertex_curvature) plan.mesh_attributes.push_back({"curvature", ScalarType::float32});
+  if (s.vertex_filled) plan.mesh_attributes.push_back({"filled", ScalarType::uint8});
   plan.double_positions = needs_double(cloud.ingested.census, plan.lattice.cell * plan.frame.step);
   plan.vertices.double_positions = plan.double_positions;
   if (meshes::mesh_format(s.output) != meshes::MeshFormat::ply)
@@ -215,9 +218,9 @@ void check_settings(const SurfaceSettings& s) {
   require(s.radius_scale > 0 && s.radius_scale <= 1000, "--particlescale", "in (0, 1000]");
   require(!s.cell || s.cell->value > 0, "--cell", "positive");
   require(s.boundary >= 0, "--boundary", "0 (no limit) or positive, in influence radii");
-  require(s.close_holes >= 0, "--close-holes", "0 (none) or positive, in influence radii");
-  require(!s.watertight.value_or(false) || (s.close_holes > 0 && s.cluster != ClusterMode::free), "--watertight",
-          "left out with --close-holes 0 and with --cluster free, which close no holes");
+  require(s.close_holes.value_or(0) >= 0, "--close-holes", "0 (none) or positive, in influence radii");
+  require(!s.watertight.value_or(false) || (s.close_holes.value_or(1) > 0 && s.cluster != ClusterMode::free),
+          "--watertight", "left out with --close-holes 0 and with --cluster free, which close no holes");
   require(!s.trim || (*s.trim >= 0 && *s.trim < 1), "--trim", "auto or in [0, 1), in influence radii");
   require(s.chord >= 0 && s.chord <= 1, "--chord", "in 0..1");
   require(s.window >= 1 && s.window <= 1024, "--window", "in 1..1024");

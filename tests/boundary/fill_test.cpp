@@ -60,8 +60,8 @@ TEST(Fill, OfASphereLiesOnTheSphere) {
   ASSERT_GT(filling.positions.size(), 4U);
   for (std::size_t i = 0; i < filling.positions.size(); ++i) {
     const auto& p = filling.positions[i];
-    EXPECT_NEAR(std::hypot(p[0], p[1], p[2]), 1, 1e-6);
-    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(static_cast<double>(filling.normals[i][k]), p[k], 1e-5);
+    EXPECT_NEAR(std::hypot(p[0], p[1], p[2]), 1, 1e-3);
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_NEAR(static_cast<double>(filling.normals[i][k]), p[k], 1e-2);
     EXPECT_NEAR(static_cast<double>(filling.attributes[i]), std::cos(0.3), 1e-5);
   }
 }
@@ -72,7 +72,7 @@ RC_GTEST_PROP(Fill, RaggedRimsBecomeDiscsNearTheSphere, ()) {
   const Filling filling = fill_loop(loop, 100);
   RC_ASSERT(filling.verdict == Verdict::filled);
   expect_disc(loop, filling);
-  for (const auto& p : filling.positions) RC_ASSERT(std::abs(std::hypot(p[0], p[1], p[2]) - 1) < 1e-4);
+  for (const auto& p : filling.positions) RC_ASSERT(std::abs(std::hypot(p[0], p[1], p[2]) - 1) < 2e-3);
 }
 
 TEST(Fill, NotBeyondTheBound) {
@@ -182,11 +182,81 @@ TEST(Fill, IsOccupiedByVerticesInItOnly) {
   ASSERT_EQ(filling.verdict, Verdict::filled);
   BoundaryVertex other;
   other.position = {0.02, 0.01, 1.05};
-  EXPECT_TRUE(occupies(other, loop, filling));
+  const FilledPlace place(loop, filling);
+  EXPECT_TRUE(place.holds(other));
   other.position = {0.02, 0.01, 0.7};
-  EXPECT_FALSE(occupies(other, loop, filling)) << "another sheet";
+  EXPECT_FALSE(place.holds(other)) << "another sheet";
   other.position = {0.4, 0.01, 0.9};
-  EXPECT_FALSE(occupies(other, loop, filling)) << "beside it";
+  EXPECT_FALSE(place.holds(other)) << "beside it";
+}
+
+/// A boundary loop on the saddle z = (x^2 - y^2) / 2, at `radius` from its middle and as noisy as is said.
+Loop saddle_loop(std::uint32_t n, double radius, double noise) {
+  std::mt19937 random(7);
+  std::normal_distribution<> normal(0, noise);
+  Loop loop = sphere_loop(n, 0.3, 0.1);
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const double a = kTurn * i / n, d = radius + 2 * normal(random);
+    const double x = d * std::cos(a), y = d * std::sin(a);
+    const Eigen::Vector3d up = Eigen::Vector3d(-x, y, 1).normalized();
+    BoundaryVertex& v = loop.vertices[i];
+    v.position = {x, y, (x * x - y * y) / 2 + normal(random)};
+    for (std::size_t k = 0; k < 3; ++k) v.normal[k] = static_cast<float>(up[static_cast<Eigen::Index>(k)]);
+    loop.facing[i] = {up.x(), up.y(), up.z()};
+  }
+  return loop;
+}
+
+TEST(Fill, OfAWideGapGoesOnAsTheSurfaceDoes) {
+  for (const double noise : {0.0, 0.004}) {
+    const Loop loop = saddle_loop(300, 0.6, noise);
+    const Filling filling = fill_loop(loop, 100);
+    expect_disc(loop, filling);
+    ASSERT_GT(filling.positions.size(), 300U);
+    for (const auto& p : filling.positions) EXPECT_NEAR(p[2], (p[0] * p[0] - p[1] * p[1]) / 2, 1e-3 + 3 * noise);
+    EXPECT_LT(filling.positions.size(), 300U * 300 / 12 / 2) << "fewer and larger triangles inside";
+  }
+}
+
+TEST(Fill, OfARimThatLeavesTheSurfaceHereAndThere) {
+  Loop loop = saddle_loop(200, 0.6, 0);
+  for (std::size_t i = 50; i < 90; ++i) loop.vertices[i].position[2] -= 0.1;
+  expect_disc(loop, fill_loop(loop, 100));
+  for (std::size_t i = 0; i < 100; ++i) loop.vertices[i].position[2] -= 0.2;
+  EXPECT_EQ(fill_loop(loop, 100).verdict, Verdict::bent) << "two surfaces, a step apart";
+}
+
+TEST(Fill, GoesAroundIslands) {
+  const Loop outer = saddle_loop(150, 0.6, 0);
+  std::vector<Loop> islands;
+  for (const double x : {-0.25, 0.3}) {
+    Loop island = saddle_loop(40, 0.1, 0);
+    for (BoundaryVertex& v : island.vertices) {
+      v.position[0] += x;
+      v.position[2] = (v.position[0] * v.position[0] - v.position[1] * v.position[1]) / 2;
+      const Eigen::Vector3d up = Eigen::Vector3d(-v.position[0], v.position[1], 1).normalized();
+      for (std::size_t k = 0; k < 3; ++k) v.normal[k] = static_cast<float>(up[static_cast<Eigen::Index>(k)]);
+    }
+    reverse(island);
+    islands.push_back(island);
+  }
+  EXPECT_EQ(fill_loop(islands[0], 100).verdict, Verdict::outer_boundary);
+  const FilledPlace place(outer, fill_loop(outer, 100));
+  EXPECT_TRUE(place.holds(islands[0].vertices[3]));
+  EXPECT_TRUE(place.surrounds(islands[0]));
+  EXPECT_FALSE(FilledPlace(islands[0], {}).surrounds(outer));
+  // An edge from the outer loop to an island, as of two triangles that meet there.
+  for (std::size_t i = 0; i < 40; ++i) islands[0].vertices[i].number += 10000;
+  islands[0].leaving = {{20, outer.vertices[75].number}};
+  const Filling filling = fill_around(outer, {&islands[0], &islands[1]});
+  ASSERT_EQ(filling.verdict, Verdict::filled);
+  const test::MeshFacts facts = test::check_mesh(filling.triangles);
+  EXPECT_TRUE(facts.is_manifold());
+  EXPECT_EQ(facts.euler, std::vector<long>{-1}) << "a disc with two holes";
+  EXPECT_EQ(facts.boundary.size(), 150U + 40 + 40);
+  for (const auto& t : filling.triangles)
+    EXPECT_LT(std::count(t.begin(), t.end(), 75U) + std::count(t.begin(), t.end(), 150U + 20), 2);
+  for (const auto& p : filling.positions) EXPECT_NEAR(p[2], (p[0] * p[0] - p[1] * p[1]) / 2, 1e-3);
 }
 
 }  // namespace

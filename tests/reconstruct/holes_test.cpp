@@ -68,22 +68,50 @@ TEST(Holes, OfASphereAreClosedOnTheSphere) {
 
 TEST(Holes, OfAClosedThingAreAllClosedWhereAskedFor) {
   // Too wide for the bound.
-  const Cloud cloud = pierced_sphere(16000, {{0.6, 0, 0.8}, {-0.6, 0, 0.8}}, 0.165);
+  const std::vector<Point3> gaps{{0.6, 0, 0.8}, {-0.6, 0, 0.8}};
+  const Cloud cloud = pierced_sphere(16000, gaps, 0.165);
   SurfaceSettings s = closing(8);
   s.watertight = false;
   const Reconstruction open = test::reconstruct(cloud, s);
   ASSERT_EQ(open.stats.holes.open, 2U);
   const double longest = open.stats.holes.longest.front().radii;
   ASSERT_GT(longest, 8);
-  ASSERT_LT(longest, 3 * 8);
+  ASSERT_LT(longest, HoleSettings::kWatertight);
   s.watertight = true;
   const Reconstruction closed = test::reconstruct(cloud, s);
   EXPECT_TRUE(closed.facts.is_closed_manifold());
   EXPECT_EQ(closed.facts.euler, std::vector<long>{2});
   EXPECT_EQ(closed.stats.holes.closed, 2U);
-  s.close_holes = longest / 3.1;
-  EXPECT_EQ(test::reconstruct(cloud, s).facts.boundary.size(), open.facts.boundary.size())
-      << "a long rim: an open thing";
+  const Reconstruction wide = test::reconstruct(pierced_sphere(16000, gaps, 0.3), s);
+  ASSERT_GT(wide.stats.holes.longest.front().radii, HoleSettings::kWatertight);
+  EXPECT_EQ(wide.stats.holes.open, 2U) << "a long rim: an open thing";
+}
+
+TEST(Holes, AreClosedWhereNobodySaysHowLong) {
+  SurfaceSettings s = closing(8);
+  s.close_holes.reset();
+  s.vertex_filled = true;
+  const Reconstruction r = test::reconstruct(pierced_sphere(16000, {{0.6, 0, 0.8}, {-0.6, 0, 0.8}}, 0.4), s);
+  EXPECT_TRUE(r.facts.is_closed_manifold());
+  EXPECT_EQ(r.stats.holes.closed, 2U);
+  EXPECT_LT(test::deviation(r.mesh, test::distance_to_sphere).largest, 0.1 * kRadius);
+  const std::vector<float>& filled = r.mesh.attributes.back();
+  const std::size_t old = r.mesh.positions.size() - r.stats.holes.vertices;
+  for (std::size_t v = 0; v < filled.size(); ++v) EXPECT_EQ(filled[v], v < old ? 0.0F : 1.0F);
+}
+
+TEST(Holes, AreClosedAroundIslands) {
+  Cloud cloud = pierced_sphere(16000, {{0.6, 0, 0.8}}, 0.45);
+  for (const Point3& p : test::sphere_cloud(16000).positions) {
+    if (angle_to(p, {0.6, 0, 0.8}) < 0.15) cloud.add(p, p);
+  }
+  SurfaceSettings s = closing(300);
+  s.prune_triangles = 10;
+  const Reconstruction r = test::reconstruct(cloud, s);
+  EXPECT_TRUE(r.facts.is_closed_manifold());
+  EXPECT_EQ(r.facts.euler, std::vector<long>{2});
+  EXPECT_EQ(r.stats.holes.closed, 2U) << "both loops of one gap";
+  EXPECT_LT(test::deviation(r.mesh, test::distance_to_sphere).largest, 0.1 * kRadius);
 }
 
 TEST(Holes, CannotAllBeClosedWhereNoneAre) {
@@ -165,7 +193,7 @@ RC_GTEST_PROP(Holes, RandomGapsStayManifoldAndTheSameBytes, ()) {
   for (Point3& gap : gaps) gap = test::random_direction(random);
   const Cloud cloud = pierced_sphere(1500, gaps, 0.3 + 0.25 * uniform(random));
   const test::TemporaryFolder folder;
-  SurfaceSettings s = closing(*rc::gen::element(6.0, 8.0, 20.0));
+  SurfaceSettings s = closing(*rc::gen::element(6.0, 8.0, 20.0, 300.0));
   s.input = test::write_cloud(cloud, folder / "in.ply");
   s.output = folder / "out.ply";
   RunContext run;

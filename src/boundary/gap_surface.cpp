@@ -1,0 +1,170 @@
+#include "boundary/gap_surface.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <Eigen/QR>
+#include <Eigen/Sparse>
+#include <Eigen/SparseCholesky>
+
+#include "lamina/error.h"
+
+namespace lamina::boundary {
+namespace {
+
+using Vec2 = Eigen::Vector2d;
+using Vec3 = Eigen::Vector3d;
+
+/// Cotangents of slivers are kept from weighing more than a thousand fair ones.
+constexpr double kMostCotangent = 1e3;
+/// Slopes of a rim are averaged over about three of its edges either way, an influence radius.
+constexpr int kSlopeSmoothing = 4;
+
+/// Cotangent of the angle at `a`.
+double cotangent(const Vec2& a, const Vec2& b, const Vec2& c) {
+  const double area = cross(b - a, c - a);
+  const double along = (b - a).dot(c - a);
+  if (!(area > 0)) return along > 0 ? kMostCotangent : -kMostCotangent;
+  return std::clamp(along / area, -kMostCotangent, kMostCotangent);
+}
+
+/// The Laplacian of a triangulation, its rows those of the new vertices: over themselves and over the rim.
+struct Laplacian {
+  Laplacian(std::size_t rim, const std::vector<Vec2>& plane, const std::vector<PlaneTriangle>& triangles)
+      : inner(static_cast<Eigen::Index>(plane.size() - rim), static_cast<Eigen::Index>(plane.size() - rim)),
+        outer(inner.rows(), static_cast<Eigen::Index>(rim)) {
+    std::vector<Eigen::Triplet<double>> own, others;
+    const auto at = [rim](std::uint32_t v) { return static_cast<int>(v) - static_cast<int>(rim); };
+    const auto add = [&](std::uint32_t v, std::uint32_t w, double weight) {
+      if (at(v) < 0) return;
+      own.emplace_back(at(v), at(v), weight);
+      if (at(w) < 0) {
+        others.emplace_back(at(v), static_cast<int>(w), weight);
+      } else {
+        own.emplace_back(at(v), at(w), -weight);
+      }
+    };
+    for (const PlaneTriangle& t : triangles) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t a = t[k], b = t[(k + 1) % 3], c = t[(k + 2) % 3];
+        const double weight = 0.5 * cotangent(plane[a], plane[b], plane[c]);
+        add(b, c, weight);
+        add(c, b, weight);
+      }
+    }
+    inner.setFromTriplets(own.begin(), own.end());
+    outer.setFromTriplets(others.begin(), others.end());
+    solver.compute(inner);
+    if (solver.info() != Eigen::Success) throw Error(ExitCode::internal, "a gap's triangles make no surface");
+  }
+  /// Values at new vertices that are harmonic but for `sources`.
+  [[nodiscard]] Eigen::MatrixXd solve(const Eigen::MatrixXd& at_rim, const Eigen::MatrixXd& sources) const {
+    return solver.solve(outer * at_rim + sources);
+  }
+  Eigen::SparseMatrix<double> inner, outer;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver;
+};
+
+/// Minus the divergence of the slopes, each triangle's the mean of its corners', at the new vertices.
+Eigen::VectorXd sources_of(const Eigen::MatrixXd& slopes, std::size_t rim, const std::vector<Vec2>& plane,
+                           const std::vector<PlaneTriangle>& triangles) {
+  Eigen::VectorXd out = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(plane.size() - rim));
+  for (const PlaneTriangle& t : triangles) {
+    const Vec2 slope = (slopes.row(t[0]) + slopes.row(t[1]) + slopes.row(t[2])).transpose() / 3;
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (t[k] < rim) continue;
+      // Area times the gradient of the vertex's hat function: half the opposite edge, turned inwards.
+      const Vec2 edge = plane[t[(k + 2) % 3]] - plane[t[(k + 1) % 3]];
+      out[t[k] - static_cast<Eigen::Index>(rim)] += 0.5 * slope.dot(Vec2(-edge.y(), edge.x()));
+    }
+  }
+  return out;
+}
+
+/// Slopes of the rim above the quadric's, evened out along it: a steep one by chance would raise a spike beside it.
+/// Vertices that do not fit have none.
+std::vector<Vec2> slopes_above(const GapRim& around) {
+  const Rim& rim = around.rim;
+  std::vector<Vec2> slopes(rim.size(), Vec2::Zero());
+  for (std::size_t i = 0; i < rim.size(); ++i) {
+    if (around.fits[i]) slopes[i] = slope_of(rim.normals[i]) - around.quadric.slope(rim.points[i].head<2>());
+  }
+  for (int pass = 0; pass < kSlopeSmoothing; ++pass) {
+    std::vector<Vec2> even(slopes.size(), Vec2::Zero());
+    for (std::size_t i = 0; i < slopes.size(); ++i) {
+      const std::size_t j = rim.next[i];
+      even[i] += 0.25 * (slopes[i] + slopes[j]);
+      even[j] += 0.25 * (slopes[i] + slopes[j]);
+    }
+    slopes = std::move(even);
+  }
+  return slopes;
+}
+
+}  // namespace
+
+Vec2 slope_of(const Vec3& normal) {
+  return -normal.head<2>() / std::max(normal.z(), kLeastNormalCosine);
+}
+
+Quadric::Quadric(const Rim& rim, double width) : scale_(2 / width) {
+  const auto n = static_cast<Eigen::Index>(rim.size());
+  Eigen::MatrixXd terms(3 * n, 6);
+  Eigen::VectorXd values(3 * n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Vec3 p = scale_ * rim.points[static_cast<std::size_t>(i)];
+    terms.row(3 * i) << 1, p.x(), p.y(), p.x() * p.x(), p.x() * p.y(), p.y() * p.y();
+    terms.row(3 * i + 1) << 0, 1, 0, 2 * p.x(), p.y(), 0;
+    terms.row(3 * i + 2) << 0, 0, 1, 0, p.x(), 2 * p.y();
+    values[3 * i] = p.z();
+    values.segment<2>(3 * i + 1) = slope_of(rim.normals[static_cast<std::size_t>(i)]);
+  }
+  coefficients_ = terms.colPivHouseholderQr().solve(values);
+}
+
+double Quadric::height(const Vec2& at) const {
+  const double x = scale_ * at.x(), y = scale_ * at.y();
+  return coefficients_.dot(Eigen::Vector<double, 6>(1, x, y, x * x, x * y, y * y)) / scale_;
+}
+
+Vec2 Quadric::slope(const Vec2& at) const {
+  const double x = scale_ * at.x(), y = scale_ * at.y();
+  const auto& c = coefficients_;
+  return Vec2(c[1] + 2 * c[3] * x + c[4] * y, c[2] + c[4] * x + 2 * c[5] * y);
+}
+
+GapSurface span_gap(const GapRim& around, const std::vector<Vec2>& plane, const std::vector<PlaneTriangle>& triangles) {
+  GapSurface out;
+  const auto& [rim, fits, quadric, attributes] = around;
+  const std::size_t n = rim.size();
+  const auto known = static_cast<Eigen::Index>(n);
+  const auto fresh = static_cast<Eigen::Index>(plane.size() - n);
+  if (fresh == 0) return out;
+  const Laplacian laplacian(n, plane, triangles);
+  // Slopes above the quadric's, the way back from the outline to the rim, attributes.
+  Eigen::MatrixXd at_rim(known, 4 + attributes.cols());
+  Eigen::VectorXd heights(known);
+  const std::vector<Vec2> slopes_at_rim = slopes_above(around);
+  for (Eigen::Index i = 0; i < known; ++i) {
+    const auto v = static_cast<std::size_t>(i);
+    const Vec2 at = rim.points[v].head<2>();
+    at_rim.block<1, 2>(i, 0) = slopes_at_rim[v].transpose();
+    at_rim.block<1, 2>(i, 2) = (at - plane[v]).transpose();
+    heights[i] = rim.points[v].z() - quadric.height(at);
+  }
+  at_rim.rightCols(attributes.cols()) = attributes;
+  const Eigen::MatrixXd smooth = laplacian.solve(at_rim, Eigen::MatrixXd::Zero(fresh, at_rim.cols()));
+  Eigen::MatrixXd slopes(known + fresh, 2);
+  slopes << at_rim.leftCols<2>(), smooth.leftCols<2>();
+  const Eigen::VectorXd above = laplacian.solve(heights, sources_of(slopes, n, plane, triangles));
+  for (Eigen::Index i = 0; i < fresh; ++i) {
+    const Vec2 at = plane[n + static_cast<std::size_t>(i)] + smooth.block<1, 2>(i, 2).transpose();
+    const Vec2 slope = quadric.slope(at) + smooth.block<1, 2>(i, 0).transpose();
+    out.positions.emplace_back(at.x(), at.y(), quadric.height(at) + above[i]);
+    out.normals.push_back(Vec3(-slope.x(), -slope.y(), 1).normalized());
+  }
+  out.attributes = smooth.rightCols(attributes.cols());
+  return out;
+}
+
+}  // namespace lamina::boundary
