@@ -91,9 +91,9 @@ TEST_F(RankFaults, KilledRank) {
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   const test::Outcome outcome = test::run_shell(test::mpirun(2) + " surface " + pipe + " -o " + (folder_ / "out.ply") +
                                                 " -q & run=$!\n"
-                                                "for i in $(seq 100); do ranks=$(ps -o pid= --ppid $run); set -- "
+                                                "for i in $(seq 1200); do ranks=$(ps -o pid= --ppid $run); set -- "
                                                 "$ranks; [ $# -eq 2 ] && break; sleep 0.05; done\n"
-                                                "sleep 0.2; kill -9 $2; wait $run");
+                                                "sleep 0.2; kill -9 ${2:-$run}; wait $run");
   std::filesystem::remove(pipe);
   EXPECT_NE(outcome.code, 0);
   EXPECT_EQ(folder_.entries(), entries_);
