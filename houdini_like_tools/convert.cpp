@@ -186,7 +186,7 @@ void add_convert(CLI::App& app) {
   auto* tool = app.add_subcommand("convert", "Write points or a mesh in another format");
   auto o = std::make_shared<ConvertOptions>();
   add_files(*tool, o->input, "Points (streamed), mesh or volume (.vdb: level set or points)", o->output,
-            "File to write: points (.ply .xyz .csv .pcd .las .laz), mesh (.ply .obj .off .stl) or volume (.vdb)");
+            "File to write: points (.ply .xyz .csv .pcd .las .laz .e57), mesh (.ply .obj .off .stl) or volume (.vdb)");
   tool->add_flag("--vertices", o->vertices, "Write a mesh's vertices as points")->group("Output");
   const std::string volume = "Volume";
   tool->add_option("--grid", o->grid, "Name of the grid to read, or of the points grid to write")
@@ -213,6 +213,7 @@ void add_convert(CLI::App& app) {
   tool->add_flag("--fog", o->fog, "Make a fog volume (grid density) of a level set")->group(volume);
   tool->add_flag("--half", o->volume.half, "Store a level set or fog in 16-bit floats")->group(volume);
   add_point_options(*tool, o->reading.columns, o->reading.select);
+  add_ignore_checksums(*tool, o->reading.ignore_checksums);
   add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

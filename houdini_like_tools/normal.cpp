@@ -90,7 +90,7 @@ void add_normal(CLI::App& app) {
       ->type_name("");
   tool->add_option_function<std::string>(
           "-o,--output", [o](const std::string& name) { o->output = pipe_name(name); },
-          "Points to write: .ply .xyz .csv .pcd .las .laz; - for PLY on standard output. Samples that lie on no "
+          "Points to write: .ply .xyz .csv .pcd .las .laz .e57; - for PLY on standard output. Samples that lie on no "
           "surface "
           "have the "
           "normal 0 0 0")

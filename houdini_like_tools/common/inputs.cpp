@@ -99,6 +99,11 @@ void add_point_options(CLI::App& app, std::string& columns, PointSelection& sele
       ->group(group);
 }
 
+void add_ignore_checksums(CLI::App& app, bool& ignore) {
+  app.add_flag("--ignore-checksums", ignore, "Read pages of E57 files with wrong checksums, too: what can be saved")
+      ->group("Input");
+}
+
 std::unique_ptr<PointSource> open_point_input(const std::string& path, const PointSettings& reading,
                                               const RunContext& context) {
   PointSettings settings = reading;

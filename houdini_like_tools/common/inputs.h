@@ -22,6 +22,9 @@ void add_bad_samples(CLI::App& app, BadSamples& bad, const std::string& what = "
 /// --where.
 void add_point_options(CLI::App& app, std::string& columns, PointSelection& select, const std::string& group = "Input");
 
+/// --ignore-checksums: PointSettings::ignore_checksums.
+void add_ignore_checksums(CLI::App& app, bool& ignore);
+
 /// open_points(), saying what the reader found worth saying.
 std::unique_ptr<PointSource> open_point_input(const std::string& path, const PointSettings& reading,
                                               const RunContext& context);

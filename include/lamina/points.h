@@ -38,7 +38,6 @@ struct PointSourceInfo {
   bool random_access = false;        ///< read() takes any row, from several threads at once
   bool double_precision = false;     ///< positions need more than float32
   bool geographic = false;           ///< x and y are degrees of longitude and latitude, in which no job can measure
-  std::string coordinate_system;     ///< as the file has it, mostly well-known text; empty: none given
   std::string crs;                   ///< coordinate reference system: well-known text or EPSG:NUMBER; empty: not told
   std::vector<ScanPart> scans;       ///< ascending, the first begins with row 0; empty: one scan, nothing known of it
   AttributeLayout attributes;        ///< every other scalar property, in the file's order and types

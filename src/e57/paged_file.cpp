@@ -65,8 +65,8 @@ void PagedFile::read(std::uint64_t offset, std::span<std::byte> out) const {
       const std::byte* const at = buffer.get() + i * kPageBytes;
       if (!ignore_checksums_ && crc32c(at, kPagePayload) != load_big<std::uint32_t>(at + kPagePayload)) {
         refuse(
-            fmt::format("the checksum of the page at byte {} is wrong: the file is damaged; --ignore-checksums "
-                        "reads it all the same",
+            fmt::format("the checksum of the page at byte {} is wrong: the file is damaged; save what is there: lamina "
+                        "convert FILE --ignore-checksums -o OTHER",
                         page * kPageBytes));
       }
       const std::size_t n = std::min(kPagePayload - skip, out.size());

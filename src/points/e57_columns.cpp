@@ -117,7 +117,7 @@ class ColumnsBuilder {
     const ScalarType type = type_of(f);
     const auto fits = [&](double full) { return limits && *limits == std::pair{0.0, full}; };
     const bool own = !scan_.intensity || (type == ScalarType::uint8 && fits(255)) ||
-                     (type == ScalarType::uint16 && fits(65535)) || !limits;
+                     (type == ScalarType::uint16 && fits(65535)) || (!is_integer(f) && fits(1)) || !limits;
     E57Column& column = add(*field, "intensity", own ? type : ScalarType::float32);
     if (!own) {
       column.scale = 1 / (limits->second - limits->first);
@@ -146,14 +146,14 @@ class ColumnsBuilder {
     column.column.type = type_of(f);
     if (!limits || limits->first < 0) return;
     if (limits->second <= 1 && !is_integer(f)) {
-      column.column.type = ScalarType::float32;
+      column.column.type = f.kind == Field::Kind::double_float ? ScalarType::float64 : ScalarType::float32;
     } else if (limits->second <= 255) {
       column.column.type = ScalarType::uint8;
     } else {
       column.column.type = ScalarType::uint16;
       column.scale = 65535 / limits->second;
     }
-    column.whole = column.column.type != ScalarType::float32;
+    column.whole = column.scale != 1;
   }
 
   void add_extensions() {
@@ -181,8 +181,11 @@ E57Columns e57_columns(const e57::Scan& scan, const e57::PagedFile& file) {
   return ColumnsBuilder(scan, file).build();
 }
 
-bool e57_is_organised(const e57::Scan& scan) {
-  return find_field(scan, "rowIndex") && find_field(scan, "columnIndex");
+std::optional<std::array<std::size_t, 2>> e57_grid_fields(const e57::Scan& scan) {
+  const auto row = find_field(scan, "rowIndex");
+  const auto column = find_field(scan, "columnIndex");
+  if (!row || !column) return std::nullopt;
+  return std::array{*row, *column};
 }
 
 }  // namespace lamina

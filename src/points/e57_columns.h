@@ -1,5 +1,6 @@
 // Which fields of an E57 scan become which columns, and how.
 #pragma once
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -36,7 +37,7 @@ struct E57Columns {
 /// Throws Error(unreadable) for a scan without positions.
 E57Columns e57_columns(const e57::Scan& scan, const e57::PagedFile& file);
 
-/// Whether points have the rows and columns of a scanner's grid.
-bool e57_is_organised(const e57::Scan& scan);
+/// The fields of the row and the column, where points have those of a scanner's grid.
+std::optional<std::array<std::size_t, 2>> e57_grid_fields(const e57::Scan& scan);
 
 }  // namespace lamina

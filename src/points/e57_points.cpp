@@ -16,6 +16,7 @@
 #include "e57/record_streams.h"
 #include "lamina/points.h"
 #include "points/e57_columns.h"
+#include "points/e57_grid.h"
 #include "points/point_columns.h"
 #include "points/readers.h"
 #include "points/scans.h"
@@ -45,8 +46,19 @@ class E57Scan final : public PointSource {
   [[nodiscard]] std::uint64_t invalid() const { return streams_.scan().records - info_.count; }
   [[nodiscard]] bool by_angles() const { return layout_.by_angles; }
 
+  /// The grid its points stand in; null where there is none.
+  [[nodiscard]] std::shared_ptr<const ScanGrid> grid() const {
+    const auto fields = e57_grid_fields(streams_.scan());
+    if (!fields) return nullptr;
+    E57GridOrder order;
+    for_grid_places(*fields, [&](std::int64_t row, std::int64_t column) { order.add(row, column); });
+    std::shared_ptr<ScanGrid> grid = order.grid();
+    if (grid) for_grid_places(*fields, [&](std::int64_t row, std::int64_t column) { order.mark(row, column, *grid); });
+    return grid;
+  }
+
   void place_scanner(ScanPart::Scanner scanner) { info_.scans = {{0, scanner, {}}}; }
-  void name_coordinates(const std::string& system) { info_.coordinate_system = system; }
+  void name_coordinates(const std::string& system) { info_.crs = system; }
   void remark(std::string text) { info_.remarks.push_back(std::move(text)); }
 
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
@@ -128,6 +140,31 @@ class E57Scan final : public PointSource {
     }
   }
 
+  /// Calls use(row, column) for every valid point.
+  template <class Use>
+  void for_grid_places(const std::array<std::size_t, 2>& grid_fields, const Use& use) const {
+    e57::StreamPieces pieces;
+    std::vector<std::size_t> fields(grid_fields.begin(), grid_fields.end());
+    if (layout_.invalid) fields.push_back(layout_.flags[*layout_.invalid].field);
+    std::array<std::vector<double>, 2> index{std::vector<double>(kE57Block), std::vector<double>(kE57Block)};
+    std::vector<float> flags(kE57Block);
+    for (std::uint64_t first = 0; first < streams_.scan().records; first += kE57Block) {
+      const auto n = static_cast<std::size_t>(std::min<std::uint64_t>(kE57Block, streams_.scan().records - first));
+      streams_.read(first, n, fields, pieces);
+      for (std::size_t k = 0; k < 2; ++k) pieces.unpack(k, 0, n, index[k].data());
+      if (layout_.invalid) pieces.unpack(2, 0, n, flags.data());
+      for (std::size_t i = 0; i < n; ++i) {
+        if (flags[i] == 0) use(whole_index(index[0][i]), whole_index(index[1][i]));
+      }
+    }
+  }
+
+  /// As far as grids go; what is no number is at their end.
+  static std::int64_t whole_index(double value) {
+    constexpr double kFar = E57GridOrder::kLargest;
+    return value < kFar ? static_cast<std::int64_t>(std::max(value, -kFar)) : E57GridOrder::kLargest;
+  }
+
   void count_valid() {
     e57::StreamPieces pieces;
     std::vector<float> flags(kE57Block);
@@ -187,7 +224,7 @@ ScanPart::Scanner scanner_of(const e57::Scan& scan, const e57::Contents& content
   const bool several = std::any_of(contents.scans.begin(), contents.scans.end(), [&](const e57::Scan& other) {
     return other.has_pose && scan.has_pose && other.translation != scan.translation;
   });
-  if (by_angles || turned || several || e57_is_organised(scan)) return ScanPart::Scanner::position;
+  if (by_angles || turned || several || e57_grid_fields(scan)) return ScanPart::Scanner::position;
   return scan.has_pose ? ScanPart::Scanner::pose_origin : ScanPart::Scanner::unknown;
 }
 
@@ -223,12 +260,11 @@ std::unique_ptr<PointSource> open_e57(InputFile file, const std::string& path, b
     const e57::Scan& scan = contents.scans[i];
     const ScanPart::Scanner scanner = scanner_of(scan, contents, scans[i]->by_angles());
     if (scanner != ScanPart::Scanner::unknown) scans[i]->place_scanner(scanner);
+    std::shared_ptr<const ScanGrid> grid = scans[i]->grid();
+    std::unique_ptr<PointSource> source = std::move(scans[i]);
+    if (grid) source = organised_points(std::move(source), std::move(grid));
     const Pose pose = pose_of(scan);
-    if (pose == PointInput{}.pose) {
-      sources.push_back(std::move(scans[i]));
-    } else {
-      sources.push_back(pose_points(std::move(scans[i]), pose));
-    }
+    sources.push_back(pose == PointInput{}.pose ? std::move(source) : pose_points(std::move(source), pose));
   }
   return join_points(std::move(sources));
 }

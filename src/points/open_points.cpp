@@ -26,12 +26,13 @@ using OpenWriter = std::unique_ptr<PointsWriter> (*)(const std::string&, const P
                                                      const PointsWriterSettings&);
 
 /// By the ending of the file's name.
-constexpr std::array<std::pair<const char*, OpenWriter>, 6> kFormats{{{".ply", open_ply_points_writer},
+constexpr std::array<std::pair<const char*, OpenWriter>, 7> kFormats{{{".ply", open_ply_points_writer},
                                                                       {".xyz", open_xyz_points_writer},
                                                                       {".csv", open_csv_points_writer},
                                                                       {".pcd", open_pcd_points_writer},
                                                                       {".las", open_las_points_writer},
-                                                                      {".laz", open_laz_points_writer}}};
+                                                                      {".laz", open_laz_points_writer},
+                                                                      {".e57", open_e57_points_writer}}};
 
 bool is_pipe_or_device(const std::string& path) {
   std::error_code ignored;

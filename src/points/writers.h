@@ -73,6 +73,12 @@ std::unique_ptr<PointsWriter> open_las_points_writer(const std::string& path, co
 std::unique_ptr<PointsWriter> open_laz_points_writer(const std::string& path, const PointColumns& columns,
                                                      const PointsWriterSettings& settings);
 
+/// E57 1.0: one scan without a pose, Cartesian. Normals by the extension `nor`; radius, quality and attributes other
+/// than red green blue and intensity by one of our own, under their names. As open_points_writer() describes; throws
+/// Error(internal) also for names that are none of XML's.
+std::unique_ptr<PointsWriter> open_e57_points_writer(const std::string& path, const PointColumns& columns,
+                                                     const PointsWriterSettings& settings);
+
 /// Text with blanks (XYZ) or commas (CSV), below a line of names. Numbers have as many digits as their type needs to
 /// come back the same. As open_points_writer() describes.
 std::unique_ptr<PointsWriter> open_xyz_points_writer(const std::string& path, const PointColumns& columns,

@@ -5,6 +5,7 @@
 
 namespace lamina::fuzz {
 
+int fuzz_e57(const std::uint8_t* data, std::size_t size);
 int fuzz_file(const std::uint8_t* data, std::size_t size);
 int fuzz_inputs(const std::uint8_t* data, std::size_t size);
 int fuzz_las(const std::uint8_t* data, std::size_t size);
