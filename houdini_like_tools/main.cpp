@@ -35,6 +35,7 @@ int main(int argc, char** argv) {
       add_merge,
       add_clean,
       add_clip,
+      add_simplify,
       add_transform,
       add_sort,
       add_normal,

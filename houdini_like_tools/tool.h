@@ -18,6 +18,7 @@ void add_convert(CLI::App& app);
 void add_merge(CLI::App& app);
 void add_clean(CLI::App& app);
 void add_clip(CLI::App& app);
+void add_simplify(CLI::App& app);
 void add_transform(CLI::App& app);
 void add_sort(CLI::App& app);
 void add_normal(CLI::App& app);

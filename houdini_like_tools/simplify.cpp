@@ -1,0 +1,91 @@
+// lamina simplify: fewer triangles for the same surface.
+#include "lamina/simplify.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <memory>
+
+#include "common/console.h"
+#include "common/help.h"
+#include "common/inputs.h"
+#include "common/outputs.h"
+#include "common/text.h"
+#include "lamina/error.h"
+#include "tool.h"
+
+namespace lamina::tools {
+namespace {
+
+struct SimplifyOptions {
+  std::string input, output;
+  std::uint64_t triangles = 0;
+  double ratio = 0;
+  BadSamples bad = BadSamples::drop;
+  RunOptions run;
+  const CLI::App* tool = nullptr;  ///< knows which options were given
+};
+
+std::uint64_t wanted_triangles(const SimplifyOptions& o, std::size_t there) {
+  if (o.tool->count("--triangles") > 0) return o.triangles;
+  if (!(o.ratio > 0 && o.ratio <= 1))
+    throw Error(ExitCode::usage, fmt::format("--ratio {:g}: is a share above 0 and up to 1", o.ratio));
+  return static_cast<std::uint64_t>(std::max(1.0, std::floor(o.ratio * static_cast<double>(there))));
+}
+
+void run_simplify(const SimplifyOptions& o) {
+  if (o.tool->count("--triangles") + o.tool->count("--ratio") == 0)
+    throw Error(ExitCode::usage, "one of --triangles and --ratio says how far to simplify");
+  require_mesh_name(o.output);
+  const RunContext context = make_context(o.run, o.output);
+  TriangleMesh mesh = read_mesh_input(o.input, context, o.bad);
+  if (mesh.triangles.empty())
+    throw Error(ExitCode::unreadable, fmt::format("{}: has no faces: a point cloud, not a mesh", shown_name(o.input)));
+  // Doubles, quadrics and a queue of edges, whatever the file's format.
+  constexpr std::size_t kBytesPerTriangle = 450;
+  if (context.max_memory > 0 && kBytesPerTriangle * mesh.triangles.size() > context.max_memory) {
+    throw Error(ExitCode::budget,
+                fmt::format("{}: simplifying {} triangles needs about {} of memory, --max-memory "
+                            "allows {}; give it more",
+                            shown_name(o.input), count_text(mesh.triangles.size()),
+                            bytes_text(kBytesPerTriangle * mesh.triangles.size()), bytes_text(context.max_memory)));
+  }
+  const SimplifyStats stats = simplify_mesh(mesh, {wanted_triangles(o, mesh.triangles.size())}, context);
+  if (!stats.reached) {
+    context.warn(
+        fmt::format("{}: more triangles stay than were wanted: no other edge can go without a fold or a change "
+                    "of topology",
+                    shown_name(o.input)));
+  }
+  write_mesh(mesh, pipe_name(o.output));
+  context.info(
+      fmt::format("{} triangles of {}", count_text(stats.triangles_after), count_text(stats.triangles_before)));
+}
+
+}  // namespace
+
+void add_simplify(CLI::App& app) {
+  auto* tool = app.add_subcommand("simplify", "Give a mesh fewer triangles where they count least");
+  auto o = std::make_shared<SimplifyOptions>();
+  o->tool = tool;
+  add_files(*tool, o->input, "Mesh, manifold: .ply .obj .off .stl, each also as .gz", o->output,
+            "Mesh: .ply .obj .off .stl; - for PLY on standard output");
+  auto* triangles = tool->add_option("--triangles", o->triangles, "How many triangles stay, at most those there are");
+  triangles->type_name("N");
+  tool->add_option("--ratio", o->ratio, "Which share of the triangles stays, above 0 and up to 1")
+      ->type_name("K")
+      ->excludes(triangles);
+  add_bad_samples(*tool, o->bad, "Vertices");
+  add_run_options(*tool, o->run);
+  add_notes(
+      *tool,
+      "Edges are contracted in the order of their quadric error, each to the point of least error; attributes are "
+      "interpolated. The mesh stays manifold with the same parts, handles and boundary loops. There is no bound "
+      "on the error: 'lamina compare' measures it. The mesh is held in memory, and one thread works.");
+  add_examples(*tool, "  lamina simplify mesh.ply --ratio 0.5 -o fewer.ply");
+  tool->callback([o] { run_simplify(*o); });
+}
+
+}  // namespace lamina::tools
