@@ -29,6 +29,7 @@ struct VolumeExport {
   std::size_t points_per_file = 1 << 20;  ///< > 0; more points become a numbered sequence of files
 
   std::optional<std::array<double, 3>> shift{};  ///< to add to coordinates; written as the metadata `shift`
+  std::string crs{};                             ///< PointSourceInfo::crs; written as the metadata `crs`
 
   static constexpr const char* kColours = "auto";
   /// True when anything is to be written.

@@ -7,9 +7,12 @@
 
 namespace lamina::volume {
 
-CornerPoints::CornerPoints(std::string path, std::size_t per_file, const AttributeLayout& layout, const Frame& frame,
-                           const std::optional<std::array<double, 3>>& shift)
-    : path_(std::move(path)), per_file_(per_file), frame_(frame), shift_(shift) {
+CornerPoints::CornerPoints(const VolumeExport& settings, const AttributeLayout& layout, const Frame& frame)
+    : path_(settings.points),
+      per_file_(settings.points_per_file),
+      frame_(frame),
+      shift_(settings.shift),
+      crs_(settings.crs) {
   points_.layout = layout;
   points_.samples.attributes.resize(layout.size());
   // An output that cannot be written is refused before the work.
@@ -45,6 +48,7 @@ void CornerPoints::write_file() {
   const auto grid = point_grid(points_);
   label(*grid, "points", false);
   if (shift_) note_shift(*grid, *shift_);
+  note_crs(*grid, crs_);
   const std::string bytes = vdb_bytes({grid});
   bytes_ += bytes.size();
   files_.back()->write(bytes);

@@ -10,16 +10,15 @@
 #include "base/output_file.h"
 #include "isosurface/iso_mesh.h"
 #include "lamina/frame.h"
+#include "lamina/volume_export.h"
 #include "lamina/volume_points.h"
 
 namespace lamina::volume {
 
-/// A points grid needs all of its points at once: beyond `per_file` a numbered sequence is begun.
+/// A points grid needs all of its points at once: beyond VolumeExport::points_per_file a numbered sequence is begun.
 class CornerPoints {
  public:
-  /// `shift`: VolumeExport::shift.
-  CornerPoints(std::string path, std::size_t per_file, const AttributeLayout& layout, const Frame& frame,
-               const std::optional<std::array<double, 3>>& shift);
+  CornerPoints(const VolumeExport& settings, const AttributeLayout& layout, const Frame& frame);
   void add(const IsoSlab& slab);
   void finish();
   /// The names the files appear under.
@@ -34,6 +33,7 @@ class CornerPoints {
   std::size_t per_file_;
   Frame frame_;
   std::optional<std::array<double, 3>> shift_;
+  std::string crs_;
   PointArrays points_;
   std::vector<std::unique_ptr<ResultFile>> files_;
   std::uint64_t count_ = 0, bytes_ = 0;

@@ -103,7 +103,7 @@ SurfaceVolume::Impl::Impl(const VolumeExport& s, const Frame& f, const Lattice& 
                           const AttributeLayout& layout, const std::string& tmp)
     : settings(s), frame(f), tmp_dir(tmp), half(s.half) {
   openvdb::initialize();
-  if (!s.points.empty()) points = std::make_unique<CornerPoints>(s.points, s.points_per_file, layout, f, s.shift);
+  if (!s.points.empty()) points = std::make_unique<CornerPoints>(s, layout, f);
   if (s.path.empty()) return;
   std::vector<int> channels;
   extras = resolve_grids(s.grids, layout, f.step, channels);
@@ -142,6 +142,7 @@ void SurfaceVolume::Impl::begin_file() {
       grid->setTransform(level.frame.transform->copy());
       label(*grid, name, half);
       if (settings.shift) note_shift(*grid, *settings.shift);
+      note_crs(*grid, settings.crs);
       level.numbers.push_back(files.back()->add_grid(grid));
     };
     const auto distances = openvdb::FloatGrid::create(static_cast<float>(level.frame.voxel * settings.band));

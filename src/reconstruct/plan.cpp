@@ -192,6 +192,7 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
     plan.waiting_vertex_bytes = vertex_record_bytes(plan.mesh_attributes, plan.double_positions);
   plan.volume = s.volume;
   plan.volume.shift = cloud.shift;
+  plan.volume.crs = cloud.info.crs;
   if (!cloud.info.crs.empty()) plan.comments.push_back("crs " + cloud.info.crs);
   if (cloud.shift) plan.comments.push_back("shift " + shift_text(*cloud.shift));
 }

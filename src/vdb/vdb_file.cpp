@@ -166,6 +166,10 @@ void note_shift(openvdb::GridBase& grid, const std::array<double, 3>& shift) {
   grid.insertMeta("shift", openvdb::Vec3DMetadata(openvdb::Vec3d(shift[0], shift[1], shift[2])));
 }
 
+void note_crs(openvdb::GridBase& grid, const std::string& crs) {
+  if (!crs.empty()) grid.insertMeta("crs", openvdb::StringMetadata(crs));
+}
+
 std::string vdb_bytes(const openvdb::GridCPtrVec& grids) {
   std::ostringstream stream(std::ios::binary);
   WholeArchive archive;

@@ -56,6 +56,9 @@ void label(openvdb::GridBase& grid, const std::string& name, bool half);
 /// Metadata `shift`: what to add to the grid's coordinates to get the input's.
 void note_shift(openvdb::GridBase& grid, const std::array<double, 3>& shift);
 
+/// Metadata `crs`: the coordinate reference system, where there is one.
+void note_crs(openvdb::GridBase& grid, const std::string& crs);
+
 /// Writes the grids beside `path`, then renames; "-" is standard output. Returns the size in bytes.
 std::uint64_t write_vdb(const openvdb::GridCPtrVec& grids, const std::string& path);
 

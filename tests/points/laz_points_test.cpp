@@ -6,11 +6,13 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <random>
+#include <set>
 
 #include "base/temporary_folder.h"
 #include "lamina/points_writer.h"
@@ -269,6 +271,35 @@ TEST_F(LazPoints, TheCoordinateSystemGoesAlong) {
   EXPECT_EQ(crs_name("EPSG:32616"), "EPSG:32616");
   const auto joined = open_points({laz, las_of("f0"), folder_ / "a.ply"}, PointSettings{});
   EXPECT_EQ(joined->info().crs, crs);
+}
+
+TEST_F(LazPoints, NodesOfCopc) {
+  const std::string path = LAMINA_SOURCE_DIR "/../shared/data/laz/1.2-with-color.copc.laz";
+  if (!std::filesystem::exists(path)) GTEST_SKIP() << path << " is absent";
+  const auto points_of = [&](const PointSelection& selection) {
+    const SampleBatch rows = all_rows(path, {.select = selection});
+    std::multiset<std::array<double, 3>> points;
+    for (std::size_t i = 0; i < rows.size(); ++i) points.insert({rows.x[i], rows.y[i], rows.z[i]});
+    return points;
+  };
+  const auto all = points_of({});
+  EXPECT_EQ(all.size(), 1065U);
+  EXPECT_EQ(points_of({.resolution = 1e-9}), all);
+  std::size_t fewer = 0;
+  for (double resolution = 4096; resolution > 1; resolution /= 2) {
+    const auto coarse = points_of({.resolution = resolution});
+    EXPECT_GE(coarse.size(), fewer);
+    EXPECT_TRUE(std::includes(all.begin(), all.end(), coarse.begin(), coarse.end()));
+    fewer = coarse.size();
+  }
+  EXPECT_GT(fewer, points_of({.resolution = 4096}).size());
+  const std::array<std::array<double, 3>, 2> box{{{636000, 849000, 0}, {636500, 849500, 1000}}};
+  const auto near = points_of({.box = box});
+  EXPECT_LT(near.size(), all.size());
+  for (const auto& p : all) {
+    const bool inside = p[0] >= box[0][0] && p[0] <= box[1][0] && p[1] >= box[0][1] && p[1] <= box[1][1];
+    EXPECT_TRUE(!inside || near.contains(p));
+  }
 }
 
 TEST_F(LazPoints, PairsOfOtherPrograms) {
