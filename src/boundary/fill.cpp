@@ -16,17 +16,12 @@ namespace {
 using Vec2 = Eigen::Vector2d;
 using Vec3 = Eigen::Vector3d;
 
-template <class T>
-Vec3 as_vec(const std::array<T, 3>& v) {
-  return Vec3(static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2]));
-}
-
 double length_in_radii(const Loop& loop) {
   double sum = 0;
   const std::size_t n = loop.vertices.size();
   for (std::size_t i = 0; i < n; ++i) {
     const BoundaryVertex &a = loop.vertices[i], &b = loop.vertices[(i + 1) % n];
-    sum += 2 * (as_vec(b.position) - as_vec(a.position)).norm() /
+    sum += 2 * (to_vec(b.position) - to_vec(a.position)).norm() /
            (static_cast<double>(a.radius) + static_cast<double>(b.radius));
   }
   return sum;
@@ -162,9 +157,9 @@ Filling fill_small(const Loop& loop) {
 /// The boundary loop of a lone triangle, whose filling would be its back.
 bool is_triangle(const Loop& loop) {
   return loop.vertices.size() == 3 && loop.facing[0] == loop.facing[1] && loop.facing[1] == loop.facing[2] &&
-         (as_vec(loop.vertices[1].position) - as_vec(loop.vertices[0].position))
-                 .cross(as_vec(loop.vertices[2].position) - as_vec(loop.vertices[0].position))
-                 .dot(as_vec(loop.facing[0])) <= 0;
+         (to_vec(loop.vertices[1].position) - to_vec(loop.vertices[0].position))
+                 .cross(to_vec(loop.vertices[2].position) - to_vec(loop.vertices[0].position))
+                 .dot(to_vec(loop.facing[0])) <= 0;
 }
 
 }  // namespace
@@ -235,13 +230,13 @@ Filling fill_any(const Loop& loop) {
 
 FilledPlace::FilledPlace(const Loop& loop, const Filling& filling)
     : base_(widest_base(loop)), triangles_(filling.triangles) {
-  for (const BoundaryVertex& v : loop.vertices) points_.push_back(base_.local(as_vec(v.position)));
+  for (const BoundaryVertex& v : loop.vertices) points_.push_back(base_.local(to_vec(v.position)));
   for (const Vec3& p : points_) outline_.emplace_back(p.head<2>());
-  for (const auto& v : filling.positions) points_.push_back(base_.local(as_vec(v)));
+  for (const auto& v : filling.positions) points_.push_back(base_.local(to_vec(v)));
 }
 
 bool FilledPlace::holds(const BoundaryVertex& other) const {
-  const Vec3 p = base_.local(as_vec(other.position));
+  const Vec3 p = base_.local(to_vec(other.position));
   for (const auto& t : triangles_) {
     const Vec3 &a = points_[t[0]], &b = points_[t[1]], &c = points_[t[2]];
     const double u = cross(b.head<2>() - p.head<2>(), c.head<2>() - p.head<2>());
@@ -256,7 +251,7 @@ bool FilledPlace::holds(const BoundaryVertex& other) const {
 
 bool FilledPlace::surrounds(const Loop& other) const {
   return std::all_of(other.vertices.begin(), other.vertices.end(), [&](const BoundaryVertex& v) {
-    return is_inside(base_.local(as_vec(v.position)).head<2>(), outline_);
+    return is_inside(base_.local(to_vec(v.position)).head<2>(), outline_);
   });
 }
 

@@ -16,11 +16,6 @@ using Vec3 = Eigen::Vector3d;
 /// What chance adds to a rim is gone after so many passes; what winds still does so at large.
 constexpr int kMostSmoothing = 20;
 
-template <class T>
-Vec3 to_vec(const std::array<T, 3>& v) {
-  return Vec3(static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2]));
-}
-
 void stand_across(const Vec3& normal, Base& base) {
   if (!(normal.norm() > 0)) return;
   const Vec3 up = normal.normalized();

@@ -12,6 +12,11 @@
 
 namespace lamina::boundary {
 
+template <class T>
+Eigen::Vector3d to_vec(const std::array<T, 3>& v) {
+  return Eigen::Vector3d(static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2]));
+}
+
 /// A plane through the middle of a boundary loop.
 struct Base {
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
