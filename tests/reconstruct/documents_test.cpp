@@ -48,7 +48,7 @@ std::map<std::string, double> defined_in(const std::string& source) {
   std::map<std::string, double> found;
   const std::string text = text_of(source);
   const std::regex definition(
-      R"((?:float|double|int|std::int32_t|std::uint32_t|std::uint64_t|std::size_t) (\w+) = (-?[0-9.e-]+)F?U?(?: \* ([0-9.]+)F?)?[;,])");
+      R"((?:float|double|std::optional<double>|int|std::int32_t|std::uint32_t|std::uint64_t|std::size_t) (\w+) = (-?[0-9.e-]+)F?U?(?: \* ([0-9.]+)F?)?[;,])");
   for (std::sregex_iterator i(text.begin(), text.end(), definition), end; i != end; ++i) {
     const double factor = (*i)[3].matched ? std::strtod((*i)[3].str().c_str(), nullptr) : 1;
     found[(*i)[1]] = factor * std::strtod((*i)[2].str().c_str(), nullptr);
