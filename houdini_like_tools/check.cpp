@@ -113,7 +113,9 @@ void run_check(const CheckOptions& o) {
 void add_check(CLI::App& app) {
   auto* tool = app.add_subcommand("check", "Check that a mesh is finite, manifold, oriented and closed");
   auto o = std::make_shared<CheckOptions>();
-  tool->add_option("MESH", o->mesh, "Mesh to check: .ply .obj .off .stl, each also as .gz")->required()->type_name("");
+  tool->add_option("MESH", o->mesh, "Mesh to check: .ply .obj .off .stl .glb, each also as .gz")
+      ->required()
+      ->type_name("");
   tool->add_option("--expect", o->expect,
                    "Exit with 6 when the mesh is not manifold, or not closed (manifold without boundary)")
       ->check(CLI::IsMember({"manifold", "closed"}).description(""))

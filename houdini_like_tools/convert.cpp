@@ -69,7 +69,7 @@ void points_to_volume(const ConvertOptions& o, PointSource& source, const RunCon
 void convert_points(const ConvertOptions& o, const RunContext& context) {
   const std::string to = file_ending(o.output);
   if (to == ".vdb") return points_to_volume(o, *open_point_input(o.input, o.reading, context), context);
-  if (to == ".off" || to == ".stl")
+  if (to == ".off" || to == ".stl" || to == ".glb")
     throw Error(ExitCode::usage, fmt::format("{}: points do not become a {} file: make a mesh of them with 'lamina "
                                              "surface' first",
                                              shown_name(o.input), to));
@@ -185,8 +185,9 @@ void run_convert(const ConvertOptions& o) {
 void add_convert(CLI::App& app) {
   auto* tool = app.add_subcommand("convert", "Write points or a mesh in another format");
   auto o = std::make_shared<ConvertOptions>();
-  add_files(*tool, o->input, "Points (streamed), mesh or volume (.vdb: level set or points)", o->output,
-            "File to write: points (.ply .xyz .csv .pcd .las .laz .e57), mesh (.ply .obj .off .stl) or volume (.vdb)");
+  add_files(
+      *tool, o->input, "Points (streamed), mesh or volume (.vdb: level set or points)", o->output,
+      "File to write: points (.ply .xyz .csv .pcd .las .laz .e57), mesh (.ply .obj .off .stl .glb) or volume (.vdb)");
   tool->add_flag("--vertices", o->vertices, "Write a mesh's vertices as points")->group("Output");
   const std::string volume = "Volume";
   tool->add_option("--grid", o->grid, "Name of the grid to read, or of the points grid to write")
@@ -224,6 +225,7 @@ void add_convert(CLI::App& app) {
       "to file; meshes, volumes and points on their way to or from a .vdb are held in memory.");
   add_examples(*tool,
                "  lamina convert mesh.ply -o mesh.obj\n"
+               "  lamina convert mesh.ply -o mesh.glb\n"
                "  lamina convert mesh.ply -o mesh.vdb --voxelsize 0.05\n"
                "  lamina convert mesh.vdb -o remeshed.ply\n"
                "  lamina convert mesh.vdb --fog -o fog.vdb\n"

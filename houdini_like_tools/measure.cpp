@@ -109,7 +109,7 @@ void add_measure(CLI::App& app) {
   auto o = std::make_shared<MeasureOptions>();
   tool->add_option_function<std::string>(
           "MESH", [o](const std::string& name) { o->mesh = pipe_name(name); },
-          "Mesh: .ply .obj .off .stl, each also as .gz; - for PLY on standard input")
+          "Mesh: .ply .obj .off .stl .glb, each also as .gz; - for PLY on standard input")
       ->required()
       ->type_name("");
   tool->add_flag("--json", o->json, "Print JSON");

@@ -22,8 +22,8 @@ namespace lamina::tools {
 namespace {
 
 struct MergeOptions {
-  std::vector<std::string> inputs;
-  std::string output;
+  std::vector<std::string> inputs, outputs;
+  std::string output;  ///< the first
   PointSettings reading;
   MixedAttributes mixed = MixedAttributes::refuse;
   BadSamples bad = BadSamples::drop;
@@ -76,8 +76,8 @@ void merge_grids(const MergeOptions& o, const std::vector<PointInput>& inputs, c
 }
 
 void merge_chunks(const MergeOptions& o, const RunContext& context) {
-  require_mesh_name(o.output);
-  const MergedParts merged = merge_parts(o.inputs, o.output, context);
+  std::for_each(o.outputs.begin(), o.outputs.end(), require_mesh_name);
+  const MergedParts merged = merge_parts(o.inputs, o.outputs, context);
   context.info(fmt::format("{} vertices, {} triangles of {} parts", count_text(merged.vertices),
                            count_text(merged.triangles), merged.parts));
   context.info(describe(merged.holes));
@@ -86,6 +86,8 @@ void merge_chunks(const MergeOptions& o, const RunContext& context) {
 void run_merge(const MergeOptions& o) {
   const RunContext context = make_context(o.run, o.output);
   if (std::any_of(o.inputs.begin(), o.inputs.end(), is_part)) return merge_chunks(o, context);
+  if (o.outputs.size() > 1)
+    throw Error(ExitCode::usage, "several --output are for the parts of a mesh; name one, and convert it");
   const auto word = [](FileContent content) {
     return content == FileContent::points ? "points" : content == FileContent::mesh ? "a mesh" : "a volume";
   };
@@ -121,10 +123,16 @@ void add_merge(CLI::App& app) {
       ->required()
       ->expected(1, 1000000)
       ->type_name(" ");
-  tool->add_option_function<std::string>(
-          "-o,--output", [o](const std::string& name) { o->output = pipe_name(name); },
-          "File of the same kind, by its ending; - for PLY on standard output")
+  tool->add_option_function<std::vector<std::string>>(
+          "-o,--output",
+          [o](const std::vector<std::string>& names) {
+            for (const std::string& name : names) o->outputs.push_back(pipe_name(name));
+            o->output = o->outputs.front();
+          },
+          "File of the same kind, by its ending; - for PLY on standard output. Of the parts of a mesh several -o write "
+          "it in several formats")
       ->required()
+      ->allow_extra_args(false)
       ->type_name("FILE")
       ->group("Output");
   const std::map<std::string, MixedAttributes> words{

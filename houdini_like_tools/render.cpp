@@ -145,10 +145,10 @@ void check_together(const RenderOptions& o) {
 void add_render(CLI::App& app) {
   CLI::App* tool = app.add_subcommand("render", "Draw a picture of a mesh, a point cloud or a volume");
   auto o = std::make_shared<RenderOptions>();
-  tool->add_option(
-          "INPUT", o->input,
-          "Mesh (.ply .obj .off .stl, each also as .gz), points (- for standard input), or volume (.vdb: level set, "
-          "fog or points)")
+  tool->add_option("INPUT", o->input,
+                   "Mesh (.ply .obj .off .stl .glb, each also as .gz), points (- for standard input), or volume (.vdb: "
+                   "level set, "
+                   "fog or points)")
       ->required()
       ->type_name("");
   tool->add_option("-o,--output", o->output, "Picture to write: PNG, - for standard output")

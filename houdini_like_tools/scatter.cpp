@@ -67,7 +67,7 @@ void add_scatter(CLI::App& app) {
       "scatter", "Scatter points with normals (and colours) over a mesh or a shape, uniformly by area");
   auto o = std::make_shared<ScatterOptions>();
   auto* mesh =
-      tool->add_option("MESH", o->mesh, "Mesh to sample: .ply .obj .off .stl, each also as .gz")->type_name("");
+      tool->add_option("MESH", o->mesh, "Mesh to sample: .ply .obj .off .stl .glb, each also as .gz")->type_name("");
   auto* shape = tool->add_option("--shape", o->shape, "A procedural shape instead of a mesh")
                     ->check(CLI::IsMember(known_shapes()));
   mesh->excludes(shape);

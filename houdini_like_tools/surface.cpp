@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -28,7 +29,7 @@ namespace lamina::tools {
 namespace {
 
 struct SurfaceOptions {
-  std::vector<std::string> inputs;
+  std::vector<std::string> inputs, outputs;
   SurfaceSettings settings;
   RunOptions run;
   PartsOptions parts;
@@ -46,7 +47,7 @@ void draw_preview(const SurfaceOptions& o, const std::string& mesh, const RunCon
   const std::uintmax_t most = context.max_memory > 0 ? context.max_memory : kUnasked;
   const bool whole = kPicture + kBytesPerByte * std::filesystem::file_size(mesh) <= most;
   const std::string ending = file_ending(mesh);
-  if (!whole && (ending == ".off" || ending == ".stl")) {
+  if (!whole && ending != ".ply" && ending != ".obj") {
     context.warn(
         fmt::format("{}: not drawn: the mesh is too large to be held for a picture, and only the vertices of "
                     "a .ply or .obj can be drawn as they are read",
@@ -86,23 +87,46 @@ void choose_what_is_not_given(const SurfaceOptions& o, SurfaceSettings& settings
   if (!given("--strays")) settings.clean.strays = launch().size == 1;
 }
 
+/// The file of the mesh that is drawn: one that can be read as it streams, if there is one. Empty where nothing but
+/// standard output is written.
+std::string file_to_draw(const std::vector<std::string>& outputs) {
+  std::string file;
+  for (const std::string& output : outputs) {
+    if (output == "-") continue;
+    if (file_ending(output) == ".ply") return output;
+    if (file.empty()) file = output;
+  }
+  return file;
+}
+
+void require_outputs(const SurfaceOptions& o, const std::vector<std::string>& outputs) {
+  const bool streams = std::find(outputs.begin(), outputs.end(), "-") != outputs.end();
+  if (o.parts.chunked && outputs.size() > 1)
+    throw Error(ExitCode::usage, "--chunk makes one part of a mesh; give one --output, and lamina merge the others");
+  if (!o.parts.chunked) std::for_each(outputs.begin(), outputs.end(), require_mesh_name);
+  if (o.stats == "-" && streams)
+    throw Error(ExitCode::usage, "--stats and --output both name standard output; give one of them a file");
+  if (o.preview.empty()) return;
+  if (streams && file_to_draw(outputs).empty())
+    throw Error(ExitCode::usage, "--preview draws the mesh file; give --output one");
+  if (o.parts.chunked) throw Error(ExitCode::usage, "--preview draws a mesh, --chunk makes only a part of one");
+  if (std::find(outputs.begin(), outputs.end(), o.preview) != outputs.end())
+    throw Error(ExitCode::usage, "--preview and --output name the same file");
+}
+
 void run_surface(const SurfaceOptions& o) {
   SurfaceSettings settings = o.settings;
   choose_what_is_not_given(o, settings);
   settings.input = pipe_name(o.inputs.front());
   for (auto name = o.inputs.begin() + 1; name != o.inputs.end(); ++name)
     settings.more_inputs.push_back(pipe_name(*name));
-  settings.output = pipe_name(settings.output);
-  if (!o.parts.chunked) require_mesh_name(settings.output);
-  if (o.stats == "-" && settings.output == "-") {
-    throw Error(ExitCode::usage, "--stats and --output both name standard output; give one of them a file");
+  std::vector<std::string> outputs;
+  for (const std::string& name : o.outputs) outputs.push_back(pipe_name(name));
+  require_outputs(o, outputs);
+  if (!outputs.empty()) {
+    settings.output = outputs.front();
+    settings.more_outputs.assign(outputs.begin() + 1, outputs.end());
   }
-  if (!o.preview.empty() && settings.output == "-")
-    throw Error(ExitCode::usage, "--preview draws the mesh file; give --output one");
-  if (!o.preview.empty() && o.parts.chunked)
-    throw Error(ExitCode::usage, "--preview draws a mesh, --chunk makes only a part of one");
-  if (!o.preview.empty() && o.preview == settings.output)
-    throw Error(ExitCode::usage, "--preview and --output name the same file");
   require_picture_name(o.preview);
   if (!o.preview.empty() && !settings.dry_run && launch().rank == 0)
     ResultFile(o.preview);  // refuses what cannot be written, before the work
@@ -139,7 +163,7 @@ void run_surface(const SurfaceOptions& o) {
       context.info(
           fmt::format("{} ... {}: {} files, {}", v.files.front(), v.files.back(), v.files.size(), bytes_text(v.bytes)));
   }
-  if (!o.preview.empty() && !settings.dry_run) draw_preview(o, settings.output, context);
+  if (!o.preview.empty() && !settings.dry_run) draw_preview(o, file_to_draw(outputs), context);
   if (!stats_file) return;
   nlohmann::ordered_json json = stats_json(stats, settings);
   if (parts.chunk) {
@@ -173,10 +197,11 @@ void add_surface(CLI::App& app) {
       ->required()
       ->type_name("");
   auto* output = tool->add_option(
-      "-o,--output", s.output,
-      "Mesh to write: .ply, binary and streamed; .obj, .off or .stl, written when the mesh is complete; - for PLY on "
-      "standard output. Not needed with --dry-run and --print-tasks");
-  output->type_name("FILE");
+      "-o,--output", o->outputs,
+      "Mesh to write: .ply, binary and streamed; .obj, .off, .stl or .glb, written when the mesh is complete; - for "
+      "PLY "
+      "on standard output. Several -o write it in several formats. Not needed with --dry-run and --print-tasks");
+  output->type_name("FILE")->allow_extra_args(false);
 
   const std::string samples = "Samples";
   add_point_options(*tool, s.columns, s.select, samples);
@@ -305,10 +330,11 @@ void add_surface(CLI::App& app) {
   add_examples(*tool,
                "  lamina surface scan.ply -o mesh_of_scan.ply\n"
                "  lamina surface scan.ply -o mesh_of_scan.stl\n"
+               "  lamina surface scan.ply -o for_archive.ply -o for_viewers.glb\n"
                "  lamina surface scan.ply --dry-run\n"
                "  lamina surface scan.ply -o smooth.ply --blend 2 --vdb smooth.vdb --stats smooth.json");
   tool->callback([o, tool, output, dry] {
-    if (o->parts.tasks > 0) return print_tasks(*tool, o->inputs.front(), o->settings.output, o->parts);
+    if (o->parts.tasks > 0) return print_tasks(*tool, o->inputs.front(), o->outputs, o->parts);
     if (output->count() == 0 && dry->count() == 0) throw CLI::RequiredError("--output");
     run_surface(*o);
   });

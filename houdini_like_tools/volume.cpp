@@ -46,7 +46,7 @@ void add_volume(CLI::App& app) {
   auto* tool = app.add_subcommand("volume", "Convert a mesh to an OpenVDB narrow-band level set");
   auto o = std::make_shared<VolumeOptions>();
   VolumeSettings& s = o->settings;
-  tool->add_option("MESH", o->mesh, "Mesh to convert: .ply .obj .off .stl, each also as .gz")
+  tool->add_option("MESH", o->mesh, "Mesh to convert: .ply .obj .off .stl .glb, each also as .gz")
       ->required()
       ->type_name("");
   tool->add_option("-o,--output", o->output, "Volume to write: .vdb, - for standard output")

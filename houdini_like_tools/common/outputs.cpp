@@ -22,12 +22,12 @@ namespace {
 
 using namespace std::string_view_literals;
 
-constexpr std::array kMeshes{".ply"sv, ".obj"sv, ".off"sv, ".stl"sv};
-constexpr std::array kOthers{".gz"sv,   ".zip"sv, ".vdb"sv,  ".xyz"sv, ".csv"sv,  ".txt"sv,  ".pts"sv, ".ptx"sv,
-                             ".pcd"sv,  ".las"sv, ".laz"sv,  ".e57"sv, ".gltf"sv, ".glb"sv,  ".usd"sv, ".usda"sv,
-                             ".usdc"sv, ".fbx"sv, ".usdz"sv, ".abc"sv, ".dae"sv,  ".3mf"sv,  ".geo"sv, ".bgeo"sv,
-                             ".vtk"sv,  ".vtp"sv, ".json"sv, ".png"sv, ".jpg"sv,  ".jpeg"sv, ".exr"sv, ".tif"sv,
-                             ".tiff"sv, ".bmp"sv, ".gif"sv,  ".svg"sv, ".pdf"sv,  ".webp"sv, ".mp4"sv};
+constexpr std::array kMeshes{".ply"sv, ".obj"sv, ".off"sv, ".stl"sv, ".glb"sv};
+constexpr std::array kOthers{".gz"sv,  ".zip"sv,  ".vdb"sv, ".xyz"sv, ".csv"sv,  ".txt"sv, ".pts"sv,  ".ptx"sv,
+                             ".pcd"sv, ".las"sv,  ".laz"sv, ".e57"sv, ".gltf"sv, ".usd"sv, ".usda"sv, ".usdc"sv,
+                             ".fbx"sv, ".usdz"sv, ".abc"sv, ".dae"sv, ".3mf"sv,  ".geo"sv, ".bgeo"sv, ".vtk"sv,
+                             ".vtp"sv, ".json"sv, ".png"sv, ".jpg"sv, ".jpeg"sv, ".exr"sv, ".tif"sv,  ".tiff"sv,
+                             ".bmp"sv, ".gif"sv,  ".svg"sv, ".pdf"sv, ".webp"sv, ".mp4"sv};
 
 template <class Endings>
 bool among(const Endings& endings, std::string_view ending) {
@@ -86,7 +86,7 @@ void require_mesh_name(const std::string& output) {
   const std::string hint = ending == ".gz"    ? ", or pipe a PLY on: -o - | gzip"
                            : ending == ".vdb" ? " (--vdb names the volume beside it)"
                                               : "";
-  require(output, ".ply", "the mesh is written as PLY, OBJ, OFF or STL", hint);
+  require(output, ".ply", "the mesh is written as PLY, OBJ, OFF, STL or GLB", hint);
 }
 
 void require_volume_name(const std::string& output) {

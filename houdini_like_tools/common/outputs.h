@@ -28,7 +28,7 @@ std::string volume_text(std::string_view verb, const VolumeEditStats& stats);
 // Each throws Error(usage) for a name such as "mesh.usd" that promises another format, with the way to what was meant.
 // Names that promise nothing ("-", "out", "mesh.tmp") will do.
 
-/// Reconstructed meshes: PLY, OBJ, OFF, STL.
+/// Reconstructed meshes: PLY, OBJ, OFF, STL, GLB.
 void require_mesh_name(const std::string& output);
 /// OpenVDB files.
 void require_volume_name(const std::string& output);

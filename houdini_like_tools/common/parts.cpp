@@ -67,13 +67,14 @@ struct Task {
   Words command, after;
 };
 
-std::vector<Task> list_tasks(const CLI::App& tool, const std::string& input, const std::string& output, int count) {
-  const std::filesystem::path mesh(output);
+std::vector<Task> list_tasks(const CLI::App& tool, const std::string& input, const std::vector<std::string>& outputs,
+                             int count) {
+  const std::filesystem::path mesh(outputs.front());
   const std::string stem = (mesh.parent_path() / mesh.stem()).string();
   const Words options = common_options(tool);
   const std::size_t digits = std::to_string(count).size();
   std::vector<Task> tasks;
-  Task merge{"merge", output, {"lamina", "merge"}, {}};
+  Task merge{"merge", outputs.front(), {"lamina", "merge"}, {}};
   for (int number = 1; number <= count; ++number) {
     Task task;
     task.name = fmt::format("chunk {}/{}", number, count);
@@ -87,7 +88,7 @@ std::vector<Task> list_tasks(const CLI::App& tool, const std::string& input, con
     merge.after.push_back(task.name);
     tasks.push_back(std::move(task));
   }
-  merge.command.insert(merge.command.end(), {"-o", output});
+  for (const std::string& output : outputs) merge.command.insert(merge.command.end(), {"-o", output});
   tasks.push_back(std::move(merge));
   return tasks;
 }
@@ -162,11 +163,11 @@ void report_ranks(const std::vector<RankStats>& ranks, const RunContext& context
   }
 }
 
-void print_tasks(const CLI::App& tool, const std::string& input, const std::string& output,
+void print_tasks(const CLI::App& tool, const std::string& input, const std::vector<std::string>& outputs,
                  const PartsOptions& options) {
-  if (output.empty() || output == "-")
+  if (outputs.empty() || std::find(outputs.begin(), outputs.end(), "-") != outputs.end())
     throw Error(ExitCode::usage, "--print-tasks: give --output the name of the mesh; the parts will lie beside it");
-  const std::vector<Task> tasks = list_tasks(tool, input, output, options.tasks);
+  const std::vector<Task> tasks = list_tasks(tool, input, outputs, options.tasks);
   if (!options.json) {
     for (const Task& task : tasks) fmt::print("{}\n", shell_line(task.command));
     return;

@@ -39,9 +39,9 @@ RanksStats run_ranks(const SurfaceSettings& settings, const PartsOptions& parts,
 /// A line per rank, for the reader.
 void report_ranks(const std::vector<RankStats>& ranks, const RunContext& context);
 
-/// Prints the command lines that make `output` out of the store `input` in options.tasks chunks, with the options the
+/// Prints the command lines that make `outputs` out of the store `input` in options.tasks chunks, with the options the
 /// tool was given. Throws Error(usage) for outputs that parts cannot lie beside.
-void print_tasks(const CLI::App& tool, const std::string& input, const std::string& output,
+void print_tasks(const CLI::App& tool, const std::string& input, const std::vector<std::string>& outputs,
                  const PartsOptions& options);
 
 }  // namespace lamina::tools

@@ -89,6 +89,7 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
   j["input"] = settings.input;
   if (!settings.more_inputs.empty()) j["more_inputs"] = settings.more_inputs;
   j["output"] = settings.output;
+  if (!settings.more_outputs.empty()) j["more_outputs"] = settings.more_outputs;
   j["dry_run"] = settings.dry_run;
   j["crs"] = s.crs;
   j["samples"] = s.samples_read;

@@ -26,21 +26,21 @@ enum class NonFinite {
   keep,    ///< read as they stand (PLY only), to be counted or dropped (drop_non_finite())
 };
 
-/// Reads OBJ, OFF, PLY or STL, each also as .gz, by extension and content. PLY brings every scalar property of its
-/// vertices (lists are skipped), the other formats normals and colours. Positions keep double precision, except in STL,
-/// which holds floats and whose equal positions are welded. Polygons are triangulated, and every face is kept, also
-/// where the mesh is not manifold. A file without faces gives a mesh without triangles. Throws Error(unreadable) naming
-/// the file, the place and what is wrong: missing, truncated, wrong counts, a face with a vertex that is not there or
-/// with fewer than three.
+/// Reads OBJ, OFF, PLY, STL or GLB, each also as .gz, by extension and content. PLY brings every scalar property of its
+/// vertices (lists are skipped), GLB its attributes of one number, the other formats normals and colours. Positions
+/// keep double precision, except in STL, which holds floats and whose equal positions are welded. Polygons are
+/// triangulated, and every face is kept, also where the mesh is not manifold. A file without faces gives a mesh without
+/// triangles. Throws Error(unreadable) naming the file, the place and what is wrong: missing, truncated, wrong counts,
+/// a face with a vertex that is not there or with fewer than three.
 TriangleMesh read_mesh(const std::string& path, NonFinite non_finite = NonFinite::refuse);
 
 /// Drops vertices that are not finite and the triangles at them; the others keep their order. Returns the number of
 /// vertices dropped.
 std::size_t drop_non_finite(TriangleMesh& mesh);
 
-/// Writes PLY, OBJ, OFF or STL, by extension; "-" is standard output, as PLY. The file appears under its name when it
-/// is complete. Positions read back as the same bits (from STL as floats). Throws Error(budget) when the file cannot be
-/// written, Error(usage) for another extension.
+/// Writes PLY, OBJ, OFF, STL or GLB, by extension; "-" is standard output, as PLY. The file appears under its name when
+/// it is complete. Positions read back as the same bits (from STL as floats, from GLB as floats from a middle). Throws
+/// Error(budget) when the file cannot be written, Error(usage) for another extension.
 void write_mesh(const TriangleMesh& mesh, const std::string& path);
 
 }  // namespace lamina

@@ -31,10 +31,11 @@ enum class NormalsChoice {
 /// The job. Lengths are in the input's units; a Length may be in multiples of the radius instead (length.h).
 struct SurfaceSettings {
   std::string input;  ///< point file, folder, pattern or scan list (expand_inputs()); "-" is standard input
-  std::vector<std::string> more_inputs;  ///< taken together with `input`, as one cloud
-  std::string columns;                   ///< of text files (PointSettings::columns)
-  PointSelection select;                 ///< which points of the files are taken
-  std::string output;                    ///< mesh file: .obj, .off, .stl, else PLY; "-": standard output
+  std::vector<std::string> more_inputs;   ///< taken together with `input`, as one cloud
+  std::string columns;                    ///< of text files (PointSettings::columns)
+  PointSelection select;                  ///< which points of the files are taken
+  std::string output;                     ///< mesh file: .obj, .off, .stl, .glb, else PLY; "-": standard output
+  std::vector<std::string> more_outputs;  ///< the same mesh in further files, each in its own format
 
   std::optional<FrameMode> frame;  ///< unset: pca, or axis where grids are asked for (they have the input's axes then)
   BadSamples bad_samples = BadSamples::drop;  ///< non-finite, without a normal, with a radius <= 0

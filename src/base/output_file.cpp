@@ -244,6 +244,10 @@ void ResultFile::write(std::string_view bytes) {
   if (std::fwrite(bytes.data(), 1, bytes.size(), file_) != bytes.size()) fail("cannot be written to its end");
 }
 
+std::string ResultFile::name() const {
+  return path_ == "-" ? "standard output" : path_;
+}
+
 void ResultFile::close() {
   // A full disk may show only when the last buffer goes out.
   if (std::fclose(std::exchange(file_, nullptr)) != 0) fail("cannot be completed");
@@ -266,8 +270,7 @@ void ResultFile::commit() {
 }
 
 void ResultFile::fail(const char* what) const {
-  throw Error(ExitCode::budget,
-              fmt::format("{}: {}: {}", path_ == "-" ? "standard output" : path_, what, std::strerror(errno)));
+  throw Error(ExitCode::budget, fmt::format("{}: {}: {}", name(), what, std::strerror(errno)));
 }
 
 }  // namespace lamina

@@ -80,6 +80,7 @@ class ResultFile {
   ResultFile(const ResultFile&) = delete;
   ResultFile& operator=(const ResultFile&) = delete;
   void write(std::string_view bytes);
+  [[nodiscard]] std::string name() const;  ///< for messages
   void commit();
   /// The same under another name of the same folder.
   void commit(const std::string& name);

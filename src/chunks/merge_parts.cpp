@@ -139,7 +139,9 @@ std::vector<std::byte> encode_addition(const std::vector<std::array<std::uint32_
   return out;
 }
 
-MergedParts merge_parts(const std::vector<std::string>& paths, const std::string& output, const RunContext& run) {
+MergedParts merge_parts(const std::vector<std::string>& paths, const std::vector<std::string>& outputs,
+                        const RunContext& run) {
+  const std::string& output = outputs.at(0);
   const std::vector<PartReader> parts = open_parts(paths);
   MergedParts merged;
   merged.parts = static_cast<int>(parts.size());
@@ -159,13 +161,15 @@ MergedParts merge_parts(const std::vector<std::string>& paths, const std::string
                                              "--particlescale above 1)",
                                              output, parts.size()));
   }
-  OutputFile file(output, run.tmp_dir);
-  const std::uint64_t own_vertices = merged.vertices;
-  const boundary::Addition addition = close_holes(parts, merged);
   MeshSinkSettings layout = parts.front().info().layout();
   layout.path = output;
+  layout.more_paths.assign(outputs.begin() + 1, outputs.end());
   layout.tmp_dir = run.tmp_dir;
-  if (const std::string losses = meshes::describe_losses(layout); !losses.empty()) run.warn(losses);
+  require_outputs(layout);
+  OutputFile file(staging_path(layout), run.tmp_dir);
+  const std::uint64_t own_vertices = merged.vertices;
+  const boundary::Addition addition = close_holes(parts, merged);
+  meshes::warn_of_losses(layout, run);
   const std::string header = mesh_header(layout, merged.vertices, merged.triangles);
   std::uint64_t bytes = header.size();
   write(file, header.data(), header.size());
@@ -199,12 +203,10 @@ MergedParts merge_parts(const std::vector<std::string>& paths, const std::string
     step();
   }
   append(encode_addition(addition.triangles, merged.vertices));
-  if (meshes::mesh_format(output) == meshes::MeshFormat::ply) {
-    file.complete(bytes);
-  } else {
-    const std::uint64_t faces_at = bytes - merged.triangles * kFaceRecordBytes;
-    write_stored({file.fd(), header.size(), file.fd(), faces_at, merged.vertices, merged.triangles}, layout, run);
-  }
+  const std::uint64_t faces_at = bytes - merged.triangles * kFaceRecordBytes;
+  write_files(
+      {file.fd(), header.size(), file.fd(), faces_at, merged.vertices, merged.triangles}, layout,
+      [&] { file.complete(bytes); }, run);
   return merged;
 }
 

@@ -34,7 +34,9 @@ struct PartInfo {
   std::uint64_t vertices = 0, triangles = 0;
   SlabMark below;  ///< the slab before the first, as this part's run has it
   SlabMark last;   ///< the last slab
-  [[nodiscard]] MeshSinkSettings layout() const { return {{}, {}, attributes, double_positions, comments}; }
+  [[nodiscard]] MeshSinkSettings layout() const {
+    return {.attributes = attributes, .double_positions = double_positions, .comments = comments};
+  }
 };
 
 /// Vertex numbers from the part's first vertex on; negative: of the slab before.

@@ -12,13 +12,14 @@ namespace lamina {
 std::string mesh_settings(const SurfaceSettings& settings) {
   // Every setting by name: one that is added must be dealt with here, or this does not compile. What follows `chord`
   // does not change the mesh; names of files are not settings of it.
-  const auto& [input, more_inputs, columns, select, output, frame, bad_samples, normals, normal_search, radius_scale,
-               density, clean, max_radius, blend, refit, steps, step_tolerance, fit, diffuse, cell, levels, boundary,
-               cluster, chord, vertex_levels, vertex_curvature, vertex_filled, close_holes, watertight, trim,
-               prune_triangles, prune_size, local, window, dry_run, volume] = settings;
+  const auto& [input, more_inputs, columns, select, output, more_outputs, frame, bad_samples, normals, normal_search,
+               radius_scale, density, clean, max_radius, blend, refit, steps, step_tolerance, fit, diffuse, cell,
+               levels, boundary, cluster, chord, vertex_levels, vertex_curvature, vertex_filled, close_holes,
+               watertight, trim, prune_triangles, prune_size, local, window, dry_run, volume] = settings;
   // Jobs of several runs refuse these: require_mesh_alone().
   (void)prune_triangles, (void)prune_size, (void)local;
-  (void)input, (void)more_inputs, (void)output, (void)normals, (void)normal_search, (void)window, (void)dry_run;
+  (void)input, (void)more_inputs, (void)output, (void)more_outputs, (void)normals, (void)normal_search, (void)window,
+      (void)dry_run;
   const auto number = [](const std::optional<double>& v) { return v ? fmt::format("{}", *v) : "auto"; };
   const std::string frame_word = frame             ? fmt::format("{}", static_cast<int>(*frame))
                                  : volume.wanted() ? "grid"

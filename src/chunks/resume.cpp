@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "chunks/cuts.h"
 #include "chunks/folders.h"
@@ -140,7 +142,7 @@ class ResumableRun {
   void join() {
     try {
       job_.watch.time("commit", [&] {
-        const MergedParts merged = merge_parts(parts_, settings_.output, job_.run);
+        const MergedParts merged = merge_parts(parts_, output_names(settings_), job_.run);
         job_.stats.vertices = merged.vertices;
         job_.stats.triangles = merged.triangles;
         job_.stats.holes = merged.holes;
@@ -164,7 +166,7 @@ SurfaceStats reconstruct_resumable(const SurfaceSettings& settings, const Checkp
   check_settings(settings);
   require_mesh_alone(settings, "--checkpoint");
   require_two_files(settings);
-  { const OutputFile trial(settings.output, run.tmp_dir); }
+  for (const std::string& output : output_names(settings)) const OutputFile trial(output, run.tmp_dir);
   Job job(run);
   run_in_arena(run, [&] { ResumableRun(settings, checkpoint, job).finish(); });
   return job.stats;

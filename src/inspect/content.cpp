@@ -104,6 +104,7 @@ FileContent content_of(const std::string& path, const std::string& tmp_dir) {
   if (start.starts_with("ply\n") || start.starts_with("ply\r"))
     return names_faces(start) ? FileContent::mesh : FileContent::points;
   if (format == ".vdb") return FileContent::volume;
+  if (start.starts_with("glTF") || format == ".glb") return FileContent::mesh;
   const bool mesh = format == ".off" || format == ".stl" || (format == ".obj" && obj_names_faces(path));
   return mesh ? FileContent::mesh : FileContent::points;
 }

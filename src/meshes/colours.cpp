@@ -1,10 +1,10 @@
 #include "meshes/colours.h"
 
-namespace lamina::meshes {
-namespace {
+#include <cmath>
 
-/// What one unit of the type is worth on the scale 0-255.
-float scale_of(ScalarType type) {
+namespace lamina::meshes {
+
+float colour_scale(ScalarType type) {
   switch (type) {
     case ScalarType::float32:
     case ScalarType::float64:
@@ -17,7 +17,13 @@ float scale_of(ScalarType type) {
   }
 }
 
-}  // namespace
+double linear_of(double encoded) {
+  return encoded <= 0.04045 ? encoded / 12.92 : std::pow((encoded + 0.055) / 1.055, 2.4);
+}
+
+double encoded_of(double linear) {
+  return linear <= 0.0031308 ? 12.92 * linear : 1.055 * std::pow(linear, 1 / 2.4) - 0.055;
+}
 
 std::optional<ColourColumns> find_colours(const AttributeLayout& layout) {
   std::array<std::optional<std::size_t>, 3> found;
@@ -27,7 +33,7 @@ std::optional<ColourColumns> find_colours(const AttributeLayout& layout) {
     if (layout[i].name == "blue") found[2] = i;
   }
   if (!found[0] || !found[1] || !found[2]) return std::nullopt;
-  return ColourColumns{{*found[0], *found[1], *found[2]}, scale_of(layout[*found[0]].type)};
+  return ColourColumns{{*found[0], *found[1], *found[2]}, colour_scale(layout[*found[0]].type)};
 }
 
 std::optional<ColourColumns> find_colours(const TriangleMesh& mesh) {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 
+#include "lamina/attributes.h"
 #include "lamina/mesh.h"
 
 namespace lamina::meshes {
@@ -17,6 +18,13 @@ struct ColourColumns {
             scale * mesh.attributes[columns[2]][vertex]};
   }
 };
+
+/// What one unit of a colour channel's type is worth on the scale 0-255.
+float colour_scale(ScalarType type);
+
+/// Between the encoded colours of files (sRGB) and linear ones, both 0-1.
+double linear_of(double encoded);
+double encoded_of(double linear);
 
 /// Empty unless all three are there.
 std::optional<ColourColumns> find_colours(const AttributeLayout& layout);

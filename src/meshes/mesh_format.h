@@ -2,8 +2,9 @@
 #pragma once
 #include <cstdint>
 #include <optional>
-#include <string>
 #include <string_view>
+
+#include "lamina/run.h"
 
 namespace lamina {
 
@@ -11,7 +12,7 @@ struct MeshSinkSettings;
 
 namespace meshes {
 
-enum class MeshFormat : std::uint8_t { ply, obj, off, stl };
+enum class MeshFormat : std::uint8_t { ply, obj, off, stl, glb };
 
 /// By the ending, in any case; nothing for another one.
 std::optional<MeshFormat> known_mesh_format(std::string_view path);
@@ -19,8 +20,8 @@ std::optional<MeshFormat> known_mesh_format(std::string_view path);
 /// The same; PLY for every name that says nothing else: "-", pipes, names without an ending.
 MeshFormat mesh_format(std::string_view path);
 
-/// One line about the properties of a mesh that the format of its name cannot hold; empty where nothing is lost.
-std::string describe_losses(const MeshSinkSettings& mesh);
+/// Warns of the properties of a mesh that the formats of its names cannot hold, a line for each.
+void warn_of_losses(const MeshSinkSettings& mesh, const RunContext& run);
 
 }  // namespace meshes
 }  // namespace lamina

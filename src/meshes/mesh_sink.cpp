@@ -5,13 +5,14 @@
 
 #include <algorithm>
 #include <limits>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "base/background_writer.h"
 #include "base/descriptor.h"
 #include "base/output_file.h"
 #include "lamina/error.h"
-#include "meshes/mesh_format.h"
 #include "meshes/stored_mesh.h"
 #include "meshes/streamed_ply.h"
 
@@ -22,15 +23,22 @@ constexpr std::size_t kBuffers = 6;  ///< on their way to the disk
 
 MeshSinkSettings checked(MeshSinkSettings settings) {
   require_ply_names(settings.attributes);
+  require_outputs(settings);
   return settings;
 }
 
 }  // namespace
 
+std::vector<std::string> MeshSinkSettings::paths() const {
+  std::vector<std::string> all{path};
+  all.insert(all.end(), more_paths.begin(), more_paths.end());
+  return all;
+}
+
 struct MeshSink::Impl {
   explicit Impl(MeshSinkSettings s)
       : settings(checked(std::move(s))),
-        output(settings.path, settings.tmp_dir),
+        output(staging_path(settings), settings.tmp_dir),
         face_directory(settings.tmp_dir.empty() ? output.directory() : settings.tmp_dir),
         face_file(open_unlinked(face_directory)),
         writer(buffer_bytes(settings), kBuffers),
@@ -72,12 +80,14 @@ struct MeshSink::Impl {
     check_written(vertex_writer.flush(output.fd()));
     check_written(face_writer.flush(face_file.get()));
     check_written(writer.drain());
-    if (meshes::mesh_format(settings.path) != meshes::MeshFormat::ply) {
-      const std::uint64_t first = mesh_header_bytes(settings);
-      write_stored({output.fd(), first, face_file.get(), 0, vertices, triangles}, settings, run);
-      committed = true;
-      return;
-    }
+    const StoredMesh mesh{output.fd(), mesh_header_bytes(settings), face_file.get(), 0, vertices, triangles};
+    write_files(
+        mesh, settings, [this] { publish(); }, run);
+    committed = true;
+  }
+
+  /// The vertices' file becomes the PLY it was made for.
+  void publish() {
     const std::string header = mesh_header(settings, vertices, triangles);
     check_vertices(pwrite_all(output.fd(), header.data(), header.size(), 0));
     if (output.streams()) {
@@ -89,7 +99,6 @@ struct MeshSink::Impl {
       check_vertices(move_all(face_file.get(), face_writer.written(), output.fd()));
       output.publish();
     }
-    committed = true;
   }
 
   MeshSinkSettings settings;

@@ -1,6 +1,6 @@
 // The streamed mesh file: vertices go straight to the output behind a reserved header, faces to a temporary file
-// appended at the end; the output appears under its name only when complete. Formats other than PLY are written from
-// these two files when they are.
+// appended at the end; the output appears under its name only when complete. Further files, and formats other than PLY,
+// are written from these two files when they are.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -27,12 +27,16 @@ struct VertexBatch {
 
 struct MeshSinkSettings {
   /// Final name; "-" is standard output; links are followed, pipes and devices written to. Its ending says the format:
-  /// .obj, .off and .stl are meant, every other name is a PLY's.
+  /// .obj, .off, .stl and .glb are meant, every other name is a PLY's.
   std::string path{};
+  std::vector<std::string> more_paths{};  ///< the same mesh once more, each in the format of its own name
   std::string tmp_dir{};          ///< for the face file; empty: next to the output (standard output: the system's)
   AttributeLayout attributes{};   ///< written after the normals in their own types; integers are rounded and clamped
   bool double_positions = false;  ///< `property double x` where float would lose precision
   std::vector<std::string> comments{};  ///< one header line each, beside the signature
+
+  /// All names, in their order.
+  [[nodiscard]] std::vector<std::string> paths() const;
 };
 
 /// Binary little-endian PLY: x y z nx ny nz and the attributes per vertex, `list uchar int vertex_indices` per face.
@@ -42,7 +46,7 @@ struct MeshSinkSettings {
 /// Until commit() the vertices lie in a hidden file beside the output (.NAME.partial-PID), the faces in an unnamed one.
 class MeshSink {
  public:
-  /// Creates the files. Throws Error(budget) naming path and reason when the output's folder is missing or cannot be
+  /// Creates the files. Throws Error(budget) naming path and reason when an output's folder is missing or cannot be
   /// written, the path is a directory or a file that may not be replaced; Error(usage) when standard output is a
   /// terminal; Error(internal) for attribute names a PLY cannot hold.
   explicit MeshSink(MeshSinkSettings settings);
@@ -58,8 +62,9 @@ class MeshSink {
   [[nodiscard]] std::uint64_t vertices() const;
   [[nodiscard]] std::uint64_t triangles() const;
   /// Fills in the header (`uint` indices where more than 2^31 - 1 vertices need them; up to 2^32 - 1), appends the
-  /// faces, renames to the final name; in another format than PLY, which has its own limits, writes the file anew.
-  /// Throws Error(budget) on disk full, Error(internal) when cancelled; the output's name is untouched then.
+  /// faces, renames to the final name; in another format than PLY, which has its own limits, writes the file anew
+  /// (see write_files()). Throws Error(budget) on disk full, Error(internal) when cancelled; the name of an output that
+  /// could not be written is untouched then.
   void commit(const RunContext& run = {});
 
  private:

@@ -29,6 +29,7 @@ TriangleMesh read_by_format(meshes::FileBuffer& file, const std::string& path) {
   in.seekg(0);
   const std::string format = packed_ending(path);
   if (magic == "ply\n" || magic == "ply\r" || format == ".ply") return meshes::read_ply(file, path);
+  if (magic == "glTF" || format == ".glb") return meshes::read_glb(file, path);
   if (format == ".obj") return meshes::read_with_openmesh(file, path, meshes::TextFormat::obj);
   if (format == ".off") return meshes::read_off(file, path);
   if (format == ".stl") return meshes::read_with_openmesh(file, path, meshes::TextFormat::stl);
@@ -39,9 +40,9 @@ TriangleMesh read_by_format(meshes::FileBuffer& file, const std::string& path) {
                     "set",
                     path));
   }
-  throw Error(
-      ExitCode::unreadable,
-      fmt::format("{}: unknown mesh format \"{}\"; known are .ply, .obj, .off, .stl, each also as .gz", path, format));
+  throw Error(ExitCode::unreadable,
+              fmt::format("{}: unknown mesh format \"{}\"; known are .ply, .obj, .off, .stl, .glb, each also as .gz",
+                          path, format));
 }
 
 bool is_finite(const std::array<double, 3>& p) {

@@ -2,10 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/descriptor.h"
@@ -23,9 +27,10 @@ namespace {
 /// Decodes what encode_vertices() and encode_faces() have written.
 class StoredBlocks final : public meshes::MeshBlocks {
  public:
-  StoredBlocks(const StoredMesh& mesh, const MeshSinkSettings& settings, const RunContext& run)
+  StoredBlocks(const StoredMesh& mesh, const MeshSinkSettings& settings, std::string path, const RunContext& run)
       : mesh_(mesh),
         settings_(settings),
+        path_(std::move(path)),
         run_(run),
         record_(vertex_record_bytes(settings.attributes, settings.double_positions)) {}
 
@@ -57,6 +62,13 @@ class StoredBlocks final : public meshes::MeshBlocks {
     }
   }
 
+  /// The records as they are, behind a header of their own: another PLY.
+  void copy_to(ResultFile& out) {
+    out.write(mesh_header(settings_, mesh_.vertices, mesh_.triangles));
+    copy(mesh_.vertex_file, mesh_.vertex_offset, mesh_.vertices * record_, out);
+    copy(mesh_.face_file, mesh_.face_offset, mesh_.triangles * kFaceRecordBytes, out);
+  }
+
   void read_triangles(std::uint64_t first, std::size_t count, std::vector<std::array<std::uint32_t, 3>>& out) override {
     read(mesh_.face_file, mesh_.face_offset + first * kFaceRecordBytes, count * kFaceRecordBytes);
     out.resize(count);
@@ -75,31 +87,86 @@ class StoredBlocks final : public meshes::MeshBlocks {
     return value;
   }
 
+  void copy(int file, std::uint64_t offset, std::uint64_t bytes, ResultFile& out) {
+    constexpr std::uint64_t kPiece = std::uint64_t{1} << 20;
+    for (std::uint64_t done = 0; done < bytes; done += kPiece) {
+      read(file, offset + done, std::min(kPiece, bytes - done));
+      out.write({reinterpret_cast<const char*>(bytes_.data()), bytes_.size()});
+    }
+  }
+
   void read(int file, std::uint64_t offset, std::size_t bytes) {
     if (run_.cancelled()) throw Error(ExitCode::internal, "cancelled");
     bytes_.resize(bytes);
     const ReadResult got = pread_all(file, bytes_.data(), bytes, offset);
     if (got.error != 0 || got.bytes < bytes) {
       throw Error(ExitCode::budget,
-                  fmt::format("{}: its temporary mesh cannot be read back: {}", settings_.path,
+                  fmt::format("{}: its temporary mesh cannot be read back: {}", path_,
                               got.error != 0 ? system_message(got.error) : std::string("it is too short")));
     }
   }
 
   const StoredMesh& mesh_;
   const MeshSinkSettings& settings_;
+  std::string path_;
   const RunContext& run_;
   std::size_t record_;
   std::vector<std::byte> bytes_;
 };
 
+void write_stored(const StoredMesh& mesh, const MeshSinkSettings& settings, const std::string& path,
+                  const RunContext& run) {
+  ResultFile out(path, settings.tmp_dir);
+  StoredBlocks blocks(mesh, settings, path, run);
+  if (meshes::mesh_format(path) == meshes::MeshFormat::ply) {
+    blocks.copy_to(out);
+  } else {
+    meshes::write_blocks(blocks, meshes::mesh_format(path), out);
+  }
+  out.commit();
+}
+
+bool is_ply_name(const std::string& path) {
+  return meshes::mesh_format(path) == meshes::MeshFormat::ply;
+}
+
+/// The names but the staged one.
+std::vector<std::string> other_paths(const MeshSinkSettings& settings) {
+  std::vector<std::string> others = settings.paths();
+  others.erase(std::find(others.begin(), others.end(), staging_path(settings)));
+  return others;
+}
+
 }  // namespace
 
-void write_stored(const StoredMesh& mesh, const MeshSinkSettings& settings, const RunContext& run) {
-  ResultFile out(settings.path, settings.tmp_dir);
-  StoredBlocks blocks(mesh, settings, run);
-  meshes::write_blocks(blocks, meshes::mesh_format(settings.path), out);
-  out.commit();
+const std::string& staging_path(const MeshSinkSettings& settings) {
+  if (is_ply_name(settings.path)) return settings.path;
+  const auto ply = std::find_if(settings.more_paths.begin(), settings.more_paths.end(), is_ply_name);
+  return ply == settings.more_paths.end() ? settings.path : *ply;
+}
+
+void require_outputs(const MeshSinkSettings& settings) {
+  for (const std::string& path : other_paths(settings)) const OutputFile trial(path, settings.tmp_dir);
+}
+
+void write_files(const StoredMesh& mesh, const MeshSinkSettings& settings, const std::function<void()>& publish,
+                 const RunContext& run) {
+  std::optional<Error> first;
+  const auto attempt = [&](const auto& write) {
+    try {
+      write();
+    } catch (const Error& error) {
+      if (run.cancelled()) throw;
+      if (first) run.warn(error.what());
+      if (!first) first = error;
+    }
+  };
+  const std::string& staged = staging_path(settings);
+  std::vector<std::string> paths = other_paths(settings);
+  if (!is_ply_name(staged)) paths.insert(paths.begin(), staged);
+  for (const std::string& path : paths) attempt([&] { write_stored(mesh, settings, path, run); });
+  if (is_ply_name(staged)) attempt(publish);
+  if (first) throw Error(*first);
 }
 
 }  // namespace lamina

@@ -1,6 +1,8 @@
-// A finished mesh that lies in files as the records of a streamed PLY, on its way to another format.
+// A finished mesh that lies in files as the records of a streamed PLY, on its way to the files it is meant for.
 #pragma once
 #include <cstdint>
+#include <functional>
+#include <string>
 
 #include "lamina/run.h"
 #include "meshes/mesh_sink.h"
@@ -16,9 +18,19 @@ struct StoredMesh {
   std::uint64_t vertices = 0, triangles = 0;
 };
 
-/// Writes the mesh in the format of its name, `settings.path`, which is not PLY. Reads it in passes and holds blocks of
-/// it, so that memory does not go with its size. The file appears under its name when complete. Throws Error(budget)
-/// where it cannot be written, Error(internal) when cancelled.
-void write_stored(const StoredMesh& mesh, const MeshSinkSettings& settings, const RunContext& run);
+/// The name for which the records are staged: the first PLY's, which they become in the end, else the first of all, for
+/// which they only wait.
+const std::string& staging_path(const MeshSinkSettings& settings);
+
+/// Throws Error(budget) naming the first of the other names that cannot be written, Error(usage) as OutputFile does.
+void require_outputs(const MeshSinkSettings& settings);
+
+/// Writes the mesh under each name in its format: in passes over the records, of which blocks are held, so that memory
+/// does not go with its size. Where one is a PLY, `publish` makes the staged records it, last. A file appears under its
+/// name when it is complete. One that cannot be written does not keep the others from being: then throws what was wrong
+/// with the first, Error(budget) as a rule, when the others are there, of which further ones are warned of.
+/// Error(internal) when cancelled.
+void write_files(const StoredMesh& mesh, const MeshSinkSettings& settings, const std::function<void()>& publish,
+                 const RunContext& run);
 
 }  // namespace lamina

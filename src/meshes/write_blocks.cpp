@@ -13,6 +13,7 @@
 #include "base/little_endian.h"
 #include "base/output_file.h"
 #include "lamina/error.h"
+#include "meshes/block_passes.h"
 #include "meshes/colours.h"
 #include "meshes/vec3.h"
 #include "meshes/writers.h"
@@ -21,7 +22,6 @@ namespace lamina::meshes {
 namespace {
 
 constexpr std::size_t kTextBytes = 1u << 20;
-constexpr std::size_t kBlock = 4096;  ///< vertices or triangles read at once
 
 /// Collects text and hands it on in large pieces.
 class Text {
@@ -42,27 +42,6 @@ class Text {
   std::string bytes_;
   ResultFile& out_;
 };
-
-/// Calls use(block, index in it) for every vertex.
-template <class Use>
-void for_vertices(MeshBlocks& mesh, const Use& use) {
-  TriangleMesh block;
-  for (std::uint64_t first = 0; first < mesh.vertices(); first += kBlock) {
-    const std::size_t n = std::min<std::uint64_t>(kBlock, mesh.vertices() - first);
-    mesh.read_vertices(first, n, block);
-    for (std::size_t v = 0; v < n; ++v) use(block, v);
-  }
-}
-
-template <class Use>
-void for_triangles(MeshBlocks& mesh, const Use& use) {
-  std::vector<std::array<std::uint32_t, 3>> block;
-  for (std::uint64_t first = 0; first < mesh.triangles(); first += kBlock) {
-    const std::size_t n = std::min<std::uint64_t>(kBlock, mesh.triangles() - first);
-    mesh.read_triangles(first, n, block);
-    for (const auto& t : block) use(t);
-  }
-}
 
 void write_obj(MeshBlocks& mesh, ResultFile& out) {
   const auto colours = find_colours(mesh.layout());
@@ -115,13 +94,13 @@ void write_off(MeshBlocks& mesh, ResultFile& out) {
 class KeptPositions {
  public:
   explicit KeptPositions(MeshBlocks& mesh)
-      : mesh_(mesh), seats_(std::min<std::uint64_t>(kMostBlocks, mesh.vertices() / kBlock + 1)) {}
+      : mesh_(mesh), seats_(std::min<std::uint64_t>(kMostBlocks, mesh.vertices() / kBlockRows + 1)) {}
 
   Vec3 at(std::uint32_t vertex) {
-    const std::uint64_t block = vertex / kBlock;
+    const std::uint64_t block = vertex / kBlockRows;
     Seat& seat = seats_[block % seats_.size()];
     if (seat.block != block) load(block, seat);
-    return seat.positions[vertex % kBlock];
+    return seat.positions[vertex % kBlockRows];
   }
 
  private:
@@ -132,8 +111,8 @@ class KeptPositions {
   };
 
   void load(std::uint64_t block, Seat& seat) {
-    const std::uint64_t first = block * kBlock;
-    mesh_.read_vertices(first, std::min<std::uint64_t>(kBlock, mesh_.vertices() - first), read_);
+    const std::uint64_t first = block * kBlockRows;
+    mesh_.read_vertices(first, std::min<std::uint64_t>(kBlockRows, mesh_.vertices() - first), read_);
     seat.positions = read_.positions;
     seat.block = block;
   }
@@ -146,8 +125,8 @@ class KeptPositions {
 void write_stl(MeshBlocks& mesh, ResultFile& out) {
   constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
   if (mesh.triangles() > kMost) {
-    throw Error(ExitCode::budget,
-                fmt::format("STL counts at most {} triangles, the mesh has {}; write a .ply", kMost, mesh.triangles()));
+    throw Error(ExitCode::budget, fmt::format("{}: STL counts at most {} triangles, the mesh has {}; write a .ply",
+                                              out.name(), kMost, mesh.triangles()));
   }
   std::string bytes = "binary STL";
   bytes.resize(80, ' ');
@@ -176,6 +155,8 @@ void write_blocks(MeshBlocks& mesh, MeshFormat format, ResultFile& out) {
       return write_off(mesh, out);
     case MeshFormat::stl:
       return write_stl(mesh, out);
+    case MeshFormat::glb:
+      return write_glb(mesh, out);
     case MeshFormat::ply:
       break;
   }

@@ -126,7 +126,7 @@ void write_mesh(const TriangleMesh& mesh, const std::string& path) {
   const auto format = path == "-" ? MeshFormat::ply : meshes::known_mesh_format(path);
   if (!format) {
     throw Error(ExitCode::usage,
-                fmt::format("{}: unknown mesh format to write; known are .ply, .obj, .off, .stl", path));
+                fmt::format("{}: unknown mesh format to write; known are .ply, .obj, .off, .stl, .glb", path));
   }
   ResultFile out(path);
   if (*format == MeshFormat::ply) {

@@ -37,6 +37,18 @@ class MeshBlocks {
 /// clamped to them); faces as `list uchar int vertex_indices` (uint beyond 2^31 - 1 vertices).
 void write_ply(const TriangleMesh& mesh, ResultFile& out);
 
+/// Bytes of a GLB's data: what limits the mesh, since lengths in it have 32 bits.
+std::uint64_t glb_data_bytes(const AttributeLayout& layout, bool normals, std::uint64_t vertices,
+                             std::uint64_t triangles);
+inline constexpr std::uint64_t kMostGlbBytes = 0xFFFFFFFF;
+
+/// GLB, binary glTF 2.0: one mesh of one node, each of positions, normals, colours and attributes in a piece of its
+/// own. Positions are floats; where those lose something, floats from a middle that the node's translation holds in
+/// double. Colours become linear, as glTF has them, in numbers from which they come back unchanged. Normals of no
+/// length become 0 0 1, others of another length than 1 are made unit; attributes that are not finite become 0. Throws
+/// Error(budget) for meshes beyond 4 GB, Error(usage) for positions that are not finite or too far apart for floats.
+void write_glb(MeshBlocks& mesh, ResultFile& out);
+
 /// Of the other formats. Keeps blocks, for STL at most a million positions, too.
 /// OBJ: `v x y z [r g b]` with colours from 0 to 1, `vn`, faces `f v//vn`. Positions read back as the same bits.
 /// OFF: [C][N]OFF with colours as r g b a bytes. Positions read back as the same bits.

@@ -29,6 +29,7 @@ constexpr std::array kSignatures{
     Signature{"# vtk DataFile", "is a VTK file; write it as PLY in ParaView or CloudCompare"},
     Signature{"CCB2",
               "is a file of CloudCompare's own; write it as PLY: CloudCompare -O FILE -C_EXPORT_FMT PLY -SAVE_CLOUDS"},
+    Signature{"glTF", "is a GLB mesh; its vertices as points: lamina convert FILE --vertices -o points.ply"},
     Signature{"OCTM", "is an OpenCTM mesh; write it as PLY in MeshLab"},
     Signature{"#VRML", "is a VRML scene; write it as PLY in MeshLab"},
     Signature{"<?xml", "is XML, which holds no points known here; write them as PLY in MeshLab or ParaView"},

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -76,14 +77,17 @@ void check_job(const SurfaceSettings& settings, const RunContext& run, bool firs
         "ranks that share out an input's rows cannot clean them: clean the points before, with 'lamina clean', "
         "or put them into a store with the same options, 'lamina sort IN... --store DIR', and give mpirun that");
   }
-  if (settings.output == "-")
+  const std::vector<std::string> outputs = output_names(settings);
+  if (std::find(outputs.begin(), outputs.end(), "-") != outputs.end())
     throw Error(ExitCode::usage, "several ranks write one file together: give --output a name");
   if (!first) return;
   require_two_files(settings);
-  const OutputFile trial(settings.output, run.tmp_dir);
-  if (trial.streams()) {
-    throw Error(ExitCode::usage,
-                fmt::format("{}: is no regular file; several ranks write one file together", settings.output));
+  for (const std::string& output : outputs) {
+    const OutputFile trial(output, run.tmp_dir);
+    if (trial.streams()) {
+      throw Error(ExitCode::usage,
+                  fmt::format("{}: is no regular file; several ranks write one file together", output));
+    }
   }
 }
 
@@ -163,7 +167,7 @@ class RanksJob {
     });
     own_.sweeping = Stopwatch::now().wall - before;
     job_.watch.time("commit", [&] {
-      const Place place = write_together(ranks_, plan, *part, settings_.output, job_);
+      const Place place = write_together(ranks_, plan, *part, output_names(settings_), job_);
       job_.stats.vertices = place.vertices;
       job_.stats.triangles = place.triangles;
     });

@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "base/output_file.h"
 #include "boundary/boundary.h"
@@ -97,15 +99,13 @@ void write_addition(SharedFile& file, const RankSlabs& part, const Place& place,
 }
 
 /// The file that all have written becomes the mesh.
-void publish_mesh(OutputFile& file, const RankSlabs& part, const Place& place, const std::string& output,
+void publish_mesh(OutputFile& file, const RankSlabs& part, const Place& place, const MeshSinkSettings& layout,
                   const RunContext& run) {
-  if (meshes::mesh_format(output) == meshes::MeshFormat::ply) return file.publish();
-  MeshSinkSettings layout = part.layout();
-  layout.path = output;
   const std::uint64_t header = make_header(part, place).size();
   const std::uint64_t record = vertex_record_bytes(layout.attributes, layout.double_positions);
-  write_stored({file.fd(), header, file.fd(), header + place.vertices * record, place.vertices, place.triangles},
-               layout, run);
+  write_files(
+      {file.fd(), header, file.fd(), header + place.vertices * record, place.vertices, place.triangles}, layout,
+      [&] { file.publish(); }, run);
 }
 
 }  // namespace
@@ -141,8 +141,12 @@ Place find_place(std::span<const Border> parts, std::size_t rank, const std::str
   return place;
 }
 
-Place write_together(Ranks& ranks, const ReconstructionPlan& plan, RankSlabs& part, const std::string& output,
-                     Job& job) {
+Place write_together(Ranks& ranks, const ReconstructionPlan& plan, RankSlabs& part,
+                     const std::vector<std::string>& outputs, Job& job) {
+  MeshSinkSettings layout = part.layout();
+  layout.path = outputs.at(0);
+  layout.more_paths.assign(outputs.begin() + 1, outputs.end());
+  const std::string& output = staging_path(layout);
   const std::vector<Border> borders =
       gather_borders(ranks, {part.span(), part.any(), part.below(), part.last(), part.vertices(), part.triangles()});
   Place place;
@@ -155,9 +159,7 @@ Place write_together(Ranks& ranks, const ReconstructionPlan& plan, RankSlabs& pa
   const boundary::Addition addition = close_together(ranks, part, borders, plan.holes, place, job.stats.holes);
   ranks.together([&] {
     if (!ranks.first()) return;
-    MeshSinkSettings layout = part.layout();
-    layout.path = output;
-    if (const std::string losses = meshes::describe_losses(layout); !losses.empty()) job.run.warn(losses);
+    meshes::warn_of_losses(layout, job.run);
     file.emplace(output, std::string());
     staged = std::filesystem::absolute(file->staged()).string();
   });
@@ -175,7 +177,7 @@ Place write_together(Ranks& ranks, const ReconstructionPlan& plan, RankSlabs& pa
     shared.close();
   }
   ranks.together([&] {
-    if (file) publish_mesh(*file, part, place, output, job.run);
+    if (file) publish_mesh(*file, part, place, layout, job.run);
   });
   return place;
 }

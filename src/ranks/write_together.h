@@ -1,4 +1,4 @@
-// One mesh file, written by all ranks at their places.
+// One mesh, written by all ranks at their places in one file.
 #pragma once
 #include <cstdint>
 #include <span>
@@ -32,9 +32,9 @@ struct Place {
 /// Error(budget) beyond the vertices that a PLY's indices can name; `name`: the mesh, for the message.
 Place find_place(std::span<const Border> parts, std::size_t rank, const std::string& name);
 
-/// Writes the plan's mesh as `output`, holes closed; it appears under its name when all have written. The place is that
+/// Writes the plan's mesh under its names, holes closed; it appears when all have written. The place is that
 /// of this rank, the holes are known to rank 0 (job.stats). Throws Error(empty) where no rank has a triangle.
-Place write_together(Ranks& ranks, const ReconstructionPlan& plan, RankSlabs& part, const std::string& output,
-                     Job& job);
+Place write_together(Ranks& ranks, const ReconstructionPlan& plan, RankSlabs& part,
+                     const std::vector<std::string>& outputs, Job& job);
 
 }  // namespace lamina::ranks

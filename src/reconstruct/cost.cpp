@@ -22,17 +22,11 @@ double cells_per_sample(const FeedSettings& feed) {
   return 0.25 / (main_cell(feed) * main_cell(feed));
 }
 
-/// Faces wait on disk for the vertices, and both for a format that is not PLY. A sample stands for a quarter of its
-/// radius squared of surface; a main cell's worth of surface gives some 3.3 triangles (the cells it cuts, two each),
-/// clustering leaves 55 % of them.
+/// Faces wait on disk for the vertices, and both for a format that is not PLY.
 std::uint64_t expected_waiting_bytes(const ReconstructionPlan& plan) {
   constexpr double kVerticesPerFace = 0.5;
   const double face_bytes = 13 + kVerticesPerFace * static_cast<double>(plan.waiting_vertex_bytes);
-  const double finest = plan.lattice.cell;
-  const double cell = plan.feed.fixed_cell() ? finest : std::max(finest, main_cell(plan.feed) * plan.radius.median);
-  const double cells =
-      static_cast<double>(plan.samples) * 0.25 * plan.radius.median * plan.radius.median / (cell * cell);
-  return static_cast<std::uint64_t>(face_bytes * cells * (plan.cluster == ClusterMode::none ? 3.3 : 1.8));
+  return static_cast<std::uint64_t>(face_bytes * expected_triangles(plan));
 }
 
 /// Behind the sweep the store gives its disk back, a file at a time, while the faces grow.
@@ -116,6 +110,16 @@ double mesh_memory(const ReconstructionPlan& plan, const SlabStore& store, doubl
 }
 
 }  // namespace
+
+double expected_triangles(const ReconstructionPlan& plan) {
+  // A sample stands for a quarter of its radius squared of surface; a main cell's worth of surface gives some 3.3
+  // triangles (the cells it cuts, two each), clustering leaves 55 % of them.
+  const double finest = plan.lattice.cell;
+  const double cell = plan.feed.fixed_cell() ? finest : std::max(finest, main_cell(plan.feed) * plan.radius.median);
+  const double cells =
+      static_cast<double>(plan.samples) * 0.25 * plan.radius.median * plan.radius.median / (cell * cell);
+  return cells * (plan.cluster == ClusterMode::none ? 3.3 : 1.8);
+}
 
 std::uint64_t expected_mesh_memory(const ReconstructionPlan& plan, const SlabStore& store) {
   return static_cast<std::uint64_t>(mesh_memory(plan, store, densest_layer(store, plan.lattice.slab_height())));

@@ -7,6 +7,9 @@
 
 namespace lamina {
 
+/// Of the mesh.
+double expected_triangles(const ReconstructionPlan& plan);
+
 /// Bytes at the peak without a volume and without the window's look-up tables.
 std::uint64_t expected_mesh_memory(const ReconstructionPlan& plan, const SlabStore& store);
 

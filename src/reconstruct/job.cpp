@@ -9,9 +9,12 @@
 #include <cmath>
 #include <fstream>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "lamina/error.h"
+#include "meshes/mesh_format.h"
+#include "meshes/writers.h"
 #include "mls/refit_normals.h"
 #include "reconstruct/choose_support.h"
 #include "reconstruct/cost.h"
@@ -106,6 +109,23 @@ std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceS
                                             input_name(settings), mb(plan.memory_bytes), mb(allowed), remedy));
 }
 
+/// A GLB of more than 4 GB is better refused before the work than after it.
+void refuse_large_glb(const SurfaceSettings& settings, const ReconstructionPlan& plan) {
+  constexpr double kVerticesPerFace = 0.5, kSurely = 1.25;
+  const double triangles = expected_triangles(plan);
+  const std::uint64_t bytes = meshes::glb_data_bytes(plan.mesh_attributes, /*normals=*/true,
+                                                     static_cast<std::uint64_t>(kVerticesPerFace * triangles),
+                                                     static_cast<std::uint64_t>(triangles));
+  if (static_cast<double>(bytes) <= kSurely * static_cast<double>(meshes::kMostGlbBytes)) return;
+  for (const std::string& output : output_names(settings)) {
+    if (meshes::mesh_format(output) != meshes::MeshFormat::glb) continue;
+    throw Error(ExitCode::budget,
+                fmt::format("{}: a GLB holds at most 4 GB, the mesh would take about {:.1f} GB in it; write a .ply, or "
+                            "cut the cloud",
+                            output, static_cast<double>(bytes) * 1e-9));
+  }
+}
+
 /// How long the whole run will take, judging by how fast this machine has read the input.
 double expected_seconds(const ReconstructionPlan& plan, const PointSourceInfo& source, int threads, const Job& job) {
   double slowness = 1;
@@ -175,6 +195,7 @@ ReconstructionPlan plan_surface(const SurfaceSettings& settings, const StoredClo
   }
   if (job.run.max_memory > 0 && told.memory_bytes > job.run.max_memory)
     refuse_memory(settings, cloud, survey, told, job.run.max_memory);
+  refuse_large_glb(settings, plan);
   job.stats.disk_bytes = cloud.ingested.store.disk_bytes();
   return std::move(*made);
 }

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
+#include <vector>
 
 #include "lamina/error.h"
 #include "levelset/surface_volume.h"
@@ -188,7 +190,9 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
   if (s.vertex_filled) plan.mesh_attributes.push_back({"filled", ScalarType::uint8});
   plan.double_positions = needs_double(cloud.ingested.census, plan.lattice.cell * plan.frame.step);
   plan.vertices.double_positions = plan.double_positions;
-  if (meshes::mesh_format(s.output) != meshes::MeshFormat::ply)
+  const std::vector<std::string> outputs = output_names(s);
+  if (std::none_of(outputs.begin(), outputs.end(),
+                   [](const std::string& name) { return meshes::mesh_format(name) == meshes::MeshFormat::ply; }))
     plan.waiting_vertex_bytes = vertex_record_bytes(plan.mesh_attributes, plan.double_positions);
   plan.volume = s.volume;
   plan.volume.shift = cloud.shift;

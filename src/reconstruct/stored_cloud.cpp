@@ -121,6 +121,12 @@ std::vector<std::string> input_names(const SurfaceSettings& settings) {
   return names;
 }
 
+std::vector<std::string> output_names(const SurfaceSettings& settings) {
+  std::vector<std::string> names{settings.output};
+  names.insert(names.end(), settings.more_outputs.begin(), settings.more_outputs.end());
+  return names;
+}
+
 std::string input_name(const SurfaceSettings& settings) {
   return settings.input == "-" ? "standard input" : settings.input;
 }
@@ -138,15 +144,19 @@ void require_two_files(const SurfaceSettings& settings) {
            std::any_of(inputs.begin(), inputs.end(),
                        [&](const PointInput& input) { return std::filesystem::equivalent(input.path, name, ignored); });
   };
+  const std::vector<std::string> outputs = output_names(settings);
   for (const std::string& grids : {settings.volume.path, settings.volume.points}) {
     if (grids.empty()) continue;
-    if (grids == settings.output || is_input(grids))
+    if (std::find(outputs.begin(), outputs.end(), grids) != outputs.end() || is_input(grids))
       throw Error(ExitCode::usage, fmt::format("{}: is named twice; give the grids a file of their own", grids));
   }
-  if (settings.output == "-" || settings.output.empty()) return;
-  if (is_input(settings.output)) {
-    throw Error(ExitCode::usage,
-                fmt::format("{}: is input and output; give the mesh another name with --output", settings.output));
+  for (auto name = outputs.begin(); name != outputs.end(); ++name) {
+    if (std::find(outputs.begin(), name, *name) != name)
+      throw Error(ExitCode::usage, fmt::format("{}: is named twice; give each --output a name of its own", *name));
+    if (*name != "-" && !name->empty() && is_input(*name)) {
+      throw Error(ExitCode::usage,
+                  fmt::format("{}: is input and output; give the mesh another name with --output", *name));
+    }
   }
 }
 

@@ -29,6 +29,9 @@ struct StoredCloud {
 /// Files and folders that the settings name, as one list.
 std::vector<std::string> input_names(const SurfaceSettings& settings);
 
+/// The names of the mesh's files, the first first.
+std::vector<std::string> output_names(const SurfaceSettings& settings);
+
 /// What messages call the input.
 std::string input_name(const SurfaceSettings& settings);
 
@@ -40,7 +43,7 @@ bool names_kept_input(const SurfaceSettings& settings);
 std::string temporary_directory(const SurfaceSettings& settings, const RunContext& run);
 
 /// A mesh in the place of its points would cost the user the scan. Throws Error(usage) where an output is one of the
-/// inputs, or two outputs are one file.
+/// inputs, or two outputs have one name.
 void require_two_files(const SurfaceSettings& settings);
 
 /// The frame asked for: the settings' own, else what suits what is wanted.

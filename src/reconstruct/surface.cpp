@@ -40,9 +40,9 @@ class PrunedSlabs final : public SlabSink {
   Pruner& pruner_;
 };
 
-/// The mesh of a plan into its file, whose name and folder `layout` has.
+/// The mesh of a plan into its files, whose names and folder `layout` has.
 void write_surface(const ReconstructionPlan& plan, StoredCloud& cloud, const MeshSinkSettings& layout, Job& job) {
-  if (const std::string losses = meshes::describe_losses(layout); !losses.empty()) job.run.warn(losses);
+  meshes::warn_of_losses(layout, job.run);
   MeshSink sink(layout);
   std::optional<SurfaceVolume> volume;
   if (plan.volume.wanted())
@@ -73,6 +73,7 @@ void write_surface(const ReconstructionPlan& plan, StoredCloud& cloud, const Mes
 void reconstruct(const SurfaceSettings& settings, Job& job) {
   MeshSinkSettings out;
   out.path = settings.output;
+  out.more_paths = settings.more_outputs;
   out.tmp_dir = temporary_directory(settings, job.run);
   // An output that cannot be written is better known now than after the input has been read.
   if (!settings.dry_run) {
@@ -88,6 +89,7 @@ void reconstruct(const SurfaceSettings& settings, Job& job) {
   if (!settings.dry_run) {
     MeshSinkSettings layout = mesh_layout(plan);
     layout.path = out.path;
+    layout.more_paths = out.more_paths;
     layout.tmp_dir = out.tmp_dir;
     write_surface(plan, cloud, layout, job);
   }

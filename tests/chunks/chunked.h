@@ -48,7 +48,7 @@ inline std::string merged_bytes(std::vector<std::string> parts, const TemporaryF
   std::mt19937 random(7);
   std::shuffle(parts.begin(), parts.end(), random);
   const std::string output = folder / "merged.ply";
-  merge_parts(parts, output, {});
+  merge_parts(parts, {output}, {});
   return read_file(output);
 }
 

@@ -28,7 +28,7 @@ class MergeParts : public ::testing::Test {
   static std::string refusal(const std::vector<std::string>& parts, ExitCode code = ExitCode::unreadable) {
     const std::string output = *folder_ / "refused.ply";
     try {
-      merge_parts(parts, output, {});
+      merge_parts(parts, {output}, {});
     } catch (const Error& error) {
       EXPECT_EQ(error.code(), code);
       EXPECT_FALSE(std::filesystem::exists(output));

@@ -10,6 +10,7 @@ int fuzz_file(const std::uint8_t* data, std::size_t size);
 int fuzz_inputs(const std::uint8_t* data, std::size_t size);
 int fuzz_las(const std::uint8_t* data, std::size_t size);
 int fuzz_laz(const std::uint8_t* data, std::size_t size);
+int fuzz_mesh_glb(const std::uint8_t* data, std::size_t size);
 int fuzz_mesh_obj(const std::uint8_t* data, std::size_t size);
 int fuzz_mesh_off(const std::uint8_t* data, std::size_t size);
 int fuzz_mesh_ply(const std::uint8_t* data, std::size_t size);

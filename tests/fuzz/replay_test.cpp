@@ -25,9 +25,10 @@ struct Reader {
 constexpr std::array kReaders = {
     Reader{"e57", fuzz_e57},           Reader{"file", fuzz_file},         Reader{"inputs", fuzz_inputs},
     Reader{"las", fuzz_las},           Reader{"laz", fuzz_laz},           Reader{"mesh_obj", fuzz_mesh_obj},
-    Reader{"mesh_off", fuzz_mesh_off}, Reader{"mesh_ply", fuzz_mesh_ply}, Reader{"mesh_stl", fuzz_mesh_stl},
-    Reader{"obj", fuzz_obj},           Reader{"pcd", fuzz_pcd},           Reader{"ply", fuzz_ply},
-    Reader{"ptx", fuzz_ptx},           Reader{"text", fuzz_text},         Reader{"vdb", fuzz_vdb},
+    Reader{"mesh_glb", fuzz_mesh_glb}, Reader{"mesh_off", fuzz_mesh_off}, Reader{"mesh_ply", fuzz_mesh_ply},
+    Reader{"mesh_stl", fuzz_mesh_stl}, Reader{"obj", fuzz_obj},           Reader{"pcd", fuzz_pcd},
+    Reader{"ply", fuzz_ply},           Reader{"ptx", fuzz_ptx},           Reader{"text", fuzz_text},
+    Reader{"vdb", fuzz_vdb},
 };
 
 std::filesystem::path corpus() {

@@ -76,6 +76,28 @@ TEST_F(RankIdentity, SeveralFilesAndStoredSamples) {
   expect_same({folder_ / "store"}, {2});
 }
 
+TEST_F(RankIdentity, SeveralOutputs) {
+  const std::string in = test::write_cloud(pipe(6000), folder_ / "in.ply");
+  const auto words = [&](const std::string& name) {
+    return std::vector<std::string>{"surface",
+                                    in,
+                                    "--keep-strays",
+                                    "--prune",
+                                    "0",
+                                    "-o",
+                                    folder_ / (name + ".glb"),
+                                    "-o",
+                                    folder_ / (name + ".ply"),
+                                    "-q"};
+  };
+  ASSERT_EQ(test::run_lamina(words("alone")).code, 0);
+  const test::Outcome outcome = test::run_ranks(2, words("ranks"));
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  for (const std::string ending : {".glb", ".ply"})
+    EXPECT_TRUE(test::read_file(folder_ / ("ranks" + ending)) == test::read_file(folder_ / ("alone" + ending)));
+  EXPECT_EQ(folder_.entries(), 5);
+}
+
 TEST_F(RankIdentity, HolesAcrossTheBordersOfRanks) {
   Cloud cloud = pipe(12000);
   Cloud pierced;

@@ -218,7 +218,7 @@ RC_GTEST_PROP(Holes, RandomGapsStayManifoldAndTheSameBytes, ()) {
     reconstruct_chunk(s, {number, count}, run);
     parts.push_back(s.output);
   }
-  const MergedParts merged = merge_parts(parts, folder / "merged.ply", run);
+  const MergedParts merged = merge_parts(parts, {folder / "merged.ply"}, run);
   RC_ASSERT(test::read_file(folder / "merged.ply") == whole);
   RC_ASSERT(merged.holes.closed == stats.holes.closed);
   RC_ASSERT(merged.holes.open_edges == stats.holes.open_edges);

@@ -27,7 +27,8 @@ TEST(OutputName, MayPromiseWhatIsWrittenOrNothing) {
     EXPECT_EQ(refusal(require_volume_name, name), "") << name;
     EXPECT_EQ(refusal(require_picture_name, name), "") << name;
   }
-  for (const char* name : {"a.obj.PLY", "a.OBJ", "a.off", "a.stl"}) EXPECT_EQ(refusal(require_mesh_name, name), "");
+  for (const char* name : {"a.obj.PLY", "a.OBJ", "a.off", "a.stl", "a.glb"})
+    EXPECT_EQ(refusal(require_mesh_name, name), "");
   EXPECT_EQ(refusal(require_volume_name, "a.ply.vdb"), "");
   EXPECT_EQ(refusal(require_picture_name, "a.Png"), "");
 }
@@ -36,7 +37,7 @@ TEST(OutputName, ThatPromisesAnotherFormatIsRefusedWithTheWayToIt) {
   EXPECT_THAT(refusal(require_mesh_name, "a.ply.gz"), HasSubstr("-o - | gzip"));
   EXPECT_THAT(refusal(require_mesh_name, "a.vdb"), HasSubstr("--vdb"));
   EXPECT_THAT(refusal(require_mesh_name, "a.usdc"),
-              HasSubstr("a.usdc: the mesh is written as PLY, OBJ, OFF or STL; name it .ply"));
+              HasSubstr("a.usdc: the mesh is written as PLY, OBJ, OFF, STL or GLB; name it .ply"));
   EXPECT_THAT(refusal(require_volume_name, "a.ply"),
               HasSubstr("a.ply: the volume is written as OpenVDB; name it .vdb"));
   EXPECT_THAT(refusal(require_picture_name, "a.jpg"), HasSubstr("a.jpg: the picture is written as PNG; name it .png"));

@@ -42,20 +42,32 @@ TEST_F(PartsTool, MeshesOfEveryFormat) {
     merge.push_back(folder_ / (std::string(1, chunk[0]) + ".lmesh"));
     ASSERT_EQ(run_lamina({"surface", store_, "--steps", "2", "--chunk", chunk, "-o", merge.back()}).code, 0);
   }
-  for (const std::string ending : {".obj", ".off", ".stl"}) {
+  for (const std::string ending : {".obj", ".off", ".stl", ".glb"}) {
     const std::string whole = folder_ / ("of_one_run" + ending), merged = folder_ / ("of_parts" + ending);
     ASSERT_EQ(run_lamina({"surface", cloud_, "-o", whole, "--steps", "2"}).code, 0);
     std::vector<std::string> words = merge;
     words.insert(words.end(), {"-o", merged});
     const Outcome outcome = run_lamina(words);
     EXPECT_EQ(outcome.code, 0) << outcome.err;
-    EXPECT_THAT(outcome.err, HasSubstr(ending == ".stl" ? "not the properties red, green, blue, id;"
-                                                        : "no place for the properties id;"));
+    if (ending != ".glb")
+      EXPECT_THAT(outcome.err, HasSubstr(ending == ".stl" ? "not the properties red, green, blue, id;"
+                                                          : "no place for the properties id;"));
     EXPECT_TRUE(read_text(merged) == read_text(whole)) << ending;
     const std::string resumed = folder_ / ("resumed" + ending);
     EXPECT_EQ(run_lamina({"surface", cloud_, "-o", resumed, "--steps", "2", "--checkpoint", folder_ / "kept"}).code, 0);
     EXPECT_TRUE(read_text(resumed) == read_text(whole)) << ending;
   }
+  // Several at once, merged and resumed.
+  std::vector<std::string> words = merge;
+  words.insert(words.end(), {"-o", folder_ / "both.glb", "-o", mesh_});
+  EXPECT_EQ(run_lamina(words).code, 0);
+  EXPECT_EQ(run_lamina({"surface", cloud_, "-o", folder_ / "again.ply", "-o", folder_ / "again.glb", "--steps", "2",
+                        "--checkpoint", folder_ / "kept"})
+                .code,
+            0);
+  for (const std::string glb : {folder_ / "both.glb", folder_ / "again.glb"})
+    EXPECT_TRUE(read_text(glb) == read_text(folder_ / "of_one_run.glb")) << glb;
+  EXPECT_TRUE(read_text(mesh_) == read_text(folder_ / "again.ply"));
 }
 
 TEST_F(PartsTool, TasksAsJsonSayWhatComesAfterWhat) {

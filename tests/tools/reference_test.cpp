@@ -102,11 +102,12 @@ class Statistics : public ::testing::Test {
 TEST_F(Statistics, OfSurfaceAndNormalAreDocumented) {
   const Fields normal = fields_of({"lamina normal more.ply --check --stats - -q"});
   expect_section("lamina normal --stats", normal);
-  Fields surface = fields_of(
-      {"lamina surface scan.ply more.ply -o out.ply --clip -2,-2,-2,2,2,0.3 --normals estimate --local --prune 5 "
-       "--vdb out.vdb --stats - -q",
-       "lamina sort scan.ply --store scan.store -q && lamina surface scan.store --chunk 1/2 -o out.lmesh "
-       "--stats - -q"});
+  Fields surface =
+      fields_of({"lamina surface scan.ply more.ply -o out.ply -o out.glb --clip -2,-2,-2,2,2,0.3 --normals estimate "
+                 "--local --prune 5 "
+                 "--vdb out.vdb --stats - -q",
+                 "lamina sort scan.ply --store scan.store -q && lamina surface scan.store --chunk 1/2 -o out.lmesh "
+                 "--stats - -q"});
   add_fields({{"ranks", ranks_json({RankStats{}})}}, "", surface);
   std::erase_if(surface, [](const std::string& field) { return field.starts_with("normals."); });
   surface.insert("normals");  // the page refers to the other section

@@ -64,7 +64,7 @@ TEST_F(SurfaceTool, MakesAMeshAndSaysSo) {
 TEST_F(SurfaceTool, TheEndingSaysTheFormat) {
   ASSERT_EQ(run({"--quiet"}).code, 0);
   const TriangleMesh ply = read_mesh(mesh_);
-  for (const std::string name : {"mesh.obj", "mesh.off", "mesh.STL"}) {
+  for (const std::string name : {"mesh.obj", "mesh.off", "mesh.STL", "mesh.glb"}) {
     const std::string path = folder_ / name;
     const auto outcome = run_lamina({"surface", cloud_, "-o", path, "--quiet"});
     EXPECT_EQ(outcome.code, 0);
@@ -80,9 +80,39 @@ TEST_F(SurfaceTool, TheEndingSaysTheFormat) {
   }
   std::filesystem::remove(mesh_);
   for (const char* name : {"mesh.gltf", "mesh.ply.gz", "mesh.obj.gz"}) {
-    expect_failure(run_lamina({"surface", cloud_, "-o", folder_ / name}), 2, {name, "PLY, OBJ, OFF or STL"});
+    expect_failure(run_lamina({"surface", cloud_, "-o", folder_ / name}), 2, {name, "PLY, OBJ, OFF, STL or GLB"});
   }
   expect_failure(run_lamina({"surface", cloud_, "-o", folder_ / "no/such/mesh.obj"}), 4, {"does not exist"});
+}
+
+TEST_F(SurfaceTool, SeveralOutputsAreOneMesh) {
+  ASSERT_EQ(run({"--quiet"}).code, 0);
+  const std::string ply = test::read_text(mesh_), glb = folder_ / "m.glb", stl = folder_ / "m.stl";
+  std::filesystem::remove(mesh_);
+  const auto outcome = run_lamina({"surface", cloud_, "-o", glb, "-o", mesh_, "-o", stl, "-o", folder_ / "more.ply",
+                                   "--quiet", "--tmp-dir", tmp_, "--preview", folder_ / "m.png"});
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_EQ(folder_.entries(), 7);
+  EXPECT_TRUE(std::filesystem::is_empty(tmp_));
+  EXPECT_TRUE(test::read_text(mesh_) == ply);
+  EXPECT_TRUE(test::read_text(folder_ / "more.ply") == ply);
+  const TriangleMesh mesh = read_mesh(mesh_), other = read_mesh(glb);
+  EXPECT_EQ(other.positions, mesh.positions);
+  EXPECT_EQ(other.triangles, mesh.triangles);
+  EXPECT_EQ(read_mesh(stl).triangles.size(), mesh.triangles.size());
+  // Standard output is one of them.
+  const auto piped = run_shell("lamina surface " + quoted(cloud_) + " -q -o " + quoted(folder_ / "p.glb") +
+                               " -o - | cmp - " + quoted(mesh_));
+  EXPECT_EQ(piped.code, 0) << piped.out << piped.err;
+  EXPECT_TRUE(test::read_text(folder_ / "p.glb") == test::read_text(glb));
+}
+
+TEST_F(SurfaceTool, SeveralOutputsThatCannotBeMeant) {
+  expect_failure(run({"-o", mesh_}), 2, {"mesh.ply", "named twice"});
+  expect_failure(run({"-o", cloud_}), 2, {"cloud.ply", "input and output"});
+  expect_failure(run({"-o", folder_ / "mesh.gltf"}), 2, {"mesh.gltf", "GLB"});
+  expect_failure(run({"-o", folder_ / "no/mesh.glb"}), 4, {"mesh.glb", "does not exist"});
+  expect_failure(run({"-o", folder_ / "b.glb", "--chunk", "1/2"}), 2, {"--chunk"});
 }
 
 TEST_F(SurfaceTool, ProgressIsPlainLinesOffATerminal) {
