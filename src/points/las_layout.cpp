@@ -172,8 +172,8 @@ void LasLayout::encode(const SampleBatch& batch, const std::array<LasAxis, 3>& a
 }
 
 void LasLayout::name_system(const std::string& crs) {
-  constexpr std::size_t kMostBytes = 65535;
-  if (crs.find('[') == std::string::npos || crs.size() + 1 > kMostBytes) return;
+  constexpr std::size_t kMostTextBytes = 65535;
+  if (crs.find('[') == std::string::npos || crs.size() + 1 > kMostTextBytes) return;
   system_.assign(kRecordHeaderBytes, '\0');
   system_.replace(2, 15, "LASF_Projection");
   put_at(system_, 18, std::uint16_t{2112});

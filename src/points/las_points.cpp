@@ -138,6 +138,7 @@ class CensusTaker {
     const RowRange rows{first, static_cast<std::size_t>(std::min<std::uint64_t>(kBlock, records_.count() - first))};
     std::vector<std::vector<float>> values(columns_.size(), std::vector<float>(rows.count));
     std::vector<ColumnTarget> targets;
+    targets.reserve(values.size());
     for (auto& v : values) targets.push_back({.narrow = v.data()});
     records_.read(rows, wanted_, [&](const std::byte* bytes, std::size_t at, std::size_t count) {
       convert_rows({0, record_bytes_, false}, columns_, bytes, at, count, targets);
@@ -228,6 +229,7 @@ class LasPoints final : public PointSource, public HiddenValues {
     }
     values.assign(names.size(), std::vector<double>(rows.count));
     std::vector<ColumnTarget> targets;
+    targets.reserve(values.size());
     for (std::vector<double>& v : values) targets.push_back({.wide = v.data()});
     records_->read(rows, bytes_of(columns, header_.record_bytes),
                    [&](const std::byte* bytes, std::size_t at, std::size_t n) {

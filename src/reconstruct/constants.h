@@ -8,16 +8,16 @@ namespace lamina {
 inline constexpr double kDefaultBlend = 1.2;
 
 /// Samples this far (radii) from the surface that their neighbours suggest are noisy. Detail that the sampling hardly
-/// resolves looks the same up to 0.05; noise of half a spacing either way has 0.12.
+/// resolves looks the same up to 0.05; noise of half a spacing either way has 0.12, of a spacing 0.3.
 inline constexpr float kNoisy = 0.05F;
-inline constexpr float kVeryNoisy = 0.1F;
+inline constexpr float kVeryNoisy = 0.3F;
 
 /// H for noisy and for very noisy samples; between them it grows with the noise.
 inline constexpr double kNoisyBlend = 1.75;
 inline constexpr double kVeryNoisyBlend = 2.5;
 
 /// Support (radii) within which noisy normals are fitted again.
-inline constexpr double kNoisyRefit = 4;
+inline constexpr double kNoisyRefit = 3;
 
 /// Radii of an evenly sampled surface: the 99 % quantile is some 2.5 times the 1 % one (cells that the surface clips
 /// give long ones), six to eight where density varies 64 times. Where density varies, the support must bridge wider

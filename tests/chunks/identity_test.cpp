@@ -5,6 +5,7 @@
 
 #include "chunks/chunked.h"
 #include "lamina/scatter.h"
+#include "reconstruct/constants.h"
 #include "reconstruct/stages.h"
 
 namespace lamina {
@@ -159,7 +160,7 @@ TEST_F(ChunkIdentity, ChosenByTheNoise) {
   SurfaceSettings s;
   s.blend.reset();
   expect_same(cloud, s, {3});
-  EXPECT_EQ(plan_.refit, 4) << plan_.noise;
+  EXPECT_EQ(plan_.refit, kNoisyRefit) << plan_.noise;
 }
 
 TEST_F(ChunkIdentity, OfAClosedThingWithHoles) {

@@ -5,6 +5,7 @@
 
 #include "ranks/launched.h"
 #include "reconstruct/clouds.h"
+#include "reconstruct/constants.h"
 #include "support/program.h"
 
 namespace lamina {
@@ -118,7 +119,7 @@ TEST_F(RankIdentity, ChosenByTheNoise) {
   expect_same({test::write_cloud(cloud, folder_ / "in.ply"), "--blend", "auto", "--threads", "1", "--stats",
                folder_ / "s.json"},
               {2});
-  EXPECT_EQ(nlohmann::json::parse(test::read_file(folder_ / "s.json")).at("refit"), 4);
+  EXPECT_EQ(nlohmann::json::parse(test::read_file(folder_ / "s.json")).at("refit"), kNoisyRefit);
 }
 
 TEST_F(RankIdentity, MoreRanksThanSlabs) {

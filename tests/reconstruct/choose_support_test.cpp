@@ -1,4 +1,5 @@
 #include "reconstruct/choose_support.h"
+#include "reconstruct/constants.h"
 
 #include <gtest/gtest.h>
 
@@ -45,7 +46,7 @@ TEST(ChooseSupport, ClosedMeshesAreMadeWhereAskedFor) {
 
 TEST(ChooseSupport, NoiseWidensTheSupportAndRefitsNormals) {
   double before = 1.2;
-  for (const float noise : {0.06F, 0.08F, 0.1F}) {
+  for (const float noise : {0.06F, 0.1F, kVeryNoisy}) {
     const StageSettings choice = choose_support(by_noise(), survey(noise, 2));
     EXPECT_GT(choice.feed.blend, before);
     EXPECT_GT(choice.refit.support, 0);

@@ -49,9 +49,10 @@ TEST_F(PartsTool, MeshesOfEveryFormat) {
     words.insert(words.end(), {"-o", merged});
     const Outcome outcome = run_lamina(words);
     EXPECT_EQ(outcome.code, 0) << outcome.err;
-    if (ending != ".glb")
+    if (ending != ".glb") {
       EXPECT_THAT(outcome.err, HasSubstr(ending == ".stl" ? "not the properties red, green, blue, id;"
                                                           : "no place for the properties id;"));
+    }
     EXPECT_TRUE(read_text(merged) == read_text(whole)) << ending;
     const std::string resumed = folder_ / ("resumed" + ending);
     EXPECT_EQ(run_lamina({"surface", cloud_, "-o", resumed, "--steps", "2", "--checkpoint", folder_ / "kept"}).code, 0);
@@ -65,8 +66,8 @@ TEST_F(PartsTool, MeshesOfEveryFormat) {
                         "--checkpoint", folder_ / "kept"})
                 .code,
             0);
-  for (const std::string glb : {folder_ / "both.glb", folder_ / "again.glb"})
-    EXPECT_TRUE(read_text(glb) == read_text(folder_ / "of_one_run.glb")) << glb;
+  for (const char* glb : {"both.glb", "again.glb"})
+    EXPECT_TRUE(read_text(folder_ / glb) == read_text(folder_ / "of_one_run.glb")) << glb;
   EXPECT_TRUE(read_text(mesh_) == read_text(folder_ / "again.ply"));
 }
 
