@@ -83,7 +83,7 @@ void add_simplify(CLI::App& app) {
       *tool,
       "Edges are contracted in the order of their quadric error, each to the point of least error; attributes are "
       "interpolated. The mesh stays manifold with the same parts, handles and boundary loops. There is no bound "
-      "on the error: 'lamina compare' measures it. The mesh is held in memory, and one thread works.");
+      "on the error: 'lamina compare' measures it. The mesh is held in memory.");
   add_examples(*tool, "  lamina simplify mesh.ply --ratio 0.5 -o fewer.ply");
   tool->callback([o] { run_simplify(*o); });
 }

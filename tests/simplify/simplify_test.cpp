@@ -123,6 +123,30 @@ TEST(Simplify, TopologyStays) {
   });
 }
 
+TEST(Simplify, PiecesLeaveNoTraceAndThreadsNone) {
+  const TriangleMesh before = field(200, [](double x, double y) { return 0.1 * std::sin(9 * x) * std::cos(7 * y); });
+  std::vector<TriangleMesh> after(3, before);
+  for (const int threads : {1, 2, 5}) {
+    RunContext run;
+    run.threads = threads;
+    EXPECT_TRUE(simplify_mesh(after[static_cast<std::size_t>(threads / 2)], {8000}, run).reached);
+  }
+  EXPECT_EQ(after[0].positions, after[1].positions);
+  EXPECT_EQ(after[0].triangles, after[1].triangles);
+  EXPECT_EQ(after[0].positions, after[2].positions);
+  EXPECT_EQ(after[0].triangles, after[2].triangles);
+  EXPECT_GE(after[0].triangles.size(), 7999u);
+  const CheckReport r = check_mesh(after[0]);
+  EXPECT_TRUE(r.manifold());
+  EXPECT_TRUE(manifold_to_openmesh(after[0]));
+  EXPECT_EQ(r.euler_characteristic, 1);
+  EXPECT_EQ(r.boundary_loops, 1u);
+  // No seams: nowhere are triangles as small as they were.
+  const MeshMeasures m = measure_mesh(after[0]);
+  EXPECT_GT(m.shortest_edge, 1.0 / 200 / 3);
+  EXPECT_LT(compare(after[0], before, {20000}).b_to_a->max, 1e-3);
+}
+
 TEST(Simplify, AttributesAreInterpolated) {
   TriangleMesh mesh = field(30, [](double, double) { return 0.0; });
   mesh.layout = {{"x_again", ScalarType::float32}};
