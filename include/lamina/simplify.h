@@ -8,13 +8,15 @@
 namespace lamina {
 
 struct SimplifySettings {
-  std::uint64_t triangles = 0;  ///< how many are wanted, >= 1
+  std::uint64_t triangles = 0;  ///< how many are wanted, >= 1; without `error`
+  double error = 0;             ///< how far it may get from what it was, > 0, in mesh units; without `triangles`
 };
 
 struct SimplifyStats {
   std::uint64_t triangles_before = 0, triangles_after = 0;
   std::uint64_t contractions = 0;
-  bool reached = false;  ///< no more triangles than wanted; else no contraction was left that keeps shape and topology
+  bool reached = false;  ///< no more triangles than wanted; else no contraction was left that keeps shape and topology.
+                         ///< With `error`: true
 };
 
 /// Contracts edges in order of their quadric error (Garland and Heckbert 1997), each to the point of least error, found

@@ -25,6 +25,7 @@ Contractor::Contractor(Piece piece)
       stars_(std::move(piece_.triangles), piece_.positions.size()),
       size_(stars_.triangles().size()),
       version_(piece_.positions.size()) {
+  if (piece_.bound > 0) tracker_.emplace(piece_.positions, stars_.triangles(), std::move(piece_.errors), piece_.bound);
   heap_.reserve(2 * size_);
   for (std::uint32_t u = 0; u < version_.size(); ++u) {
     if (piece_.fixed[u] != 0) continue;
@@ -83,8 +84,10 @@ std::uint64_t Contractor::run(float dearest, std::uint64_t keep) {
     std::pop_heap(heap_.begin(), heap_.end());
     heap_.pop_back();
     if (!stars_.contractible(e.u, e.v)) continue;
-    const Vec3 to = place(e.u, e.v).at;
-    if (keeps_shape(e.u, e.v, to)) size_ -= static_cast<std::uint64_t>(contract(e.u, e.v, to));
+    const Placed to = place(e.u, e.v);
+    if (!keeps_shape(e.u, e.v, to.at) || (tracker_ && !stays_near(e.u, e.v, to))) continue;
+    size_ -= static_cast<std::uint64_t>(contract(e.u, e.v, to.at));
+    if (tracker_) tracker_->accept();
   }
   return before - size_;
 }
@@ -107,6 +110,15 @@ bool Contractor::keeps_shape(std::uint32_t u, std::uint32_t v, const Vec3& to) c
     }
   }
   return true;
+}
+
+/// Within the bound? Where the root mean square of the planes' distances is far beyond it, nothing is proved any more.
+bool Contractor::stays_near(std::uint32_t u, std::uint32_t v, const Placed& to) {
+  const Vec3 edge = piece_.positions[v] - piece_.positions[u];
+  const double of_noise = 16 * kNormalNoise * kNormalNoise * dot(edge, edge);  // counted in the cost, too
+  const double weight = piece_.quadrics[u].weight() + piece_.quadrics[v].weight();
+  if (to.cost > weight * (piece_.bound * piece_.bound + of_noise)) return false;
+  return tracker_->allows(stars_, piece_.positions, u, v, to.at);
 }
 
 int Contractor::contract(std::uint32_t u, std::uint32_t v, const Vec3& to) {

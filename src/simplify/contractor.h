@@ -3,11 +3,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "meshes/vec3.h"
 #include "simplify/quadric.h"
 #include "simplify/stars.h"
+#include "simplify/tracker.h"
 
 namespace lamina::simplify {
 
@@ -19,6 +21,8 @@ struct Piece {
   std::vector<Triangle> triangles;
   meshes::Vec3 centre{};  ///< far from it quadrics lose their digits
   bool floats = false;    ///< positions are floats and stay so
+  double bound = 0;       ///< how far it may get from the mesh that simplification began with; 0: as far as it likes
+  std::vector<Errors> errors;  ///< of the triangles; empty without a bound
 };
 
 /// v has gone into u, `share` of the way from u to v.
@@ -40,6 +44,8 @@ class Contractor {
 
   [[nodiscard]] std::uint64_t size() const { return size_; }  ///< triangles that are there
   [[nodiscard]] const std::vector<Merge>& merges() const { return merges_; }
+  /// Of the triangles that are there; only with a bound.
+  [[nodiscard]] std::vector<Errors> errors() const { return tracker_->errors(); }
   [[nodiscard]] const Stars& stars() const { return stars_; }
   [[nodiscard]] const Piece& piece() const { return piece_; }  ///< its triangles are in stars()
 
@@ -60,12 +66,14 @@ class Contractor {
 
   [[nodiscard]] Placed place(std::uint32_t u, std::uint32_t v) const;
   void offer(std::uint32_t u, std::uint32_t v);
+  [[nodiscard]] bool stays_near(std::uint32_t u, std::uint32_t v, const Placed& to);
   [[nodiscard]] bool keeps_shape(std::uint32_t u, std::uint32_t v, const meshes::Vec3& to) const;
   int contract(std::uint32_t u, std::uint32_t v, const meshes::Vec3& to);
 
   Piece piece_;
   Stars stars_;
   std::uint64_t size_;
+  std::optional<Tracker> tracker_;
   std::vector<std::uint32_t> version_;  ///< how often a vertex has moved
   std::vector<Entry> heap_;
   std::vector<Merge> merges_;

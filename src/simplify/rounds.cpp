@@ -22,13 +22,14 @@ namespace {
 
 using namespace meshes;
 
-constexpr double kNormalNoise = 1e-3;  ///< of planes: about what floats leave of a small triangle's normal
 constexpr double kBoundaryWeight = 1;  ///< of planes through boundary edges, beside the squared edge
 
 constexpr std::size_t kPieceTriangles = 24'000;  ///< some 3 MB with queue and quadrics
 constexpr double kRoundShrinks = 0.5;            ///< a round leaves no smaller share of the triangles
 constexpr double kLastRound = 1.15;              ///< of the wanted ones: what the last round begins with at the most
 constexpr double kInTurn = 1.01;  ///< from this many of the wanted ones on, pieces take turns, the cheapest edge of all
+
+constexpr int kBoundRounds = 3;  ///< with a bound: a round goes as far as it can, the others clear what it held fast
 
 /// Where a round cuts: different from the two before it.
 double share_of_round(int round) {
@@ -78,14 +79,31 @@ class Round {
     return !exactly || in_turn(goal);
   }
 
+  /// As far as pieces go.
+  void exhaust(const RunContext& run) {
+    tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
+      Contractor& c = *pieces_[p];
+      while (!run.cancelled() &&
+             c.run(std::numeric_limits<float>::max(), c.size() - std::max<std::uint64_t>(c.size() / 8, 1)) > 0) {
+      }
+    });
+    if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+  }
+
   /// Everything back into the mesh. Returns the number of contractions.
   std::uint64_t finish() {
     tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) { put_back(p); });
     std::uint64_t contractions = 0;
     for (const auto& piece : pieces_) contractions += piece->merges().size();
     auto& triangles = work_.mesh.triangles;
-    triangles.erase(std::remove_if(triangles.begin(), triangles.end(), [](const Triangle& t) { return t[0] == kNone; }),
-                    triangles.end());
+    std::size_t kept = 0;
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+      if (triangles[t][0] == kNone) continue;
+      if (work_.bound > 0) work_.errors[kept] = work_.errors[t];
+      triangles[kept++] = triangles[t];
+    }
+    triangles.resize(kept);
+    if (work_.bound > 0) work_.errors.resize(kept);
     return contractions;
   }
 
@@ -114,6 +132,7 @@ class Round {
       Piece piece;
       piece.centre = work_.centre;
       piece.floats = work_.floats;
+      piece.bound = work_.bound;
       for (const std::uint32_t t : triangles_of(p)) {
         Triangle local = triangles[t];
         for (std::uint32_t& v : local) {
@@ -124,6 +143,7 @@ class Round {
           v = number[v];
         }
         piece.triangles.push_back(local);
+        if (work_.bound > 0) piece.errors.push_back(work_.errors[t]);
       }
       for (const std::uint32_t v : vertices) {
         number[v] = kNone;
@@ -171,6 +191,10 @@ class Round {
       work_.quadrics[vertices[v]] = c.piece().quadrics[v];
     }
     const auto where = triangles_of(p);
+    if (work_.bound > 0) {
+      const std::vector<Errors> errors = c.errors();
+      for (std::size_t t = 0; t < where.size(); ++t) work_.errors[where[t]] = errors[t];
+    }
     for (std::size_t t = 0; t < where.size(); ++t) {
       const Triangle& local = c.stars().triangles()[t];
       mesh.triangles[where[t]] = local[0] == kNone
@@ -242,6 +266,20 @@ std::uint64_t contract_to(WorkMesh& work, std::uint64_t wanted, const RunContext
     // Two rounds in which nothing goes: what one holds fast, the other does not.
     if (last && work.mesh.triangles.size() == there && number > 0) break;
     if (last && there <= kPieceTriangles) break;
+  }
+  return contractions;
+}
+
+std::uint64_t contract_within(WorkMesh& work, const RunContext& run) {
+  work.errors.assign(work.mesh.triangles.size(), {});
+  std::uint64_t contractions = 0;
+  for (int number = 0; number < kBoundRounds; ++number) {
+    const std::size_t there = work.mesh.triangles.size();
+    Round round(work, share_of_round(number));
+    round.exhaust(run);
+    contractions += round.finish();
+    const std::size_t gone = there - work.mesh.triangles.size();
+    if (there <= kPieceTriangles || gone < there / 200) break;
   }
   return contractions;
 }

@@ -17,7 +17,9 @@ struct WorkMesh {
   TriangleMesh& mesh;
   std::vector<Quadric> quadrics;
   meshes::Vec3 centre{};
-  bool floats = false;  ///< all positions are
+  bool floats = false;           ///< all positions are
+  double bound = 0;              ///< how far the mesh may get from what it was; 0: as far as it likes
+  std::vector<Errors> errors{};  ///< of the triangles; empty without a bound
 };
 
 /// Sums up planes of triangles and boundary edges.
@@ -26,5 +28,8 @@ WorkMesh make_work_mesh(TriangleMesh& mesh);
 /// Contracts edges until `wanted` triangles are left, or no edge can go. Returns the number of contractions. Vertices
 /// that have gone stay in the arrays. Throws Error(internal) when cancelled.
 std::uint64_t contract_to(WorkMesh& work, std::uint64_t wanted, const RunContext& run);
+
+/// The same as far as the bound allows.
+std::uint64_t contract_within(WorkMesh& work, const RunContext& run);
 
 }  // namespace lamina::simplify

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -50,7 +51,14 @@ void drop_unused(TriangleMesh& mesh) {
 }  // namespace
 
 SimplifyStats simplify_mesh(TriangleMesh& mesh, const SimplifySettings& settings, const RunContext& run) {
-  if (settings.triangles == 0) throw Error(ExitCode::usage, "simplify: at least one triangle has to stay");
+  if (settings.error != 0) {
+    if (!(settings.error > 0 && std::isfinite(settings.error)))
+      throw Error(ExitCode::usage,
+                  fmt::format("simplify: an error of {:g}: a length above 0 is meant", settings.error));
+    if (settings.triangles > 0) throw Error(ExitCode::usage, "simplify: a number of triangles or an error, not both");
+  } else if (settings.triangles == 0) {
+    throw Error(ExitCode::usage, "simplify: at least one triangle has to stay");
+  }
   require_manifold(mesh, run);
   if (settings.triangles > mesh.triangles.size()) {
     throw Error(ExitCode::usage, fmt::format("simplify: {} triangles are wanted, the mesh has {}", settings.triangles,
@@ -60,11 +68,13 @@ SimplifyStats simplify_mesh(TriangleMesh& mesh, const SimplifySettings& settings
   stats.triangles_before = mesh.triangles.size();
   with_threads(run.threads, [&] {
     simplify::WorkMesh work = simplify::make_work_mesh(mesh);
-    stats.contractions = simplify::contract_to(work, settings.triangles, run);
+    work.bound = settings.error;
+    stats.contractions = settings.error > 0 ? simplify::contract_within(work, run)
+                                            : simplify::contract_to(work, settings.triangles, run);
   });
   drop_unused(mesh);
   stats.triangles_after = mesh.triangles.size();
-  stats.reached = stats.triangles_after <= settings.triangles;
+  stats.reached = settings.error > 0 || stats.triangles_after <= settings.triangles;
   return stats;
 }
 
