@@ -58,9 +58,10 @@ class Round {
   bool reduce(std::uint64_t goal, bool exactly, const RunContext& run) {
     const auto in_parallel = static_cast<std::uint64_t>(kInTurn * static_cast<double>(goal));
     float dearest = 0;
-    while (size_ > in_parallel && !pieces_.empty()) {
+    const std::uint64_t odd = 2 * pieces_.size();  // what rounding up and contractions by two may take beside
+    while (size_ > std::max(goal, in_parallel) && size_ - goal > 2 * odd) {
       if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
-      const double part = static_cast<double>(size_ - goal) / static_cast<double>(size_);
+      const double part = static_cast<double>(size_ - goal - odd) / static_cast<double>(size_);
       tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
         Contractor& c = *pieces_[p];
         const auto some = static_cast<std::uint64_t>(std::ceil(part * static_cast<double>(c.size())));
@@ -253,19 +254,24 @@ WorkMesh make_work_mesh(TriangleMesh& mesh) {
 }
 
 std::uint64_t contract_to(WorkMesh& work, std::uint64_t wanted, const RunContext& run) {
+  const auto times_wanted = [&](double factor) {
+    return static_cast<std::uint64_t>(factor * static_cast<double>(wanted));
+  };
   std::uint64_t contractions = 0;
+  bool stuck = false;  // the round before this one found no edge that can go
   for (int number = 0; work.mesh.triangles.size() > wanted; ++number) {
     const std::uint64_t there = work.mesh.triangles.size();
-    const auto last_begins = static_cast<std::uint64_t>(kLastRound * static_cast<double>(wanted));
-    const bool last = there <= std::max<std::uint64_t>(last_begins, kPieceTriangles);
-    const auto goal =
-        last ? wanted : std::max(last_begins, static_cast<std::uint64_t>(kRoundShrinks * static_cast<double>(there)));
+    const bool last = stuck || there <= std::max<std::uint64_t>(times_wanted(kLastRound), kPieceTriangles);
+    // A round before the last ends a little above its goal, and has to end where the last one begins.
+    const std::uint64_t goal = last ? wanted
+                                    : std::max(times_wanted(kLastRound / kInTurn) - 1,
+                                               static_cast<std::uint64_t>(kRoundShrinks * static_cast<double>(there)));
     Round round(work, share_of_round(number));
     round.reduce(goal, last, run);
     contractions += round.finish();
-    // Two rounds in which nothing goes: what one holds fast, the other does not.
-    if (last && work.mesh.triangles.size() == there && number > 0) break;
-    if (last && there <= kPieceTriangles) break;
+    const bool whole = there <= kPieceTriangles;  // nothing was held fast
+    if (last && (whole || (stuck && work.mesh.triangles.size() == there))) break;
+    stuck = work.mesh.triangles.size() == there;
   }
   return contractions;
 }
