@@ -84,7 +84,7 @@ void add_attribtransfer(CLI::App& app) {
       ->type_name("LENGTH")
       ->capture_default_str()
       ->group(group);
-  add_point_options(*tool, o->reading.columns, o->reading.select);
+  add_point_options(*tool, o->reading);
   add_run_options(*tool, o->run);
   add_notes(
       *tool,

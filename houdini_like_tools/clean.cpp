@@ -34,12 +34,10 @@ void run_clean(const CleanOptions& o) {
   const RowPick& pick = o.settings.pick;
   if (pick.clip && pick.every <= 1) reading.select.box = {pick.clip->low, pick.clip->high};
   const auto source = open_point_input(o.input, reading, context);
-  if (source->info().geographic && o.settings.looks_around())
-    throw Error(ExitCode::unreadable, shown_name(o.input) +
-                                          ": x and y are degrees of longitude and latitude, in which no distance can "
-                                          "be measured; project them to metres first");
-  const auto writer = open_points_writer(o.output, with_precision(columns_of(source->info()), o.precision),
-                                         {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs});
+  if (o.settings.looks_around()) require_no_degrees(source->info());
+  const auto writer = open_points_writer(
+      o.output, with_precision(columns_of(source->info()), o.precision),
+      {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs, .geographic = source->info().geographic});
   const CleanReport report = clean_points(*source, *writer, o.settings, o.bad, context);
   warn_of_bad_rows(report.rows, shown_name(o.input), context);
   const std::string said = describe(report.counts);
@@ -58,7 +56,7 @@ void add_clean(CLI::App& app) {
   auto o = std::make_shared<CleanOptions>();
   add_files(*tool, o->input, "Points", o->output, "Points that stay, in their order");
   add_clean_options(*tool, o->settings, "Cleaning");
-  add_point_options(*tool, o->reading.columns, o->reading.select);
+  add_point_options(*tool, o->reading);
   add_bad_samples(*tool, o->bad);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

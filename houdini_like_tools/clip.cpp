@@ -39,8 +39,9 @@ void clip_points(const ClipOptions& o, const RunContext& context) {
   PointSettings reading = o.reading;
   if (o.region.box && o.keep == Keep::inside) reading.select.box = {o.region.box->low, o.region.box->high};
   const auto source = open_point_input(o.input, reading, context);
-  const auto writer = open_points_writer(o.output, with_precision(columns_of(source->info()), o.precision),
-                                         {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs});
+  const auto writer = open_points_writer(
+      o.output, with_precision(columns_of(source->info()), o.precision),
+      {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs, .geographic = source->info().geographic});
   const EditReport report = edit_points(
       *source, *writer, [&](SampleBatch& batch) { clip_rows(batch, o.region, o.keep); }, o.bad, context);
   warn_of_bad_rows(report, shown_name(o.input), context);
@@ -103,7 +104,7 @@ void add_clip(CLI::App& app) {
       ->check(CLI::IsMember({"inside", "outside"}).description(""))
       ->type_name("inside|outside")
       ->group("Region");
-  add_point_options(*tool, o->reading.columns, o->reading.select);
+  add_point_options(*tool, o->reading);
   add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

@@ -74,8 +74,9 @@ void convert_points(const ConvertOptions& o, const RunContext& context) {
                                              "surface' first",
                                              shown_name(o.input), to));
   const auto source = open_point_input(o.input, o.reading, context);
-  const auto writer = open_points_writer(o.output, with_precision(columns_of(source->info()), o.precision),
-                                         {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs});
+  const auto writer = open_points_writer(
+      o.output, with_precision(columns_of(source->info()), o.precision),
+      {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs, .geographic = source->info().geographic});
   const EditReport report = edit_points(*source, *writer, {}, o.bad, context);
   warn_of_bad_rows(report, shown_name(o.input), context);
   writer->commit();
@@ -213,8 +214,7 @@ void add_convert(CLI::App& app) {
       ->group(volume);
   tool->add_flag("--fog", o->fog, "Make a fog volume (grid density) of a level set")->group(volume);
   tool->add_flag("--half", o->volume.half, "Store a level set or fog in 16-bit floats")->group(volume);
-  add_point_options(*tool, o->reading.columns, o->reading.select);
-  add_ignore_checksums(*tool, o->reading.ignore_checksums);
+  add_point_options(*tool, o->reading);
   add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

@@ -210,8 +210,7 @@ void add_info(CLI::App& app) {
       ->required()
       ->type_name("");
   tool->add_flag("--json", o->json, "Print JSON");
-  add_point_options(*tool, o->reading.columns, o->reading.select);
-  add_ignore_checksums(*tool, o->reading.ignore_checksums);
+  add_point_options(*tool, o->reading);
   add_run_options(*tool, o->run);
   add_notes(*tool,
             "Tells the number of points, vertices or voxels, the box, every attribute with its type and range, and a "

@@ -34,13 +34,28 @@ struct MergeOptions {
 void merge_points(const MergeOptions& o, const std::vector<PointInput>& inputs, const RunContext& context) {
   std::vector<std::unique_ptr<PointSource>> sources;
   std::vector<const PointSourceInfo*> infos;
+  std::string crs;
   for (const PointInput& input : inputs) {
     auto source = open_point_input(input.path, o.reading, context);
     sources.push_back(input.posed ? pose_points(std::move(source), input.pose) : std::move(source));
     infos.push_back(&sources.back()->info());
+    if (infos.size() == 1) crs = infos[0]->crs;
+    if (infos.back()->crs == crs && infos.back()->geographic == infos[0]->geographic) continue;
+    if (o.reading.project_degrees) {
+      throw Error(ExitCode::usage,
+                  fmt::format("{}: its degrees come into another plane than those of {}, as whole degrees lie between; "
+                              "merge the files first, and project the result",
+                              shown_name(input.path), shown_name(inputs.front().path)));
+    }
+    if (!crs.empty()) {
+      context.warn(fmt::format("{}: has another coordinate reference system than {}; the result names none",
+                               shown_name(input.path), shown_name(inputs.front().path)));
+    }
+    crs.clear();
   }
-  const auto writer = open_points_writer(o.output, with_precision(merged_columns(infos, o.mixed), o.precision),
-                                         {.count = {}, .tmp_dir = o.run.tmp_dir});
+  const auto writer =
+      open_points_writer(o.output, with_precision(merged_columns(infos, o.mixed), o.precision),
+                         {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = crs, .geographic = infos[0]->geographic});
   for (const auto& source : sources)
     warn_of_bad_rows(append_points(*source, *writer, o.bad, context), shown_name(source->info().path), context);
   writer->commit();
@@ -143,7 +158,7 @@ void add_merge(CLI::App& app) {
       ->check(CLI::IsMember({"refuse", "fill", "intersect"}).description(""))
       ->type_name("refuse|fill|intersect")
       ->group("Input");
-  add_point_options(*tool, o->reading.columns, o->reading.select);
+  add_point_options(*tool, o->reading);
   add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

@@ -12,6 +12,7 @@
 #include "common/inputs.h"
 #include "common/outputs.h"
 #include "common/point_options.h"
+#include "common/presets.h"
 #include "common/stats.h"
 #include "lamina/edit_points.h"
 #include "lamina/error.h"
@@ -27,6 +28,8 @@ struct NormalOptions {
   NormalsSettings settings;
   bool reorient = false, check = false, missing = false;
   Precision precision = Precision::automatic;
+  std::optional<Trade> preset;
+  CLI::App* tool = nullptr;  ///< knows which options were given
   RunOptions run;
 };
 
@@ -38,7 +41,11 @@ NormalsMode mode_of(const NormalOptions& o) {
   return o.missing ? NormalsMode::complete : NormalsMode::estimate;
 }
 
-void run_normal(const NormalOptions& o) {
+void run_normal(NormalOptions& o) {
+  if (o.preset) {
+    const auto points_only = [](PresetPart part) { return part == PresetPart::points; };
+    apply_preset(*o.tool, *o.preset, points_only, make_context(o.run, o.output));
+  }
   NormalsSettings settings = o.settings;
   settings.mode = mode_of(o);
   if (!o.check && o.output.empty()) throw CLI::RequiredError("--output");
@@ -53,16 +60,20 @@ void run_normal(const NormalOptions& o) {
   std::unique_ptr<PointSource> source = open_points(names, reading);
   for (const std::string& remark : source->info().remarks) context.info(remark);
   const std::string path = shown_name(source->info().path);
-  if (source->info().geographic)
-    throw Error(ExitCode::unreadable, path +
-                                          ": x and y are degrees of longitude and latitude, in which no distance "
-                                          "can be measured; project them to metres first");
+  require_no_degrees(source->info());
+  if (!o.preset && !o.check) {
+    const TradeGuess guess = guess_trade(source->info());
+    context.info(describe(guess));
+    face_by_trade(guess.trade, settings);
+  }
   PointColumns columns = with_precision(columns_of(source->info()), o.precision);
   columns.normals = true;
   // An output that cannot be written is better known before the work.
   std::unique_ptr<PointsWriter> writer;
   if (!o.output.empty())
-    writer = open_points_writer(o.output, columns, {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs});
+    writer = open_points_writer(
+        o.output, columns,
+        {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs, .geographic = source->info().geographic});
   std::optional<ResultFile> stats_file;
   if (!o.stats.empty()) stats_file.emplace(o.stats);
   NormalsReport report;
@@ -82,6 +93,7 @@ void run_normal(const NormalOptions& o) {
 void add_normal(CLI::App& app) {
   auto* tool = app.add_subcommand("normal", "Find normals of points, or turn those they have to one side");
   auto o = std::make_shared<NormalOptions>();
+  o->tool = tool;
   tool->add_option(
           "INPUT", o->inputs,
           "Points of any format; several files, folders, patterns or scan lists are one cloud; - for PLY on standard "
@@ -100,8 +112,9 @@ void add_normal(CLI::App& app) {
   tool->add_flag("--reorient", o->reorient, "Keep the directions the input has, change signs only")->group(group);
   tool->add_flag("--missing", o->missing, "Keep the normals the input has, find those it lacks")->group(group);
   tool->add_flag("--check", o->check, "Change and write nothing: tell the share of sign conflicts")->group(group);
+  add_preset(*tool, o->preset, group);
   add_normals_options(*tool, o->settings, group);
-  add_point_options(*tool, o->reading.columns, o->reading.select);
+  add_point_options(*tool, o->reading);
   add_bad_samples(*tool, o->settings.bad_samples);
   add_precision(*tool, o->precision);
   tool->add_option("--stats", o->stats, "Write counts and conflicts by slab to this JSON file; - for standard output")

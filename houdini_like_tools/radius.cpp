@@ -26,10 +26,7 @@ struct RadiusOptions {
 void run_radius(const RadiusOptions& o) {
   const RunContext context = make_context(o.run, o.output);
   const auto source = open_point_input(o.input, o.reading, context);
-  if (source->info().geographic)
-    throw Error(ExitCode::unreadable, shown_name(o.input) +
-                                          ": x and y are degrees of longitude and latitude, in which "
-                                          "no distance can be measured; project them to metres first");
+  require_no_degrees(source->info());
   PointColumns columns = with_precision(columns_of(source->info()), o.precision);
   columns.radius = o.name;
   for (const AttributeSpec& spec : columns.attributes) {
@@ -37,8 +34,9 @@ void run_radius(const RadiusOptions& o) {
       throw Error(ExitCode::usage, fmt::format("{}: has an attribute '{}' already; choose another name with --name",
                                                shown_name(o.input), o.name));
   }
-  const auto writer =
-      open_points_writer(o.output, columns, {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs});
+  const auto writer = open_points_writer(
+      o.output, columns,
+      {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs, .geographic = source->info().geographic});
   const PointRadiiReport report = write_point_radii(*source, *writer, o.settings, context);
   warn_of_bad_rows(report.rows, shown_name(o.input), context);
   writer->commit();
@@ -79,7 +77,7 @@ void add_radius(CLI::App& app) {
       ->check(CLI::IsMember({"radius", "pscale"}).description(""))
       ->type_name("radius|pscale")
       ->group(group);
-  add_point_options(*tool, o->reading.columns, o->reading.select);
+  add_point_options(*tool, o->reading);
   add_bad_samples(*tool, s.bad_samples);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

@@ -22,37 +22,42 @@ namespace {
 struct SimplifyOptions {
   std::string input, output;
   std::uint64_t triangles = 0;
-  double ratio = 0;
+  double ratio = 0, error = 0;
   BadSamples bad = BadSamples::drop;
   RunOptions run;
   const CLI::App* tool = nullptr;  ///< knows which options were given
 };
 
-std::uint64_t wanted_triangles(const SimplifyOptions& o, std::size_t there) {
-  if (o.tool->count("--triangles") > 0) return o.triangles;
+SimplifySettings settings_of(const SimplifyOptions& o, std::size_t there) {
+  if (o.tool->count("--error") > 0) {
+    if (!(o.error > 0 && std::isfinite(o.error)))
+      throw Error(ExitCode::usage, fmt::format("--error {:g}: is a length above 0", o.error));
+    return {0, o.error};
+  }
+  if (o.tool->count("--triangles") > 0) return {o.triangles, 0};
   if (!(o.ratio > 0 && o.ratio <= 1))
     throw Error(ExitCode::usage, fmt::format("--ratio {:g}: is a share above 0 and up to 1", o.ratio));
-  return static_cast<std::uint64_t>(std::max(1.0, std::floor(o.ratio * static_cast<double>(there))));
+  return {static_cast<std::uint64_t>(std::max(1.0, std::floor(o.ratio * static_cast<double>(there)))), 0};
 }
 
 void run_simplify(const SimplifyOptions& o) {
-  if (o.tool->count("--triangles") + o.tool->count("--ratio") == 0)
-    throw Error(ExitCode::usage, "one of --triangles and --ratio says how far to simplify");
+  if (o.tool->count("--triangles") + o.tool->count("--ratio") + o.tool->count("--error") == 0)
+    throw Error(ExitCode::usage, "one of --error, --triangles and --ratio says how far to simplify");
   require_mesh_name(o.output);
   const RunContext context = make_context(o.run, o.output);
   TriangleMesh mesh = read_mesh_input(o.input, context, o.bad);
   if (mesh.triangles.empty())
     throw Error(ExitCode::unreadable, fmt::format("{}: has no faces: a point cloud, not a mesh", shown_name(o.input)));
-  // Doubles, quadrics and a queue of edges, whatever the file's format.
-  constexpr std::size_t kBytesPerTriangle = 450;
-  if (context.max_memory > 0 && kBytesPerTriangle * mesh.triangles.size() > context.max_memory) {
+  // Doubles, quadrics and a queue of edges, whatever the file's format; with a bound also what triangles stand for.
+  const std::size_t bytes_per_triangle = o.tool->count("--error") > 0 ? 650 : 450;
+  if (context.max_memory > 0 && bytes_per_triangle * mesh.triangles.size() > context.max_memory) {
     throw Error(ExitCode::budget,
                 fmt::format("{}: simplifying {} triangles needs about {} of memory, --max-memory "
                             "allows {}; give it more",
                             shown_name(o.input), count_text(mesh.triangles.size()),
-                            bytes_text(kBytesPerTriangle * mesh.triangles.size()), bytes_text(context.max_memory)));
+                            bytes_text(bytes_per_triangle * mesh.triangles.size()), bytes_text(context.max_memory)));
   }
-  const SimplifyStats stats = simplify_mesh(mesh, {wanted_triangles(o, mesh.triangles.size())}, context);
+  const SimplifyStats stats = simplify_mesh(mesh, settings_of(o, mesh.triangles.size()), context);
   if (!stats.reached) {
     context.warn(
         fmt::format("{}: more triangles stay than were wanted: no other edge can go without a fold or a change "
@@ -72,19 +77,26 @@ void add_simplify(CLI::App& app) {
   o->tool = tool;
   add_files(*tool, o->input, "Mesh, manifold: .ply .obj .off .stl, each also as .gz", o->output,
             "Mesh: .ply .obj .off .stl; - for PLY on standard output");
+  auto* error = tool->add_option("--error", o->error,
+                                 "How far the mesh may get from what it was, and that from it, in its units");
+  error->type_name("LENGTH");
   auto* triangles = tool->add_option("--triangles", o->triangles, "How many triangles stay, at most those there are");
-  triangles->type_name("N");
+  triangles->type_name("N")->excludes(error);
   tool->add_option("--ratio", o->ratio, "Which share of the triangles stays, above 0 and up to 1")
       ->type_name("K")
-      ->excludes(triangles);
+      ->excludes(triangles)
+      ->excludes(error);
   add_bad_samples(*tool, o->bad, "Vertices");
   add_run_options(*tool, o->run);
   add_notes(
       *tool,
       "Edges are contracted in the order of their quadric error, each to the point of least error; attributes are "
-      "interpolated. The mesh stays manifold with the same parts, handles and boundary loops. There is no bound "
-      "on the error: 'lamina compare' measures it. The mesh is held in memory, and one thread works.");
-  add_examples(*tool, "  lamina simplify mesh.ply --ratio 0.5 -o fewer.ply");
+      "interpolated. The mesh stays manifold with the same parts, handles and boundary loops. With --error every "
+      "contraction is proved to keep the largest distance, measured from either mesh to the other, within it. The mesh "
+      "is held in memory.");
+  add_examples(*tool,
+               "  lamina simplify mesh.ply --ratio 0.5 -o fewer.ply\n"
+               "  lamina simplify mesh.ply --error 0.001 -o within.ply");
   tool->callback([o] { run_simplify(*o); });
 }
 

@@ -3,6 +3,7 @@
 
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "common/inputs.h"
 #include "common/outputs.h"
 #include "common/point_options.h"
+#include "common/presets.h"
 #include "common/text.h"
 #include "lamina/chunk.h"
 #include "lamina/edit_points.h"
@@ -28,16 +30,23 @@ struct SortOptions {
   SortSettings settings;
   Precision precision = Precision::automatic;
   RunOptions run;
-  const CLI::App* tool = nullptr;  ///< knows which options were given
+  std::optional<Trade> preset;
+  CLI::App* tool = nullptr;  ///< knows which options were given
 };
 
 /// For chunks of a reconstruction.
-void run_store(const SortOptions& o) {
+void run_store(SortOptions& o) {
+  if (o.preset) {
+    const auto before_the_mesh = [](PresetPart part) {
+      return part == PresetPart::points || part == PresetPart::cleaning;
+    };
+    apply_preset(*o.tool, *o.preset, before_the_mesh, make_context(o.run));
+  }
   SurfaceSettings settings = o.reading;
+  settings.guess_trade = !o.preset;
   settings.input = o.inputs.front();
   settings.more_inputs.assign(o.inputs.begin() + 1, o.inputs.end());
-  settings.columns = o.points.columns;
-  settings.select = o.points.select;
+  settings.reading = o.points;
   settings.bad_samples = o.settings.bad_samples;
   if (o.tool->count("--strays") == 0) settings.clean.strays = true;
   const RunContext context = make_context(o.run);
@@ -46,15 +55,16 @@ void run_store(const SortOptions& o) {
       fmt::format("{}: {} samples, {}", o.store, count_text(stats.plan.samples), bytes_text(stats.disk_bytes)));
 }
 
-void run_sort(const SortOptions& o) {
+void run_sort(SortOptions& o) {
   if (!o.store.empty()) return run_store(o);
   if (o.output.empty()) throw Error(ExitCode::usage, "--output is required, or --store");
   if (o.inputs.size() > 1)
     throw Error(ExitCode::usage, "several inputs go into a --store only; put them into one file first: lamina merge");
   const RunContext context = make_context(o.run, o.output);
   const auto source = open_point_input(o.inputs.front(), o.points, context);
-  const auto writer = open_points_writer(o.output, with_precision(columns_of(source->info()), o.precision),
-                                         {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs});
+  const auto writer = open_points_writer(
+      o.output, with_precision(columns_of(source->info()), o.precision),
+      {.count = {}, .tmp_dir = o.run.tmp_dir, .crs = source->info().crs, .geographic = source->info().geographic});
   const EditReport report = sort_points(*source, *writer, o.settings, context);
   warn_of_bad_rows(report, shown_name(o.inputs.front()), context);
   writer->commit();
@@ -62,8 +72,9 @@ void run_sort(const SortOptions& o) {
 }
 
 /// What else lamina surface would do with the samples while it reads them: all of it needs --store.
-void add_reading(CLI::App& tool, CLI::Option& store, SurfaceSettings& reading) {
+void add_reading(CLI::App& tool, CLI::Option& store, SurfaceSettings& reading, std::optional<Trade>& preset) {
   const std::size_t before = tool.get_options().size();
+  add_preset(tool, preset, "Store");
   add_clean_options(tool, reading.clean, "Cleaning of the store");
   add_normals_choice(tool, reading.normals, "Normals of the store");
   add_normals_options(tool, reading.normal_search, "Normals of the store");
@@ -137,8 +148,8 @@ void add_sort(CLI::App& app) {
       ->capture_default_str()
       ->needs(folder)
       ->group(store);
-  add_reading(*tool, *folder, o->reading);
-  add_point_options(*tool, o->points.columns, o->points.select);
+  add_reading(*tool, *folder, o->reading, o->preset);
+  add_point_options(*tool, o->points);
   add_bad_samples(*tool, o->settings.bad_samples);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

@@ -18,6 +18,7 @@
 #include "common/outputs.h"
 #include "common/parts.h"
 #include "common/point_options.h"
+#include "common/presets.h"
 #include "common/stats.h"
 #include "common/surface_options.h"
 #include "common/text.h"
@@ -35,7 +36,8 @@ struct SurfaceOptions {
   PartsOptions parts;
   std::string stats, preview;
   bool raw = false;
-  const CLI::App* tool = nullptr;  ///< knows which options were given
+  std::optional<Trade> preset;
+  CLI::App* tool = nullptr;  ///< knows which options were given
 };
 
 /// A picture of the mesh file: of its triangles where they can be held, of its vertices where they cannot.
@@ -114,8 +116,23 @@ void require_outputs(const SurfaceOptions& o, const std::vector<std::string>& ou
     throw Error(ExitCode::usage, "--preview and --output name the same file");
 }
 
-void run_surface(const SurfaceOptions& o) {
+/// A store's points are what they are. Ranks do not clean; meshes made in parts are not pruned.
+void take_preset(const SurfaceOptions& o, const RunContext& context) {
+  const bool stored = is_store(o.inputs.front());
+  const bool ranked = launch().size > 1;
+  const bool in_parts = ranked || o.parts.chunked || !o.parts.checkpoint.directory.empty();
+  const auto takes = [&](PresetPart part) {
+    if (part == PresetPart::points) return !stored;
+    if (part == PresetPart::cleaning) return !stored && !ranked;
+    return part == PresetPart::mesh || !in_parts;
+  };
+  apply_preset(*o.tool, *o.preset, takes, context);
+}
+
+void run_surface(SurfaceOptions& o) {
+  if (o.preset) take_preset(o, make_context(o.run));
   SurfaceSettings settings = o.settings;
+  settings.guess_trade = !o.preset && !o.raw;
   choose_what_is_not_given(o, settings);
   settings.input = pipe_name(o.inputs.front());
   for (auto name = o.inputs.begin() + 1; name != o.inputs.end(); ++name)
@@ -203,8 +220,10 @@ void add_surface(CLI::App& app) {
       "on standard output. Several -o write it in several formats. Not needed with --dry-run and --print-tasks");
   output->type_name("FILE")->allow_extra_args(false);
 
+  add_preset(*tool, o->preset, "Trade");
+
   const std::string samples = "Samples";
-  add_point_options(*tool, s.columns, s.select, samples);
+  add_point_options(*tool, s.reading, samples);
   tool->add_option("--frame", s.frame,
                    "pca: sweep along the cloud's dominant axis, for the least memory; axis: along the longest input "
                    "axis, so that "
@@ -237,6 +256,7 @@ void add_surface(CLI::App& app) {
 
   tool->add_flag("--raw", o->raw,
                  "Choose nothing: the file's normals, all samples, --blend 1.2, --prune 0, where these are not given")
+      ->excludes(tool->get_option("--preset"))
       ->group("Fit");
   add_fit_options(*tool, s);
 
@@ -332,6 +352,7 @@ void add_surface(CLI::App& app) {
                "  lamina surface scan.ply -o mesh_of_scan.stl\n"
                "  lamina surface scan.ply -o for_archive.ply -o for_viewers.glb\n"
                "  lamina surface scan.ply --dry-run\n"
+               "  lamina surface scan.ply --preset photogrammetry --prune 50 -o mesh_of_photos.ply\n"
                "  lamina surface scan.ply -o smooth.ply --blend 2 --vdb smooth.vdb --stats smooth.json");
   tool->callback([o, tool, output, dry] {
     if (o->parts.tasks > 0) return print_tasks(*tool, o->inputs.front(), o->outputs, o->parts);

@@ -131,7 +131,7 @@ void add_transform(CLI::App& app) {
   matrix->group(group);
   for (const char* other : {"--scale", "--rotate", "--translate", "--pivot"}) matrix->excludes(tool->get_option(other));
   tool->add_flag("--invert", o->invert, "Undo the transform instead")->group(group);
-  add_point_options(*tool, o->reading.columns, o->reading.select);
+  add_point_options(*tool, o->reading);
   add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);

@@ -56,9 +56,10 @@ void add_bad_samples(CLI::App& app, BadSamples& bad, const std::string& what) {
       ->group("Input");
 }
 
-void add_point_options(CLI::App& app, std::string& columns, PointSelection& select, const std::string& group) {
+void add_point_options(CLI::App& app, PointSettings& reading, const std::string& group) {
+  PointSelection& select = reading.select;
   app.add_option(
-         "--columns", columns,
+         "--columns", reading.columns,
          "What the columns of text files hold: names as in x,y,z,nx,ny,nz,red:uchar,-, where - is a column to skip [by "
          "header line, else by the numbers]")
       ->type_name("NAMES")
@@ -97,11 +98,14 @@ void add_point_options(CLI::App& app, std::string& columns, PointSelection& sele
       ->type_name("CONDITION")
       ->allow_extra_args(false)
       ->group(group);
-}
-
-void add_ignore_checksums(CLI::App& app, bool& ignore) {
-  app.add_flag("--ignore-checksums", ignore, "Read pages of E57 files with wrong checksums, too: what can be saved")
-      ->group("Input");
+  app.add_flag(
+         "--project-degrees", reading.project_degrees,
+         "x and y are degrees of longitude and latitude: take them to metres, by a transverse Mercator projection "
+         "around the whole degrees next to the first point")
+      ->group(group);
+  app.add_flag("--ignore-checksums", reading.ignore_checksums,
+               "Read pages of E57 files with wrong checksums, too: what can be saved")
+      ->group(group);
 }
 
 std::unique_ptr<PointSource> open_point_input(const std::string& path, const PointSettings& reading,

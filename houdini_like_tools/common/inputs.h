@@ -18,12 +18,8 @@ std::string pipe_name(const std::string& name);
 
 /// --bad-samples drop|refuse, in the group "Input"; `what` may be bad.
 void add_bad_samples(CLI::App& app, BadSamples& bad, const std::string& what = "Points");
-/// What is taken of point files: --columns NAMES (PointSettings::columns), --keep-class, --drop-class, --returns,
-/// --where.
-void add_point_options(CLI::App& app, std::string& columns, PointSelection& select, const std::string& group = "Input");
-
-/// --ignore-checksums: PointSettings::ignore_checksums.
-void add_ignore_checksums(CLI::App& app, bool& ignore);
+/// How point files are read and what is taken of them: PointSettings.
+void add_point_options(CLI::App& app, PointSettings& reading, const std::string& group = "Input");
 
 /// open_points(), saying what the reader found worth saying.
 std::unique_ptr<PointSource> open_point_input(const std::string& path, const PointSettings& reading,

@@ -38,6 +38,7 @@ struct PointSourceInfo {
   bool random_access = false;        ///< read() takes any row, from several threads at once
   bool double_precision = false;     ///< positions need more than float32
   bool geographic = false;           ///< x and y are degrees of longitude and latitude, in which no job can measure
+  bool from_above = false;           ///< wide and flat, with the returns or classes of surveys from the air
   std::string crs;                   ///< coordinate reference system: well-known text or EPSG:NUMBER; empty: not told
   std::vector<ScanPart> scans;       ///< ascending, the first begins with row 0; empty: one scan, nothing known of it
   AttributeLayout attributes;        ///< every other scalar property, in the file's order and types
@@ -46,6 +47,9 @@ struct PointSourceInfo {
 
 /// What people call a coordinate reference system (PointSourceInfo::crs): the name in the text, or the text itself.
 std::string crs_name(const std::string& crs);
+
+/// Throws Error(unreadable), naming what to do, where x and y are degrees.
+void require_no_degrees(const PointSourceInfo& info);
 
 /// Rows of points. One thread at a time, unless info().random_access.
 class PointSource {
@@ -105,6 +109,9 @@ struct PointSettings {
   /// guessed from the numbers. Other formats ignore it.
   std::string columns{};
   bool ignore_checksums = false;  ///< of E57: pages are believed whatever their checksums say
+  /// x and y, which must be degrees of longitude and latitude, become metres in a plane: transverse Mercator around the
+  /// whole degrees next to the first point. Heights stay.
+  bool project_degrees = false;
   PointSelection select{};
 };
 

@@ -31,6 +31,7 @@ struct PointsWriterSettings {
   std::string tmp_dir{};                 ///< for rows that must wait; empty: next to the output (a pipe: the system's)
   std::vector<std::string> comments{};   ///< one line each, where the format has room for them
   std::string crs{};                     ///< PointSourceInfo::crs, where the format has room for it
+  bool geographic = false;               ///< that is a system of degrees
 };
 
 /// Takes rows in batches and holds less than a megabyte of them, of LAZ 400 000 rows, whatever their number. The bytes

@@ -32,8 +32,7 @@ enum class NormalsChoice {
 struct SurfaceSettings {
   std::string input;  ///< point file, folder, pattern or scan list (expand_inputs()); "-" is standard input
   std::vector<std::string> more_inputs;   ///< taken together with `input`, as one cloud
-  std::string columns;                    ///< of text files (PointSettings::columns)
-  PointSelection select;                  ///< which points of the files are taken
+  PointSettings reading;                  ///< how the files are read; temporary files are the run's affair
   std::string output;                     ///< mesh file: .obj, .off, .stl, .glb, else PLY; "-": standard output
   std::vector<std::string> more_outputs;  ///< the same mesh in further files, each in its own format
 
@@ -43,6 +42,7 @@ struct SurfaceSettings {
   /// normal it is dropped. A store's stay.
   std::optional<NormalsChoice> normals;
   NormalsSettings normal_search;  ///< how normals are found; its mode and bad_samples are those of this job
+  bool guess_trade = false;       ///< say what the cloud is taken for; normals that are found face as is usual there
   double radius_scale = 1;        ///< > 0: multiplies every sample's radius, given or estimated
   std::uint32_t density = 16;  ///< samples a counting cell must hold to give a radius (Cuccuru et al. 2009, 3.1), >= 2
   CleanSettings clean;         ///< what is left out before radii are estimated

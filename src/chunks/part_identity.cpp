@@ -12,28 +12,29 @@ namespace lamina {
 std::string mesh_settings(const SurfaceSettings& settings) {
   // Every setting by name: one that is added must be dealt with here, or this does not compile. What follows `chord`
   // does not change the mesh; names of files are not settings of it.
-  const auto& [input, more_inputs, columns, select, output, more_outputs, frame, bad_samples, normals, normal_search,
-               radius_scale, density, clean, max_radius, blend, refit, steps, step_tolerance, fit, diffuse, cell,
-               levels, boundary, cluster, chord, vertex_levels, vertex_curvature, vertex_filled, close_holes,
+  const auto& [input, more_inputs, reading, output, more_outputs, frame, bad_samples, normals, normal_search,
+               guess_trade, radius_scale, density, clean, max_radius, blend, refit, steps, step_tolerance, fit, diffuse,
+               cell, levels, boundary, cluster, chord, vertex_levels, vertex_curvature, vertex_filled, close_holes,
                watertight, trim, prune_triangles, prune_size, local, window, dry_run, volume] = settings;
   // Jobs of several runs refuse these: require_mesh_alone().
   (void)prune_triangles, (void)prune_size, (void)local;
-  (void)input, (void)more_inputs, (void)output, (void)more_outputs, (void)normals, (void)normal_search, (void)window,
-      (void)dry_run;
+  (void)input, (void)more_inputs, (void)output, (void)more_outputs, (void)normals, (void)normal_search,
+      (void)guess_trade, (void)window, (void)dry_run;
   const auto number = [](const std::optional<double>& v) { return v ? fmt::format("{}", *v) : "auto"; };
   const std::string frame_word = frame             ? fmt::format("{}", static_cast<int>(*frame))
                                  : volume.wanted() ? "grid"
                                                    : "auto";
   return fmt::format(
-      "columns {}\nselect {}\nframe {}\nbad_samples {}\nnormals {}\ncleaning {}\nparticlescale {}\ndensity "
+      "columns {}\nprojected {}\nselect {}\nframe {}\nbad_samples {}\nnormals {}\ncleaning {}\nparticlescale "
+      "{}\ndensity "
       "{}\nmax_radius {}\n"
       "blend {}\nrefit {}\nsteps {}\nstep_tolerance {}\nfit {}\ndiffuse {}\ncell {}\nlevels {}\nboundary {}\ncluster "
       "{}\n"
       "chord {}\nlevel {}\ncurvature {}\nfilled {}\nclose_holes {}\nwatertight {}\ntrim {}\n",
-      columns, to_string(select), frame_word, static_cast<int>(bad_samples), normals_words(settings),
-      cleaning_words(clean), radius_scale, density, to_string(max_radius), number(blend), number(refit), steps,
-      step_tolerance, static_cast<int>(fit), diffuse, cell ? to_string(*cell) : "auto", levels, boundary,
-      static_cast<int>(cluster), chord, vertex_levels, vertex_curvature, vertex_filled, number(close_holes),
+      reading.columns, reading.project_degrees, to_string(reading.select), frame_word, static_cast<int>(bad_samples),
+      normals_words(settings), cleaning_words(clean), radius_scale, density, to_string(max_radius), number(blend),
+      number(refit), steps, step_tolerance, static_cast<int>(fit), diffuse, cell ? to_string(*cell) : "auto", levels,
+      boundary, static_cast<int>(cluster), chord, vertex_levels, vertex_curvature, vertex_filled, number(close_holes),
       watertight ? (*watertight ? "yes" : "no") : "auto", number(trim));
 }
 

@@ -105,6 +105,7 @@ class JoinedPoints final : public PointSource, public OrganisedPoints {
     info_.random_access = info_.random_access && from.random_access;
     info_.double_precision = info_.double_precision || from.double_precision;
     info_.geographic = info_.geographic || from.geographic;
+    info_.from_above = info_.from_above || from.from_above;
     if (info_.crs != from.crs && !from.crs.empty()) {
       if (!info_.crs.empty()) {
         info_.remarks.push_back(fmt::format("{} has the coordinate system {}, others have {}: taken as they are",

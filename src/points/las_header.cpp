@@ -239,6 +239,18 @@ void read_coordinates(const InputFile& file, const std::byte* bytes, LasHeader& 
   }
 }
 
+/// Whether the counts by return tell of any but the first.
+bool counts_several_returns(const std::byte* bytes, int minor) {
+  constexpr std::size_t kSecond = 115, kOldReturns = 4, kSecond14 = 263, kReturns14 = 14;
+  for (std::size_t k = 0; k < kOldReturns; ++k) {
+    if (load_little<std::uint32_t>(bytes + kSecond + 4 * k) > 0) return true;
+  }
+  for (std::size_t k = 0; minor >= 4 && k < kReturns14; ++k) {
+    if (load_little<std::uint64_t>(bytes + kSecond14 + 8 * k) > 0) return true;
+  }
+  return false;
+}
+
 /// A compressed point takes a hundredth of a bit at the very least. The chunk table tells more.
 void require_compressed_room(const InputFile& file, const LasHeader& h) {
   constexpr std::uint64_t kMostPerByte = 1000;
@@ -295,6 +307,7 @@ LasHeader read_las_header(const InputFile& file) {
   const std::uint16_t header_bytes = read_layout(file, bytes, file.read(0, header.data(), header.size()), h);
   h.count = load_little<std::uint32_t>(bytes + 107);
   if (const auto wide = load_little<std::uint64_t>(bytes + 247); h.minor >= 4 && wide != 0) h.count = wide;
+  h.several_returns = counts_several_returns(bytes, h.minor);
   read_coordinates(file, bytes, h);
   require_room(file, bytes, header_bytes, h);
   LasVariableRecords records;

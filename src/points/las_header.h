@@ -32,6 +32,7 @@ struct LasHeader {
   std::array<double, 3> scale{}, offset{};
   std::array<double, 3> low{}, high{};  ///< bounding box as the header gives it
   bool geographic = false;              ///< x and y are degrees
+  bool several_returns = false;         ///< some pulses have more than one, by the header's counts
   std::string crs;                      ///< PointSourceInfo::crs
   std::vector<LasExtra> extras;         ///< of one value each, of a type this library has
   std::optional<LazPacking> packing;    ///< of LAZ files

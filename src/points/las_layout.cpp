@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <set>
+#include <string_view>
 
 #include "base/little_endian.h"
 #include "base/scalar_type.h"
@@ -57,6 +60,37 @@ double colour_scale(ScalarType type) {
   return type == ScalarType::uint8 ? 257 : type == ScalarType::uint16 ? 1 : 65535;
 }
 
+/// The number of EPSG:NUMBER; 0 where it is none that GeoTIFF keys have room for.
+std::uint16_t epsg_number(const std::string& crs) {
+  constexpr std::string_view kLead = "EPSG:";
+  constexpr std::uint16_t kOwn = 32767;  // a system that other keys would describe
+  std::uint16_t number = 0;
+  if (!crs.starts_with(kLead)) return 0;
+  const char* const end = crs.data() + crs.size();
+  const auto [stop, bad] = std::from_chars(crs.data() + kLead.size(), end, number);
+  return bad == std::errc() && stop == end && number != kOwn ? number : std::uint16_t{0};
+}
+
+/// A directory of two GeoTIFF keys: what kind of system, and which.
+std::string geotiff_keys(std::uint16_t number, bool geographic) {
+  constexpr std::uint16_t kModelType = 1024, kGeographic = 2048, kProjected = 3072;
+  const std::array<std::uint16_t, 12> words{
+      1, 1, 0,     2, kModelType, 0, 1, std::uint16_t(geographic ? 2 : 1), geographic ? kGeographic : kProjected,
+      0, 1, number};
+  std::string keys;
+  for (const std::uint16_t word : words) append_little(keys, word);
+  return keys;
+}
+
+/// A variable length record of the coordinate system.
+std::string projection_record(std::uint16_t id, const std::string& content) {
+  std::string record(kRecordHeaderBytes, '\0');
+  record.replace(2, 15, "LASF_Projection");
+  put_at(record, 18, id);
+  put_at(record, 20, static_cast<std::uint16_t>(content.size()));
+  return record + content;
+}
+
 }  // namespace
 
 LasLayout::LasLayout(const PointColumns& columns) : columns_(columns) {
@@ -103,8 +137,8 @@ std::string LasLayout::header(const std::array<LasAxis, 3>& axes, std::uint64_t 
   const std::size_t records = extras_.empty() ? 0 : kRecordHeaderBytes + kDescriptorBytes * extras_.size();
   std::string b(kHeaderBytes + records, '\0');
   b.replace(0, 4, "LASF");
-  constexpr std::uint16_t kTextProjection = 16;  // these point formats name coordinate systems by text, if at all
-  put_at(b, 6, kTextProjection);
+  constexpr std::uint16_t kTextProjection = 16;
+  if (system_text_) put_at(b, 6, kTextProjection);
   b[24] = 1;
   b[25] = 4;
   const std::string maker = fmt::format("lamina {}", version()).substr(0, kName);
@@ -171,15 +205,16 @@ void LasLayout::encode(const SampleBatch& batch, const std::array<LasAxis, 3>& a
   }
 }
 
-void LasLayout::name_system(const std::string& crs) {
+void LasLayout::name_system(const std::string& crs, bool geographic) {
   constexpr std::size_t kMostTextBytes = 65535;
-  if (crs.find('[') == std::string::npos || crs.size() + 1 > kMostTextBytes) return;
-  system_.assign(kRecordHeaderBytes, '\0');
-  system_.replace(2, 15, "LASF_Projection");
-  put_at(system_, 18, std::uint16_t{2112});
-  put_at(system_, 20, static_cast<std::uint16_t>(crs.size() + 1));
-  system_ += crs;
-  system_ += '\0';
+  constexpr std::uint16_t kText = 2112, kKeys = 34735;
+  system_text_ = true;
+  if (crs.find('[') != std::string::npos && crs.size() + 1 <= kMostTextBytes) {
+    system_ = projection_record(kText, crs + '\0');
+  } else if (const std::uint16_t number = epsg_number(crs); number != 0) {
+    system_ = projection_record(kKeys, geotiff_keys(number, geographic));
+    system_text_ = false;
+  }
 }
 
 }  // namespace lamina

@@ -27,8 +27,9 @@ class LasLayout {
   /// Header and records before the points; `packing` is LAZ's record, empty for LAS.
   [[nodiscard]] std::string header(const std::array<LasAxis, 3>& axes, std::uint64_t count,
                                    const std::string& packing) const;
-  /// The coordinate system to name in the header: well-known text. Anything else has no place there.
-  void name_system(const std::string& crs);
+  /// The coordinate system to name before the points: well-known text, or EPSG:NUMBER, which becomes GeoTIFF keys (of
+  /// degrees where it is `geographic`). Anything else has no place there.
+  void name_system(const std::string& crs, bool geographic);
   /// Rows [first, first + n) as point records.
   void encode(const SampleBatch& batch, const std::array<LasAxis, 3>& axes, std::size_t first, std::size_t n,
               std::byte* out) const;
@@ -41,7 +42,8 @@ class LasLayout {
   std::vector<std::size_t> others_;      ///< attributes that are extra bytes
   std::vector<LasExtraColumn> extras_;   ///< all extra bytes
   std::size_t record_bytes_ = 0;
-  std::string system_;  ///< the record of the coordinate system
+  std::string system_;       ///< the record of the coordinate system
+  bool system_text_ = true;  ///< which is text, as these point formats ask for; else keys, which others read as well
 };
 
 }  // namespace lamina

@@ -175,6 +175,7 @@ class LasPoints final : public PointSource, public HiddenValues {
     info_.crs = header_.crs;
     for (std::size_t k = 0; k < 3; ++k) columns_.push_back({std::string(1, "xyz"[k]), ScalarType::int32, 4 * k});
     add_standard_values();
+    info_.from_above = is_from_above();
     add_extras();
     give_roles(columns_, info_, file_.name, "value");
     declare_types();
@@ -250,6 +251,18 @@ class LasPoints final : public PointSource, public HiddenValues {
     std::size_t column;
     double scale, shift;
   };
+
+  /// Pulses of several returns, or points classified as ground or buildings, in a box twice as wide as high; or, where
+  /// these were lost on the way, a georeferenced hectare four times as wide as high.
+  [[nodiscard]] bool is_from_above() const {
+    constexpr std::size_t kGround = 2, kBuilding = 6;
+    const auto extent = [this](std::size_t k) { return header_.high[k] - header_.low[k]; };
+    const bool told = header_.several_returns || classes_[kGround] > 0 || classes_[kBuilding] > 0;
+    const double width = std::min(extent(0), extent(1));
+    constexpr double kWide = 100;
+    if (told) return 2 * extent(2) <= width;
+    return !header_.crs.empty() && width >= kWide && 4 * extent(2) <= width;
+  }
 
   void add_standard_values() {
     LasCensus census = CensusTaker(*records_, header_).take();

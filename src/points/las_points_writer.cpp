@@ -53,7 +53,7 @@ class LasPointsWriter final : public PointsWriter {
         rows_out_(path, settings, false),
         waiting_(settings.tmp_dir.empty() ? system_tmp_dir() : settings.tmp_dir),
         block_(kBlock * codec_.row_bytes()) {
-    layout_.name_system(settings.crs);
+    layout_.name_system(settings.crs, settings.geographic);
   }
 
   void append(const SampleBatch& batch) override {

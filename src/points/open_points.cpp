@@ -14,6 +14,7 @@
 #include "lamina/points.h"
 #include "lamina/points_writer.h"
 #include "points/input_file.h"
+#include "points/project_degrees.h"
 #include "points/readers.h"
 #include "points/select_points.h"
 #include "points/sniff.h"
@@ -70,7 +71,10 @@ std::unique_ptr<PointSource> open_all_points(const std::string& path, const Poin
 }  // namespace
 
 std::unique_ptr<PointSource> open_points(const std::string& path, const PointSettings& settings) {
-  return select_points(open_all_points(path, settings), settings.select);
+  if (!settings.project_degrees) return select_points(open_all_points(path, settings), settings.select);
+  PointSettings here = settings;
+  here.select.box.reset();  // it is a box in the plane
+  return project_degrees(select_points(open_all_points(path, here), here.select));
 }
 
 std::unique_ptr<PointSource> open_points(const std::string& path, const std::string& tmp_dir) {
@@ -81,12 +85,15 @@ std::unique_ptr<PointSource> open_points(const std::vector<std::string>& names, 
   std::vector<std::unique_ptr<PointSource>> sources;
   for (const PointInput& input : expand_inputs(names)) {
     PointSettings here = settings;
-    if (input.posed) here.select.box.reset();  // it is a box of where the pose puts the points
+    here.project_degrees = false;  // all into one plane
+    // It is a box of where the pose or the plane puts the points.
+    if (input.posed || settings.project_degrees) here.select.box.reset();
     std::unique_ptr<PointSource> source = open_points(input.path, here);
     if (input.posed) source = pose_points(std::move(source), input.pose, input.seen_along_z);
     sources.push_back(std::move(source));
   }
-  return join_points(std::move(sources));
+  std::unique_ptr<PointSource> joined = join_points(std::move(sources));
+  return settings.project_degrees ? project_degrees(std::move(joined)) : std::move(joined);
 }
 
 PointColumns columns_of(const PointSourceInfo& info) {

@@ -12,6 +12,7 @@
 #include "base/scalar_type.h"
 #include "lamina/error.h"
 #include "points/input_file.h"
+#include "points/project_degrees.h"
 #include "points/text_rows.h"
 
 namespace lamina {
@@ -181,6 +182,7 @@ PlyRows understand_vertices(const PlyHeader& header, const std::string& path, co
   rows.info.path = path;
   rows.info.count = vertices.count;
   rows.info.crs = header.crs;
+  rows.info.geographic = names_degrees(header.crs);
   for (const PlyProperty& property : vertices.properties) {
     rows.columns.push_back({property.name, property.type, rows.stride});
     rows.stride += static_cast<std::size_t>(byte_size(property.type));

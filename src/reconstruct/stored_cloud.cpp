@@ -9,6 +9,7 @@
 
 #include "base/descriptor.h"
 #include "lamina/error.h"
+#include "lamina/trade.h"
 #include "reconstruct/job.h"
 #include "reconstruct/kept_input.h"
 #include "samples/cleaning.h"
@@ -166,20 +167,15 @@ FrameMode chosen_frame(const SurfaceSettings& settings) {
 
 std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const std::string& tmp_dir,
                                          const RunContext& run) {
-  PointSelection select = settings.select;
+  PointSettings reading = settings.reading;
+  reading.tmp_dir = tmp_dir;
   const RowPick& pick = settings.clean.pick;
-  if (pick.clip && pick.every <= 1) select.box = {pick.clip->low, pick.clip->high};
-  std::unique_ptr<PointSource> source =
-      open_points(input_names(settings), {.tmp_dir = tmp_dir, .columns = settings.columns, .select = select});
+  if (pick.clip && pick.every <= 1) reading.select.box = {pick.clip->low, pick.clip->high};
+  std::unique_ptr<PointSource> source = open_points(input_names(settings), reading);
   const PointSourceInfo& info = source->info();
   for (const std::string& remark : info.remarks) run.info(remark);
-  if (info.geographic) {
-    throw Error(ExitCode::unreadable,
-                fmt::format("{}: x and y are degrees of longitude and latitude, in which no distance can be measured; "
-                            "project them to metres first, for example to the UTM zone: pdal translate IN.las OUT.las "
-                            "reprojection --filters.reprojection.out_srs=EPSG:326ZONE",
-                            info.path));
-  }
+  require_no_degrees(info);
+  if (settings.guess_trade) run.info(describe(guess_trade(info)));
   return source;
 }
 
@@ -190,6 +186,7 @@ std::unique_ptr<PointSource> choose_normals(std::unique_ptr<PointSource> source,
   NormalsSettings search = settings.normal_search;
   search.bad_samples = settings.bad_samples;
   search.mode = NormalsMode::estimate;
+  if (settings.guess_trade) face_by_trade(guess_trade(source->info()).trade, search);
   if (choice == NormalsChoice::automatic && source->info().has_normals) {
     const bool asked = settings.normals.has_value();
     const Lacking lacking = look_for_normals(*source, asked, job.run);
@@ -217,6 +214,7 @@ std::string normals_words(const SurfaceSettings& settings) {
   (void)mode, (void)bad_samples;
   std::string words = settings.normals == NormalsChoice::estimate ? "estimate" : "auto";
   words += fmt::format(" k {} radius {} scanners {} poses {} flip {}", k, radius, scanners, pose_origins, flip);
+  if (settings.guess_trade) words += " guessed";
   for (const Viewpoint& v : viewpoints)
     words += fmt::format(" {} {} {} {}", v.direction ? "towards" : "from", v.at[0], v.at[1], v.at[2]);
   return words;

@@ -9,6 +9,8 @@
 
 namespace lamina::simplify {
 
+constexpr double kNormalNoise = 1e-3;  ///< of planes: about what floats leave of a small triangle's normal
+
 /// x' A x - 2 b' x + c with symmetric A, the weighted sum of squared distances of x to planes (Garland and Heckbert
 /// 1997).
 struct Quadric {
@@ -27,6 +29,8 @@ struct Quadric {
     return x[0] * (xx * x[0] + 2 * (xy * x[1] + xz * x[2])) + x[1] * (yy * x[1] + 2 * yz * x[2]) + zz * x[2] * x[2] -
            2 * meshes::dot(b, x) + c;
   }
+  /// Of all planes.
+  [[nodiscard]] double weight() const { return a[0] + a[3] + a[5]; }
   /// Where it is least, by the adjugate of A; nothing where A is too near to singular for that.
   [[nodiscard]] std::optional<meshes::Vec3> least() const {
     const auto& [xx, xy, xz, yy, yz, zz] = a;

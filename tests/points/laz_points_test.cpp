@@ -211,6 +211,10 @@ TEST_F(LazPoints, HeadersThatLie) {
   EXPECT_THAT(with(record + 32, std::uint16_t{2}), HasSubstr("have 3 compressed items, not 2"));
   EXPECT_THAT(with(record + 34, std::uint16_t{6}), HasSubstr("item 0 of the points is of kind 6 and 30 bytes"));
   EXPECT_THAT(with(record + 38, std::uint16_t{9}), HasSubstr("item 0 of the points is of version 9"));
+  std::string old = laz_bytes(kLazFolder + "f0.laz");
+  const std::size_t name = old.find("laszip encoded");
+  patch(old, name - 2 + 54 + 38, std::uint16_t{1});
+  EXPECT_THAT(test::refusal(write(old)), HasSubstr("as LASzip did before 2011; compress them anew: laszip -i FILE"));
   EXPECT_THAT(with(247, std::uint64_t{5000}), HasSubstr("the header promises 5000 points, the chunk table has"));
   EXPECT_THAT(with(247, ~std::uint64_t{0}), HasSubstr("compressed bytes are too few"));
   EXPECT_THAT(with(247, std::uint64_t{0}), HasSubstr("counts no points, but compressed ones follow"));

@@ -123,6 +123,56 @@ TEST(Simplify, TopologyStays) {
   });
 }
 
+TEST(Simplify, PiecesLeaveNoTraceAndThreadsNone) {
+  const TriangleMesh before = field(200, [](double x, double y) { return 0.1 * std::sin(9 * x) * std::cos(7 * y); });
+  std::vector<TriangleMesh> after(3, before);
+  for (const int threads : {1, 2, 5}) {
+    RunContext run;
+    run.threads = threads;
+    EXPECT_TRUE(simplify_mesh(after[static_cast<std::size_t>(threads / 2)], {8000}, run).reached);
+  }
+  EXPECT_EQ(after[0].positions, after[1].positions);
+  EXPECT_EQ(after[0].triangles, after[1].triangles);
+  EXPECT_EQ(after[0].positions, after[2].positions);
+  EXPECT_EQ(after[0].triangles, after[2].triangles);
+  EXPECT_GE(after[0].triangles.size(), 7999u);
+  const CheckReport r = check_mesh(after[0]);
+  EXPECT_TRUE(r.manifold());
+  EXPECT_TRUE(manifold_to_openmesh(after[0]));
+  EXPECT_EQ(r.euler_characteristic, 1);
+  EXPECT_EQ(r.boundary_loops, 1u);
+  // No seams: nowhere are triangles as small as they were.
+  const MeshMeasures m = measure_mesh(after[0]);
+  EXPECT_GT(m.shortest_edge, 1.0 / 200 / 3);
+  EXPECT_LT(compare(after[0], before, {20000}).b_to_a->max, 1e-3);
+}
+
+TEST(Simplify, EveryNumberIsReached) {
+  const TriangleMesh before = field(160, [](double x, double y) { return 0.1 * std::sin(9 * x) * std::cos(7 * y); });
+  for (const double share : {1.0, 0.999, 0.95, 0.88, 0.8, 0.7, 0.67, 0.5, 0.3}) {
+    TriangleMesh mesh = before;
+    const auto wanted = static_cast<std::size_t>(share * static_cast<double>(before.triangles.size()));
+    EXPECT_TRUE(simplify_mesh(mesh, {wanted}).reached) << share;
+    EXPECT_LE(mesh.triangles.size(), wanted);
+    EXPECT_GE(mesh.triangles.size() + 1, wanted);
+  }
+}
+
+TEST(Simplify, EndsWhereNothingCanGo) {
+  // Slabs of tetrahedra: no edge of any can go, and there are many pieces.
+  TriangleMesh mesh;
+  const TriangleMesh one = tetrahedron();
+  for (std::uint32_t i = 0; i < 9000; ++i) {
+    for (auto p : one.positions) {
+      p[0] += 3.0 * i;
+      mesh.positions.push_back(p);
+    }
+    for (const auto& t : one.triangles) mesh.triangles.push_back({t[0] + 4 * i, t[1] + 4 * i, t[2] + 4 * i});
+  }
+  EXPECT_FALSE(simplify_mesh(mesh, {100}).reached);
+  EXPECT_EQ(mesh.triangles.size(), 36000u);
+}
+
 TEST(Simplify, AttributesAreInterpolated) {
   TriangleMesh mesh = field(30, [](double, double) { return 0.0; });
   mesh.layout = {{"x_again", ScalarType::float32}};

@@ -1,0 +1,83 @@
+// Edges of one piece of a mesh contracted, the cheapest first.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "meshes/vec3.h"
+#include "simplify/quadric.h"
+#include "simplify/stars.h"
+#include "simplify/tracker.h"
+
+namespace lamina::simplify {
+
+/// Some triangles of a mesh, with vertices numbered anew.
+struct Piece {
+  std::vector<meshes::Vec3> positions;
+  std::vector<Quadric> quadrics;    ///< of the vertices, about `centre`
+  std::vector<std::uint8_t> fixed;  ///< vertices with triangles elsewhere: they stay, and so does what they are in
+  std::vector<Triangle> triangles;
+  meshes::Vec3 centre{};  ///< far from it quadrics lose their digits
+  bool floats = false;    ///< positions are floats and stay so
+  double bound = 0;       ///< how far it may get from the mesh that simplification began with; 0: as far as it likes
+  std::vector<Errors> errors;  ///< of the triangles; empty without a bound
+};
+
+/// v has gone into u, `share` of the way from u to v.
+struct Merge {
+  std::uint32_t u, v;
+  float share;
+};
+
+/// Contracts the edges of a piece by their quadric error, each to the point of least error. Depends on the piece alone.
+class Contractor {
+ public:
+  explicit Contractor(Piece piece);
+
+  /// What the next contraction costs; nothing that is finite when none is left.
+  [[nodiscard]] float next_cost();
+  /// Contracts while the next one costs no more than `dearest` and more than `keep` triangles are there. Returns
+  /// how many triangles went.
+  std::uint64_t run(float dearest, std::uint64_t keep);
+
+  [[nodiscard]] std::uint64_t size() const { return size_; }  ///< triangles that are there
+  [[nodiscard]] const std::vector<Merge>& merges() const { return merges_; }
+  /// Of the triangles that are there; only with a bound.
+  [[nodiscard]] std::vector<Errors> errors() const { return tracker_->errors(); }
+  [[nodiscard]] const Stars& stars() const { return stars_; }
+  [[nodiscard]] const Piece& piece() const { return piece_; }  ///< its triangles are in stars()
+
+ private:
+  /// In a heap with the cheapest on top, equal ones by their vertices.
+  struct Entry {
+    float cost;
+    std::uint32_t u, v, version;
+    bool operator<(const Entry& o) const {
+      if (cost != o.cost) return cost > o.cost;
+      return u != o.u ? u > o.u : v > o.v;
+    }
+  };
+  struct Placed {
+    meshes::Vec3 at;
+    double cost;
+  };
+
+  [[nodiscard]] Placed place(std::uint32_t u, std::uint32_t v) const;
+  void offer(std::uint32_t u, std::uint32_t v);
+  [[nodiscard]] bool stays_near(std::uint32_t u, std::uint32_t v, const Placed& to);
+  [[nodiscard]] bool keeps_shape(std::uint32_t u, std::uint32_t v, const meshes::Vec3& to) const;
+  int contract(std::uint32_t u, std::uint32_t v, const meshes::Vec3& to);
+
+  Piece piece_;
+  Stars stars_;
+  std::uint64_t size_;
+  std::optional<Tracker> tracker_;
+  std::vector<std::uint32_t> version_;  ///< how often a vertex has moved
+  std::vector<Entry> heap_;
+  std::vector<Merge> merges_;
+  std::vector<std::uint32_t> near_;
+};
+
+}  // namespace lamina::simplify

@@ -1,0 +1,293 @@
+#include "simplify/rounds.h"
+
+#include <tbb/enumerable_thread_specific.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numeric>
+#include <queue>
+#include <span>
+#include <utility>
+
+#include "lamina/error.h"
+#include "measure/edge_table.h"
+#include "simplify/cut.h"
+
+namespace lamina::simplify {
+namespace {
+
+using namespace meshes;
+
+constexpr double kBoundaryWeight = 1;  ///< of planes through boundary edges, beside the squared edge
+
+constexpr std::size_t kPieceTriangles = 24'000;  ///< some 3 MB with queue and quadrics
+constexpr double kRoundShrinks = 0.5;            ///< a round leaves no smaller share of the triangles
+constexpr double kLastRound = 1.15;              ///< of the wanted ones: what the last round begins with at the most
+constexpr double kInTurn = 1.01;  ///< from this many of the wanted ones on, pieces take turns, the cheapest edge of all
+
+constexpr int kBoundRounds = 3;  ///< with a bound: a round goes as far as it can, the others clear what it held fast
+
+/// Where a round cuts: different from the two before it.
+double share_of_round(int round) {
+  constexpr std::array<double, 3> kShares{0.5, 0.41, 0.59};
+  return kShares[static_cast<std::size_t>(round) % kShares.size()];
+}
+
+class Round {
+ public:
+  Round(WorkMesh& work, double share) : work_(work), size_(work.mesh.triangles.size()) {
+    std::vector<Centre> centres(size_);
+    tbb::parallel_for(std::size_t{0}, size_, [&](std::size_t t) {
+      const Triangle& c = work.mesh.triangles[t];
+      const Vec3 sum = at(c[0]) + at(c[1]) + at(c[2]) - 3 * work.centre;
+      centres[t] = {to_float(sum), static_cast<std::uint32_t>(t)};
+    });
+    starts_ = cut_into_boxes(centres, kPieceTriangles, share);
+    order_.resize(size_);
+    for (std::size_t i = 0; i < size_; ++i) order_[i] = centres[i].triangle;
+    build();
+  }
+
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+
+  /// False when no edge can go any more.
+  bool reduce(std::uint64_t goal, bool exactly, const RunContext& run) {
+    const auto in_parallel = static_cast<std::uint64_t>(kInTurn * static_cast<double>(goal));
+    float dearest = 0;
+    const std::uint64_t odd = 2 * pieces_.size();  // what rounding up and contractions by two may take beside
+    while (size_ > std::max(goal, in_parallel) && size_ - goal > 2 * odd) {
+      if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+      const double part = static_cast<double>(size_ - goal - odd) / static_cast<double>(size_);
+      tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
+        Contractor& c = *pieces_[p];
+        const auto some = static_cast<std::uint64_t>(std::ceil(part * static_cast<double>(c.size())));
+        c.run(dearest, c.size() - std::min(c.size(), some));
+      });
+      float next = std::numeric_limits<float>::infinity();
+      size_ = 0;
+      for (const auto& piece : pieces_) {
+        size_ += piece->size();
+        next = std::min(next, piece->next_cost());
+      }
+      if (std::isinf(next)) return false;
+      // Errors of smooth surfaces grow with the cube of the area of triangles.
+      dearest = std::max(next, dearest * (size_ > goal + goal / 2 ? 2.F : 1.25F));
+    }
+    return !exactly || in_turn(goal);
+  }
+
+  /// As far as pieces go.
+  void exhaust(const RunContext& run) {
+    tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
+      Contractor& c = *pieces_[p];
+      while (!run.cancelled() &&
+             c.run(std::numeric_limits<float>::max(), c.size() - std::max<std::uint64_t>(c.size() / 8, 1)) > 0) {
+      }
+    });
+    if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+  }
+
+  /// Everything back into the mesh. Returns the number of contractions.
+  std::uint64_t finish() {
+    tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) { put_back(p); });
+    std::uint64_t contractions = 0;
+    for (const auto& piece : pieces_) contractions += piece->merges().size();
+    auto& triangles = work_.mesh.triangles;
+    std::size_t kept = 0;
+    for (std::size_t t = 0; t < triangles.size(); ++t) {
+      if (triangles[t][0] == kNone) continue;
+      if (work_.bound > 0) work_.errors[kept] = work_.errors[t];
+      triangles[kept++] = triangles[t];
+    }
+    triangles.resize(kept);
+    if (work_.bound > 0) work_.errors.resize(kept);
+    return contractions;
+  }
+
+ private:
+  [[nodiscard]] const Vec3& at(std::uint32_t v) const { return work_.mesh.positions[v]; }
+  [[nodiscard]] std::span<const std::uint32_t> triangles_of(std::size_t piece) const {
+    return {order_.data() + starts_[piece], starts_[piece + 1] - starts_[piece]};
+  }
+
+  void build() {
+    const auto& triangles = work_.mesh.triangles;
+    constexpr std::uint32_t kSeveral = kNone - 1;
+    std::vector<std::uint32_t> owner(work_.mesh.positions.size(), kNone);
+    for (std::uint32_t p = 0; p + 1 < starts_.size(); ++p) {
+      for (const std::uint32_t t : triangles_of(p)) {
+        for (const std::uint32_t v : triangles[t]) owner[v] = owner[v] == kNone || owner[v] == p ? p : kSeveral;
+      }
+    }
+    pieces_.resize(starts_.size() - 1);
+    vertices_.resize(pieces_.size());
+    tbb::enumerable_thread_specific<std::vector<std::uint32_t>> numbers(
+        [&] { return std::vector<std::uint32_t>(owner.size(), kNone); });
+    tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
+      std::vector<std::uint32_t>& number = numbers.local();
+      std::vector<std::uint32_t>& vertices = vertices_[p];
+      Piece piece;
+      piece.centre = work_.centre;
+      piece.floats = work_.floats;
+      piece.bound = work_.bound;
+      for (const std::uint32_t t : triangles_of(p)) {
+        Triangle local = triangles[t];
+        for (std::uint32_t& v : local) {
+          if (number[v] == kNone) {
+            number[v] = static_cast<std::uint32_t>(vertices.size());
+            vertices.push_back(v);
+          }
+          v = number[v];
+        }
+        piece.triangles.push_back(local);
+        if (work_.bound > 0) piece.errors.push_back(work_.errors[t]);
+      }
+      for (const std::uint32_t v : vertices) {
+        number[v] = kNone;
+        piece.positions.push_back(at(v));
+        piece.quadrics.push_back(work_.quadrics[v]);
+        piece.fixed.push_back(owner[v] == kSeveral ? 1 : 0);
+      }
+      pieces_[p] = std::make_unique<Contractor>(std::move(piece));
+    });
+  }
+
+  /// One contraction after the other, the cheapest of all pieces.
+  bool in_turn(std::uint64_t goal) {
+    using Turn = std::pair<float, std::size_t>;
+    std::priority_queue<Turn, std::vector<Turn>, std::greater<>> queue;
+    for (std::size_t p = 0; p < pieces_.size(); ++p) queue.emplace(pieces_[p]->next_cost(), p);
+    while (size_ > goal && !queue.empty() && !std::isinf(queue.top().first)) {
+      const std::size_t p = queue.top().second;
+      queue.pop();
+      Contractor& c = *pieces_[p];
+      const float dearest = queue.empty() ? std::numeric_limits<float>::max() : queue.top().first;
+      const std::uint64_t others = size_ - c.size();
+      size_ -= c.run(dearest, goal > others ? goal - others : 0);
+      queue.emplace(c.next_cost(), p);
+    }
+    return size_ <= goal;
+  }
+
+  void put_back(std::size_t p) {
+    TriangleMesh& mesh = work_.mesh;
+    const Contractor& c = *pieces_[p];
+    const std::vector<std::uint32_t>& vertices = vertices_[p];
+    for (const Merge& merge : c.merges()) {
+      const std::uint32_t u = vertices[merge.u], v = vertices[merge.v];
+      if (!mesh.normals.empty()) {
+        const double s = static_cast<double>(merge.share);
+        const Vec3 mixed = (1 - s) * to_double(mesh.normals[u]) + s * to_double(mesh.normals[v]);
+        if (norm(mixed) > 0) mesh.normals[u] = to_float(unit(mixed));
+      }
+      for (auto& values : mesh.attributes) values[u] += merge.share * (values[v] - values[u]);
+    }
+    for (std::size_t v = 0; v < vertices.size(); ++v) {
+      if (c.piece().fixed[v] != 0) continue;
+      mesh.positions[vertices[v]] = c.piece().positions[v];
+      work_.quadrics[vertices[v]] = c.piece().quadrics[v];
+    }
+    const auto where = triangles_of(p);
+    if (work_.bound > 0) {
+      const std::vector<Errors> errors = c.errors();
+      for (std::size_t t = 0; t < where.size(); ++t) work_.errors[where[t]] = errors[t];
+    }
+    for (std::size_t t = 0; t < where.size(); ++t) {
+      const Triangle& local = c.stars().triangles()[t];
+      mesh.triangles[where[t]] = local[0] == kNone
+                                     ? Triangle{kNone, kNone, kNone}
+                                     : Triangle{vertices[local[0]], vertices[local[1]], vertices[local[2]]};
+    }
+  }
+
+  WorkMesh& work_;
+  std::uint64_t size_;
+  std::vector<std::size_t> starts_;                   ///< of the pieces in `order_`
+  std::vector<std::uint32_t> order_;                  ///< triangles by piece
+  std::vector<std::vector<std::uint32_t>> vertices_;  ///< of each piece
+  std::vector<std::unique_ptr<Contractor>> pieces_;
+};
+
+}  // namespace
+
+WorkMesh make_work_mesh(TriangleMesh& mesh) {
+  WorkMesh work{mesh, std::vector<Quadric>(mesh.positions.size())};
+  Vec3 low = mesh.positions[mesh.triangles[0][0]], high = low;
+  work.floats = true;
+  for (const Triangle& t : mesh.triangles) {
+    for (const std::uint32_t v : t) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const double c = mesh.positions[v][k];
+        low[k] = std::min(low[k], c);
+        high[k] = std::max(high[k], c);
+        work.floats = work.floats && static_cast<double>(static_cast<float>(c)) == c;
+      }
+    }
+  }
+  work.centre = 0.5 * (low + high);
+  const auto at = [&](std::uint32_t v) { return mesh.positions[v] - work.centre; };
+  const auto normal_of = [&](const Triangle& t) { return cross(at(t[1]) - at(t[0]), at(t[2]) - at(t[0])); };
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3 n = normal_of(t);
+    const double twice = norm(n);
+    if (!(twice > 0)) continue;
+    const Quadric plane = plane_quadric(at(t[0]), (1 / twice) * n, 0.5 * twice, kNormalNoise);
+    for (const std::uint32_t v : t) work.quadrics[v] += plane;
+  }
+  measure::EdgeTable(mesh).for_each_edge([&](std::span<const measure::Side> sides) {
+    if (sides.size() != 1) return;
+    const std::uint32_t corner = sides[0].corner;
+    const Triangle& t = mesh.triangles[corner / 3];
+    const std::uint32_t u = t[corner % 3], v = t[sides[0].next_corner() % 3];
+    const Vec3 edge = at(v) - at(u), n = normal_of(t);
+    if (!(norm(n) > 0)) return;
+    const Quadric wall =
+        plane_quadric(at(u), unit(cross(edge, unit(n))), kBoundaryWeight * dot(edge, edge), kNormalNoise);
+    work.quadrics[u] += wall;
+    work.quadrics[v] += wall;
+  });
+  return work;
+}
+
+std::uint64_t contract_to(WorkMesh& work, std::uint64_t wanted, const RunContext& run) {
+  const auto times_wanted = [&](double factor) {
+    return static_cast<std::uint64_t>(factor * static_cast<double>(wanted));
+  };
+  std::uint64_t contractions = 0;
+  bool stuck = false;  // the round before this one found no edge that can go
+  for (int number = 0; work.mesh.triangles.size() > wanted; ++number) {
+    const std::uint64_t there = work.mesh.triangles.size();
+    const bool last = stuck || there <= std::max<std::uint64_t>(times_wanted(kLastRound), kPieceTriangles);
+    // A round before the last ends a little above its goal, and has to end where the last one begins.
+    const std::uint64_t goal = last ? wanted
+                                    : std::max(times_wanted(kLastRound / kInTurn) - 1,
+                                               static_cast<std::uint64_t>(kRoundShrinks * static_cast<double>(there)));
+    Round round(work, share_of_round(number));
+    round.reduce(goal, last, run);
+    contractions += round.finish();
+    const bool whole = there <= kPieceTriangles;  // nothing was held fast
+    if (last && (whole || (stuck && work.mesh.triangles.size() == there))) break;
+    stuck = work.mesh.triangles.size() == there;
+  }
+  return contractions;
+}
+
+std::uint64_t contract_within(WorkMesh& work, const RunContext& run) {
+  work.errors.assign(work.mesh.triangles.size(), {});
+  std::uint64_t contractions = 0;
+  for (int number = 0; number < kBoundRounds; ++number) {
+    const std::size_t there = work.mesh.triangles.size();
+    Round round(work, share_of_round(number));
+    round.exhaust(run);
+    contractions += round.finish();
+    const std::size_t gone = there - work.mesh.triangles.size();
+    if (there <= kPieceTriangles || gone < there / 200) break;
+  }
+  return contractions;
+}
+
+}  // namespace lamina::simplify

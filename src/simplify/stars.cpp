@@ -1,0 +1,118 @@
+#include "simplify/stars.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace lamina::simplify {
+
+Stars::Stars(std::vector<Triangle> triangles, std::size_t vertices)
+    : triangles_(std::move(triangles)), star_(vertices), boundary_(vertices), mark_(vertices) {
+  for (const Triangle& t : triangles_) {
+    for (const std::uint32_t v : t) ++star_[v].size;
+  }
+  std::uint32_t end = 0;
+  for (Run& run : star_) {
+    run.begin = end;
+    end += run.size;
+    run.size = 0;
+  }
+  runs_.reserve(2 * std::size_t{end});
+  runs_.resize(end);
+  for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
+    for (const std::uint32_t v : triangles_[t]) runs_[star_[v].begin + star_[v].size++] = t;
+  }
+  // An inner vertex of a manifold has as many neighbours as triangles.
+  std::vector<std::uint32_t> near;
+  for (std::uint32_t v = 0; v < vertices; ++v) {
+    neighbours(v, near);
+    boundary_[v] = near.size() > star_[v].size ? 1 : 0;
+  }
+}
+
+void Stars::neighbours(std::uint32_t vertex, std::vector<std::uint32_t>& out) {
+  out.clear();
+  ++question_;
+  for (const std::uint32_t triangle : around(vertex)) {
+    for (const std::uint32_t w : triangles_[triangle]) {
+      if (w == vertex || mark_[w] == question_) continue;
+      mark_[w] = question_;
+      out.push_back(w);
+    }
+  }
+}
+
+bool Stars::spans(std::uint32_t vertex, std::uint32_t c, std::uint32_t d) const {
+  const auto star = around(vertex);
+  return std::any_of(star.begin(), star.end(),
+                     [&](std::uint32_t t) { return names(triangles_[t], c) && names(triangles_[t], d); });
+}
+
+bool Stars::contractible(std::uint32_t u, std::uint32_t v) {
+  std::array<std::uint32_t, 2> beside{};  // the third vertices of the triangles that go
+  std::size_t shared = 0;
+  ++question_;
+  for (const std::uint32_t triangle : around(u)) {
+    const Triangle& t = triangles_[triangle];
+    const std::size_t k = corner_of(t, u);
+    const std::uint32_t p = t[(k + 1) % 3], q = t[(k + 2) % 3];
+    mark_[p] = mark_[q] = question_;
+    if (p != v && q != v) continue;
+    if (shared == beside.size()) return false;
+    beside[shared++] = p == v ? q : p;
+  }
+  if (shared == 0) return false;
+  if (shared == 2 && boundary(u) && boundary(v)) return false;
+  std::size_t common = 0;
+  const std::uint32_t of_u = question_++;
+  for (const std::uint32_t triangle : around(v)) {
+    for (const std::uint32_t w : triangles_[triangle]) {
+      if (w == u || w == v || mark_[w] != of_u) continue;
+      mark_[w] = question_;
+      ++common;
+    }
+  }
+  if (common != shared) return false;
+  const auto sides = [&](std::uint32_t vertex) {
+    const auto star = around(vertex);
+    return std::count_if(star.begin(), star.end(), [&](std::uint32_t t) { return names(triangles_[t], beside[0]); });
+  };
+  // A triangle alone would vanish; of a tetrahedron two would become one.
+  if (shared == 1) return sides(u) != 1 || sides(v) != 1;
+  return !spans(u, beside[0], beside[1]) || !spans(v, beside[0], beside[1]);
+}
+
+void Stars::drop(std::uint32_t vertex, std::uint32_t triangle) {
+  Run& run = star_[vertex];
+  std::uint32_t* const begin = runs_.data() + run.begin;
+  std::uint32_t* const end = begin + run.size--;
+  std::copy(std::find(begin, end, triangle) + 1, end, std::find(begin, end, triangle));
+}
+
+int Stars::contract(std::uint32_t u, std::uint32_t v) {
+  int gone = 0;
+  const auto begin = static_cast<std::uint32_t>(runs_.size());
+  for (const std::uint32_t vertex : {u, v}) {
+    const Run run = star_[vertex];
+    for (std::uint32_t i = run.begin; i < run.begin + run.size; ++i) {
+      const std::uint32_t triangle = runs_[i];
+      Triangle& t = triangles_[triangle];
+      if (t[0] == kNone) continue;
+      if (names(t, u) && names(t, v)) {
+        for (const std::uint32_t w : t) {
+          if (w != u && w != v) drop(w, triangle);
+        }
+        t[0] = kNone;
+        ++gone;
+        continue;
+      }
+      t[corner_of(t, vertex)] = u;
+      runs_.push_back(triangle);
+    }
+  }
+  star_[u] = {begin, static_cast<std::uint32_t>(runs_.size()) - begin};
+  star_[v] = {};
+  boundary_[u] = boundary_[u] | boundary_[v];
+  return gone;
+}
+
+}  // namespace lamina::simplify

@@ -1,0 +1,59 @@
+// Triangles by their vertices, while edges are contracted.
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace lamina::simplify {
+
+using Triangle = std::array<std::uint32_t, 3>;
+
+constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+
+/// The corner that names `vertex`, which is one of them.
+inline std::size_t corner_of(const Triangle& t, std::uint32_t vertex) {
+  return t[0] == vertex ? 0 : t[1] == vertex ? 1 : 2;
+}
+inline bool names(const Triangle& t, std::uint32_t vertex) {
+  return t[0] == vertex || t[1] == vertex || t[2] == vertex;
+}
+
+/// Which triangles meet at a vertex: for each a run of triangle numbers in one array. A contracted vertex' run is
+/// written anew behind the others.
+class Stars {
+ public:
+  Stars(std::vector<Triangle> triangles, std::size_t vertices);
+
+  [[nodiscard]] const std::vector<Triangle>& triangles() const { return triangles_; }
+  [[nodiscard]] bool alive(std::uint32_t triangle) const { return triangles_[triangle][0] != kNone; }
+  /// The triangles at a vertex; none for one that is gone.
+  [[nodiscard]] std::span<const std::uint32_t> around(std::uint32_t vertex) const {
+    return {runs_.data() + star_[vertex].begin, star_[vertex].size};
+  }
+  /// Their other vertices, each once, into `out`.
+  void neighbours(std::uint32_t vertex, std::vector<std::uint32_t>& out);
+  /// Is it at an edge of one triangle?
+  [[nodiscard]] bool boundary(std::uint32_t vertex) const { return boundary_[vertex] != 0; }
+  /// The link condition: contracting the edge changes neither topology nor manifoldness.
+  [[nodiscard]] bool contractible(std::uint32_t u, std::uint32_t v);
+  /// v becomes u. Returns how many triangles go.
+  int contract(std::uint32_t u, std::uint32_t v);
+
+ private:
+  struct Run {
+    std::uint32_t begin = 0, size = 0;
+  };
+  void drop(std::uint32_t vertex, std::uint32_t triangle);
+  [[nodiscard]] bool spans(std::uint32_t vertex, std::uint32_t c, std::uint32_t d) const;
+
+  std::vector<Triangle> triangles_;  ///< of dead ones the first vertex is kNone
+  std::vector<Run> star_;
+  std::vector<std::uint32_t> runs_;
+  std::vector<std::uint8_t> boundary_;
+  std::vector<std::uint32_t> mark_;  ///< of vertices: the last question that met them
+  std::uint32_t question_ = 0;
+};
+
+}  // namespace lamina::simplify

@@ -1,0 +1,195 @@
+// Simplification with a bound, against distances found another way.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "lamina/error.h"
+#include "lamina/measure.h"
+#include "lamina/simplify.h"
+#include "meshes/mesh_files.h"
+#include "meshes/vec3.h"
+#include "simplify/cover.h"
+
+namespace lamina {
+namespace {
+
+using namespace testing_meshes;
+using namespace meshes;
+
+/// By the plane where the foot of the perpendicular is inside, else by the sides.
+double point_to_triangle(const Vec3& x, const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 n = cross(b - a, c - a);
+  if (dot(n, cross(b - a, x - a)) >= 0 && dot(n, cross(c - b, x - b)) >= 0 && dot(n, cross(a - c, x - c)) >= 0 &&
+      norm(n) > 0)
+    return std::abs(dot(n, x - a)) / norm(n);
+  const auto to_side = [&](const Vec3& p, const Vec3& q) {
+    const Vec3 s = q - p;
+    const double t = dot(s, s) > 0 ? std::clamp(dot(x - p, s) / dot(s, s), 0.0, 1.0) : 0;
+    return norm(x - p - t * s);
+  };
+  return std::min({to_side(a, b), to_side(b, c), to_side(c, a)});
+}
+
+/// The greatest distance of samples of one mesh to the other.
+double farthest(const TriangleMesh& from, const TriangleMesh& to) {
+  constexpr int kSteps = 4;
+  double most = 0;
+  for (const auto& t : from.triangles) {
+    for (int i = 0; i <= kSteps; ++i) {
+      for (int j = 0; i + j <= kSteps; ++j) {
+        const double u = static_cast<double>(i) / kSteps, v = static_cast<double>(j) / kSteps;
+        const Vec3 x = u * from.positions[t[0]] + v * from.positions[t[1]] + (1 - u - v) * from.positions[t[2]];
+        double nearest = std::numeric_limits<double>::infinity();
+        for (const auto& f : to.triangles)
+          nearest = std::min(nearest, point_to_triangle(x, to.positions[f[0]], to.positions[f[1]], to.positions[f[2]]));
+        most = std::max(most, nearest);
+      }
+    }
+  }
+  return most;
+}
+
+TriangleMesh rough_field(std::mt19937& random, std::uint32_t n) {
+  const auto real = [&](double low, double high) { return std::uniform_real_distribution<>(low, high)(random); };
+  const double wave = real(0, 12), height = real(0, 0.3), noise = real(0, 1) < 0.5 ? 0 : real(0, 0.5 / n);
+  const auto hole = static_cast<std::uint32_t>(random() % (n * n));
+  TriangleMesh mesh;
+  for (std::uint32_t i = 0; i <= n; ++i) {
+    for (std::uint32_t j = 0; j <= n; ++j) {
+      const double x = static_cast<double>(i) / n, y = static_cast<double>(j) / n;
+      mesh.positions.push_back({x + real(0, noise), y + real(0, noise),
+                                height * std::sin(wave * x) * std::cos(wave * y) + real(-noise, noise)});
+    }
+  }
+  for (std::uint32_t i = 0; i < n; ++i) {
+    for (std::uint32_t j = 0; j < n; ++j) {
+      if (i * n + j == hole) continue;
+      const std::uint32_t a = i * (n + 1) + j, b = a + n + 1;
+      mesh.triangles.push_back({a, b, b + 1});
+      mesh.triangles.push_back({a, b + 1, a + 1});
+    }
+  }
+  return mesh;
+}
+
+/// Anything from a ball to a disc thinner than the bound.
+TriangleMesh rough_ball(std::mt19937& random) {
+  const auto real = [&](double low, double high) { return std::uniform_real_distribution<>(low, high)(random); };
+  TriangleMesh mesh = sphere(1, 8, 16);
+  const double flat = std::exp(real(-5, 0)), noise = real(0, 0.05) * flat;
+  for (Vec3& p : mesh.positions) p = {p[0], p[1] + real(-noise, noise), flat * (p[2] + real(-noise, noise))};
+  return mesh;
+}
+
+TEST(SimplifyBound, HoldsBothWays) {
+  std::uint64_t before = 0, after = 0;
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    std::mt19937 random(seed);
+    const TriangleMesh mesh =
+        seed % 3 == 0 ? rough_ball(random) : rough_field(random, static_cast<std::uint32_t>(4 + random() % 9));
+    const double bound = std::exp(std::uniform_real_distribution<>(std::log(1e-4), std::log(0.4))(random));
+    TriangleMesh fewer = mesh;
+    const SimplifyStats stats = simplify_mesh(fewer, {0, bound});
+    EXPECT_LE(farthest(mesh, fewer), bound) << seed;
+    EXPECT_LE(farthest(fewer, mesh), bound) << seed;
+    EXPECT_TRUE(stats.reached);
+    const CheckReport was = check_mesh(mesh), is = check_mesh(fewer);
+    EXPECT_TRUE(is.manifold()) << seed;
+    EXPECT_EQ(is.euler_characteristic, was.euler_characteristic) << seed;
+    EXPECT_EQ(is.boundary_loops, was.boundary_loops) << seed;
+    before += mesh.triangles.size();
+    after += fewer.triangles.size();
+  }
+  EXPECT_LT(4 * after, 3 * before);
+}
+
+TEST(SimplifyBound, IsUsedUp) {
+  TriangleMesh mesh;
+  constexpr std::uint32_t n = 112;  // more than a piece
+  for (std::uint32_t i = 0; i <= n; ++i)
+    for (std::uint32_t j = 0; j <= n; ++j) {
+      const double x = static_cast<double>(i) / n, y = static_cast<double>(j) / n;
+      mesh.positions.push_back({x, y, 0.1 * std::sin(6 * x) * std::cos(6 * y)});
+    }
+  for (std::uint32_t i = 0; i < n; ++i)
+    for (std::uint32_t j = 0; j < n; ++j) {
+      const std::uint32_t a = i * (n + 1) + j, b = a + n + 1;
+      mesh.triangles.push_back({a, b, b + 1});
+      mesh.triangles.push_back({a, b + 1, a + 1});
+    }
+  TriangleMesh within = mesh, plain = mesh;
+  RunContext one;
+  one.threads = 1;
+  simplify_mesh(within, {0, 1e-3}, one);
+  const CompareResult held = compare(within, mesh, {50000});
+  EXPECT_LE(held.a_to_b->max, 1e-3);
+  EXPECT_LE(held.b_to_a->max, 1e-3);
+  // The plain order reaches the bound no later than with as many triangles, a tenth granted.
+  simplify_mesh(plain, {within.triangles.size() * 9 / 10});
+  const CompareResult free = compare(plain, mesh, {50000});
+  EXPECT_GT(std::max(free.a_to_b->max, free.b_to_a->max), 1e-3);
+  TriangleMesh again = mesh;
+  RunContext three;
+  three.threads = 3;
+  simplify_mesh(again, {0, 1e-3}, three);
+  EXPECT_EQ(again.positions, within.positions);
+  EXPECT_EQ(again.triangles, within.triangles);
+}
+
+TEST(SimplifyBound, APlaneGoesAtAnyBound) {
+  std::mt19937 random(1);
+  TriangleMesh mesh = rough_field(random, 12);
+  for (Vec3& p : mesh.positions) p[2] = 0;
+  const std::size_t before = mesh.triangles.size();
+  simplify_mesh(mesh, {0, 1e-9});
+  EXPECT_LT(mesh.triangles.size(), before / 2);
+}
+
+TEST(SimplifyBound, RefusesWhatIsNoLength) {
+  TriangleMesh mesh = tetrahedron();
+  for (const double error : {-1.0, std::nan(""), std::numeric_limits<double>::infinity()})
+    expect_error(ExitCode::usage, [&] { simplify_mesh(mesh, {0, error}); }, {"error", "length above 0"});
+  expect_error(ExitCode::usage, [&] { simplify_mesh(mesh, {2, 1.0}); }, {"not both"});
+  expect_error(ExitCode::usage, [&] { simplify_mesh(mesh, {0, 0.0}); }, {"at least one triangle"});
+}
+
+TEST(Cover, DistanceIsTheDistance) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<> real(-1, 1);
+  const auto any = [&] { return Vec3{real(random), real(random), real(random)}; };
+  for (int i = 0; i < 2000; ++i) {
+    const Vec3 a = any(), b = any(), c = i % 10 == 0 ? 0.5 * (a + b) : any(), x = any();
+    const double truth = i % 10 == 0 ? point_to_triangle(x, a, b, b) : point_to_triangle(x, a, b, c);
+    EXPECT_NEAR(simplify::distance_within(x, simplify::make_facet(a, b, c), 10), truth, 1e-6);
+    EXPECT_EQ(simplify::distance_within(x, simplify::make_facet(a, b, c), 0.9 * truth - 1e-6),
+              std::numeric_limits<double>::infinity());
+  }
+}
+
+TEST(Cover, ATriangleLiesNearItsParts) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<> real(0, 1);
+  for (int i = 0; i < 200; ++i) {
+    const Vec3 a{0, 0, 0}, b{1, 0, 0}, c{0, 1, 0}, m{0.2 + 0.3 * real(random), 0.2 + 0.2 * real(random), 0};
+    std::vector<simplify::Facet> parts{simplify::make_facet(a, b, m), simplify::make_facet(b, c, m),
+                                       simplify::make_facet(c, a, m)};
+    simplify::Cover cover(1e-6);
+    EXPECT_TRUE(cover.prove({a, b, c}, 0, parts, 30));
+    EXPECT_LT(cover.error(), 1e-6);
+    parts.pop_back();
+    EXPECT_FALSE(cover.prove({a, b, c}, 0, parts, 30));
+    parts.push_back(simplify::make_facet(c, a, m + Vec3{0, 0, 0.01}));
+    EXPECT_FALSE(cover.prove({a, b, c}, 0, parts, 30));
+    simplify::Cover wider(0.011);
+    EXPECT_TRUE(wider.prove({a, b, c}, 0, parts, 30));
+    EXPECT_FALSE(wider.prove({a, b, c}, 0.01, parts, 30));
+  }
+}
+
+}  // namespace
+}  // namespace lamina
