@@ -10,7 +10,7 @@ inline constexpr double kDefaultBlend = 1.2;
 /// Samples this far (radii) from the surface that their neighbours suggest are noisy. Detail that the sampling hardly
 /// resolves looks the same up to 0.05; noise of half a spacing either way has 0.12, of a spacing 0.3.
 inline constexpr float kNoisy = 0.05F;
-inline constexpr float kVeryNoisy = 0.3F;
+inline constexpr float kVeryNoisy = 0.25F;
 
 /// H for noisy and for very noisy samples; between them it grows with the noise.
 inline constexpr double kNoisyBlend = 1.75;

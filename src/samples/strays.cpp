@@ -153,6 +153,7 @@ struct Surroundings {
   std::vector<std::uint8_t> count;        ///< of them
   std::vector<std::uint8_t> stray;        ///< Verdict
   std::vector<std::uint8_t> suspect;      ///< 1: may be one
+  std::vector<std::uint8_t> beside;       ///< 1: few neighbours, but many samples not much farther away
 };
 
 enum Verdict : std::uint8_t { kStays, kIsLonely, kIsOffSurface };
@@ -184,7 +185,8 @@ float mean_distance(const Oriented& s, std::size_t place, const Company& company
   return sum / static_cast<float>(kStrayNeighbours);
 }
 
-bool is_off_surface(const Oriented& s, std::size_t place, const Company& company) {
+/// Whether fewer than `least` of the company lie on the surface of a sample.
+bool is_off_surface(const Oriented& s, std::size_t place, const Company& company, float least) {
   if (company.count == 0) return true;
   std::array<float, kStrayNeighbours> off;
   float farthest2 = 0;
@@ -213,7 +215,7 @@ bool is_off_surface(const Oriented& s, std::size_t place, const Company& company
   const float agreement = std::sqrt(mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2]) / all;
   // Neighbours that do not agree among themselves say nothing of the way a sample faces.
   if (agreement < kAgreeing) along += against;
-  return static_cast<float>(along) < kLeastOnSurface * all;
+  return static_cast<float>(along) < least * all;
 }
 
 /// Whether the samples of a leaf lie close together on one plane and face its way: none of them can be a stray.
@@ -296,6 +298,16 @@ void find_neighbours(const Neighbourhoods& around, float reach, Surroundings& ou
     for (std::size_t p = places.begin; p < places.end; ++p) out.suspect[p] = 1;
   });
   search(kWanted);
+  out.beside.assign(tree.size(), 0);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree.size(), 4096), [&](const auto& range) {
+    std::array<Neighbour, kManyBeside> found;
+    for (std::size_t p = range.begin(); p < range.end(); ++p) {
+      if (out.suspect[p] == 0 || out.count[p] >= kStrayNeighbours) continue;
+      const float twice = 4 * reach * reach;
+      const std::size_t many = tree.nearest(static_cast<std::uint32_t>(p), kManyBeside, twice, found.data());
+      out.beside[p] = many == kManyBeside ? 1 : 0;
+    }
+  });
   for (std::size_t p = 0; p < tree.size(); ++p) {
     if (out.suspect[p] == 0) continue;
     for (std::size_t k = 0; k < out.count[p]; ++k) {
@@ -340,7 +352,10 @@ void judge_places(const Neighbourhoods& around, float reach, float margin, Surro
     const Company company = company_of(known, p);
     if (known.distance[p] < 0 || known.distance[p] > kLonely * usual_distance(known, company)) {
       verdicts[p] = kIsLonely;
-    } else if (is_off_surface(samples, p, company)) {
+    } else if (known.beside[p] != 0 && company.count < kStrayNeighbours) {
+      if (company.count < kLeastCompany || is_off_surface(samples, p, company, kLeastOnSparseSurface))
+        verdicts[p] = kIsOffSurface;
+    } else if (is_off_surface(samples, p, company, kLeastOnSurface)) {
       verdicts[p] = kIsOffSurface;
     }
   });

@@ -27,6 +27,13 @@ inline constexpr float kAgreeing = 0.7F;
 /// A sample lies on no surface when fewer of its neighbours than this share do: of a ball filled at random a third is
 /// near the plane, and a third of those face along it; at a right edge half of them do.
 inline constexpr float kLeastOnSurface = 0.35F;
+/// A few strays far from everything but each other have chance company, and most of so few lie near the plane of one of
+/// them. Where fewer neighbours are found than are looked for, though there are many not much farther away, more is
+/// asked for: so many neighbours, so large a share of them on the sample's surface.
+inline constexpr std::size_t kLeastCompany = 6;
+inline constexpr float kLeastOnSparseSurface = 0.5F;
+/// Many: within twice the distance a surface of even density has four times as many.
+inline constexpr std::size_t kManyBeside = 64;
 
 struct StrayCounts {
   std::uint64_t lonely = 0;       ///< far from their neighbours
