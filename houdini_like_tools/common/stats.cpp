@@ -99,6 +99,7 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
   j["levels"] = s.plan.levels;
   j["leaf_cells_by_level"] = s.leaf_cells;
   j["noise"] = s.plan.noise;
+  j["normal_noise"] = s.plan.normal_noise;
   j["blend"] = s.plan.blend;
   j["refit"] = s.plan.refit;
   j["cell"] = to_string(s.plan.cell);

@@ -96,6 +96,7 @@ struct SurfacePlan {
   std::array<double, 3> extent{};  ///< of the bounding box along the axes of the frame, sweep axis last
   double radius_low = 0, radius_median = 0, radius_high = 0;  ///< 1 %, 50 %, 99 % of r
   double noise = 0;             ///< median distance of samples from the surface their neighbours suggest, in radii
+  double normal_noise = 0;      ///< median angle of their normals to that surface's, degrees
   double blend = 0, refit = 0;  ///< as given or chosen
   Length cell;
   bool refine_sheets = false;  ///< half of it where things are thin

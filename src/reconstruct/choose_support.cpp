@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numbers>
 
 #include "reconstruct/constants.h"
 
@@ -13,11 +14,13 @@ namespace {
 constexpr int kMostProjections = 16;
 
 /// What noise asks for: a wider support, the wider the more of it, on the same cells, and normals that agree.
-void choose_for_noise(float noise, bool cell_given, StageSettings& out) {
-  const double share = std::min(1.0, static_cast<double>(noise - kNoisy) / static_cast<double>(kVeryNoisy - kNoisy));
+void choose_for_noise(const RadiusSurvey& survey, bool cell_given, StageSettings& out) {
+  const bool rough = static_cast<double>(survey.normal_noise) * 180 / std::numbers::pi > kRoughNormals;
+  const double most = static_cast<double>((rough ? kVeryNoisyRough : kVeryNoisy) - kNoisy);
+  const double share = std::min(1.0, static_cast<double>(survey.noise - kNoisy) / most);
   out.feed.blend = kNoisyBlend + (kVeryNoisyBlend - kNoisyBlend) * share;
   out.feed.cell = {kChosenCell, Length::Unit::sample_radius};
-  out.refit.support = kNoisyRefit;
+  out.refit.support = rough ? kRoughRefit : kNoisyRefit;
   out.trim = kRimOverhang;
   if (!cell_given) out.projection.band = kNoisyBand;
 }
@@ -43,7 +46,7 @@ StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& surve
   if (s.blend) {
     out.feed.blend = *s.blend;
   } else if (survey.noise > kNoisy) {
-    choose_for_noise(survey.noise, s.cell.has_value(), out);
+    choose_for_noise(survey, s.cell.has_value(), out);
   } else if (survey.high < kEven * survey.low) {
     choose_for_even(s.cell.has_value(), out);
   }
@@ -67,8 +70,9 @@ StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& surve
 
 std::string describe_choice(const SurfaceSettings& settings, const SurfacePlan& plan) {
   if (settings.blend) return "";
-  return fmt::format("noise {:.2g} r: chosen --blend {:g} --cell {}{} --refit {:g}{}", plan.noise, plan.blend,
-                     to_string(plan.cell), plan.refine_sheets ? " (half of it where things are thin)" : "", plan.refit,
+  return fmt::format("noise {:.2g} r, of normals {:.2g} degrees: chosen --blend {:g} --cell {}{} --refit {:g}{}",
+                     plan.noise, plan.normal_noise, plan.blend, to_string(plan.cell),
+                     plan.refine_sheets ? " (half of it where things are thin)" : "", plan.refit,
                      plan.watertight ? " --watertight yes" : "");
 }
 

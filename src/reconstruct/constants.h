@@ -19,6 +19,13 @@ inline constexpr double kVeryNoisyBlend = 2.5;
 /// Support (radii) within which noisy normals are fitted again.
 inline constexpr double kNoisyRefit = 3;
 
+/// Normals found over a handful of neighbours scatter by 13 degrees on noisy samples, those of scanners and of
+/// neighbourhoods that know the noise by two to eight. The former want the wide support with less noise, and more
+/// company.
+inline constexpr double kRoughNormals = 10;
+inline constexpr float kVeryNoisyRough = 0.1F;
+inline constexpr double kRoughRefit = 4;
+
 /// Radii of an evenly sampled surface: the 99 % quantile is some 2.5 times the 1 % one (cells that the surface clips
 /// give long ones), six to eight where density varies 64 times. Where density varies, the support must bridge wider
 /// gaps.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <vector>
 
@@ -306,6 +307,7 @@ SurfacePlan summary_of(const ReconstructionPlan& p) {
   out.radius_median = p.radius.median * step;
   out.radius_high = p.radius.high * step;
   out.noise = static_cast<double>(p.radius.noise);
+  out.normal_noise = static_cast<double>(p.radius.normal_noise) * 180 / std::numbers::pi;
   out.blend = p.feed.blend;
   out.refit = p.refit.support;
   out.cell = p.feed.cell;

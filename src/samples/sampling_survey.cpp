@@ -46,7 +46,7 @@ double height_of(const SlabStore& store, BucketRun run) {
   return static_cast<double>(high) - low;
 }
 
-LocalSamples read_positions(const SlabStore& store, const ReadBucket& read, BucketRun run) {
+LocalSamples read_oriented(const SlabStore& store, const ReadBucket& read, BucketRun run) {
   LocalSamples all, bucket;
   for (std::size_t b = run.begin; b < run.end; ++b) {
     if (store.count(b) == 0) continue;
@@ -54,6 +54,9 @@ LocalSamples read_positions(const SlabStore& store, const ReadBucket& read, Buck
     all.x.insert(all.x.end(), bucket.x.begin(), bucket.x.end());
     all.y.insert(all.y.end(), bucket.y.begin(), bucket.y.end());
     all.z.insert(all.z.end(), bucket.z.begin(), bucket.z.end());
+    all.nx.insert(all.nx.end(), bucket.nx.begin(), bucket.nx.end());
+    all.ny.insert(all.ny.end(), bucket.ny.begin(), bucket.ny.end());
+    all.nz.insert(all.nz.end(), bucket.nz.begin(), bucket.nz.end());
   }
   return all;
 }
@@ -67,7 +70,7 @@ constexpr double kLow = 0.01, kMiddle = 0.5, kHigh = 0.99;
 std::vector<WeightedRadius> run_radii(const SlabStore& store, const ReadBucket& read, BucketRun run,
                                       std::uint32_t min_samples) {
   const CutEnds cut{run.begin > 0, run.end < store.buckets()};
-  return density_radii(read_positions(store, read, run), cut, min_samples);
+  return density_radii(read_oriented(store, read, run), cut, min_samples);
 }
 
 std::vector<WeightedRadius> given_radii(const ReadBucket& read, BucketRun run) {
@@ -125,7 +128,7 @@ constexpr std::size_t kSeeds = 128;  ///< samples of a run whose surroundings ar
 constexpr double kNeighbourhood = 2;
 constexpr std::size_t kLeast = 16;  ///< neighbours that a quadric takes
 constexpr std::size_t kMost = 512;
-constexpr std::size_t kEnough = 32;  ///< residuals that make a median
+constexpr std::size_t kEnough = 32;  ///< values that make a median
 /// Ratio of the second moments along two axes from which on the neighbours are flat, or on a line.
 constexpr double kFlat = 4;
 /// Half of a normal distribution lies within so many of its deviations.
@@ -153,9 +156,14 @@ BucketRun noise_run(const SlabStore& store, std::uint64_t rank, double height) {
   }
 }
 
-/// Distance (in units of the neighbourhood) of its origin from the quadric height field over the plane of least squares
-/// through its points; negative where there is none.
-double residual(const std::vector<Eigen::Vector3d>& points) {
+/// How a sample lies to the surface that its neighbours suggest.
+struct Deviation {
+  double distance = -1;  ///< in units of the neighbourhood; negative where there is no surface
+  double angle = -1;     ///< of the normals, either way, radians; negative where there is none
+};
+
+/// Of the origin with a normal from the quadric height field over the plane of least squares through the points.
+Deviation deviation(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& normal) {
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& p : points) mean += p;
   mean /= static_cast<double>(points.size());
@@ -164,8 +172,9 @@ double residual(const std::vector<Eigen::Vector3d>& points) {
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(scatter);
   // A line of samples has no plane. Nor has a ball, but that is what much noise looks like.
   if (!(axes.eigenvalues()(1) > kFlat * axes.eigenvalues()(0))) {
-    if (axes.eigenvalues()(2) > kFlat * axes.eigenvalues()(1)) return -1;
-    return kMedianDeviation * std::sqrt(std::max(0.0, axes.eigenvalues()(0)) / static_cast<double>(points.size()));
+    if (axes.eigenvalues()(2) > kFlat * axes.eigenvalues()(1)) return {};
+    const double across = std::max(0.0, axes.eigenvalues()(0)) / static_cast<double>(points.size());
+    return {kMedianDeviation * std::sqrt(across), -1};
   }
   using Row = Eigen::Matrix<double, 6, 1>;
   Eigen::Matrix<double, 6, 6> a = Eigen::Matrix<double, 6, 6>::Zero();
@@ -177,7 +186,10 @@ double residual(const std::vector<Eigen::Vector3d>& points) {
     b += row * q.x();
   }
   a.diagonal().array() += 1e-9 * a.trace();
-  return std::abs(a.ldlt().solve(b)(0));
+  const Row height = a.ldlt().solve(b);
+  const Eigen::Vector3d across = axes.eigenvectors() * Eigen::Vector3d(1, -height(1), -height(2)).normalized();
+  const double angle = normal.isZero() ? -1 : std::acos(std::min(1.0, std::abs(across.dot(normal))));
+  return {std::abs(height(0)), angle};
 }
 
 /// Samples of a run in cells as wide as neighbours are looked for, those around the seeds only.
@@ -197,6 +209,11 @@ class SeedNeighbourhoods {
   }
 
   [[nodiscard]] const std::vector<std::size_t>& seeds() const { return seeds_; }
+  /// Zero where there is none.
+  [[nodiscard]] Eigen::Vector3d normal(std::size_t seed) const {
+    if (samples_.nx.size() != samples_.size()) return Eigen::Vector3d::Zero();
+    return Eigen::Vector3f(samples_.nx[seed], samples_.ny[seed], samples_.nz[seed]).cast<double>();
+  }
   /// The neighbours' places about the seed, in units of the neighbourhood.
   void gather(std::size_t seed, std::vector<Eigen::Vector3d>& out) const {
     out.clear();
@@ -237,11 +254,20 @@ class SeedNeighbourhoods {
   std::unordered_map<NoiseCell, std::vector<std::uint32_t>, CellHash> cells_;
 };
 
+/// 0 where there are too few to tell.
+float median_of(std::vector<float>& values) {
+  if (values.size() < kEnough) return 0;
+  const auto median = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), median, values.end());
+  return *median;
+}
+
 }  // namespace
 
-float survey_noise(const SlabStore& store, const ReadBucket& read, float radius) {
-  if (store.total() == 0 || !(radius > 0)) return 0;
-  std::vector<float> residuals;
+Noise survey_noise(const SlabStore& store, const ReadBucket& read, float radius) {
+  if (store.total() == 0 || !(radius > 0)) return {};
+  std::vector<float> distances;
+  std::vector<float> angles;
   std::vector<Eigen::Vector3d> neighbours;
   const bool small = store.total() <= kRuns * kRunSamples;
   for (int run = 0; run < (small ? 1 : kRuns); ++run) {
@@ -249,19 +275,17 @@ float survey_noise(const SlabStore& store, const ReadBucket& read, float radius)
         small ? store.total() / 2
               : store.total() / kRuns * static_cast<std::uint64_t>(run) + store.total() / (2 * kRuns);
     const double height = small ? std::numeric_limits<double>::infinity() : kRunHeight * static_cast<double>(radius);
-    const LocalSamples samples = read_positions(store, read, noise_run(store, rank, height));
+    const LocalSamples samples = read_oriented(store, read, noise_run(store, rank, height));
     const SeedNeighbourhoods around(samples, static_cast<double>(radius));
     for (const std::size_t seed : around.seeds()) {
       around.gather(seed, neighbours);
       if (neighbours.size() < kLeast) continue;
-      const double d = residual(neighbours);
-      if (d >= 0) residuals.push_back(static_cast<float>(d * kNeighbourhood));
+      const Deviation d = deviation(neighbours, around.normal(seed));
+      if (d.distance >= 0) distances.push_back(static_cast<float>(d.distance * kNeighbourhood));
+      if (d.angle >= 0) angles.push_back(static_cast<float>(d.angle));
     }
   }
-  if (residuals.size() < kEnough) return 0;
-  const auto median = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
-  std::nth_element(residuals.begin(), median, residuals.end());
-  return *median;
+  return {median_of(distances), median_of(angles)};
 }
 
 RadiusSurvey survey_radii(const SlabStore& store, std::uint64_t sample_limit, std::uint32_t min_samples) {
@@ -288,7 +312,9 @@ RadiusSurvey survey_radii(const SlabStore& store, const ReadBucket& read, std::u
   survey.low = quantile(radii, total, kLow);
   survey.median = quantile(radii, total, kMiddle);
   survey.high = quantile(radii, total, kHigh);
-  survey.noise = survey_noise(store, read, survey.median);
+  const Noise noise = survey_noise(store, read, survey.median);
+  survey.noise = noise.distance;
+  survey.normal_noise = noise.angle;
   return survey;
 }
 

@@ -14,11 +14,12 @@ struct RadiusSurvey {
   std::uint64_t samples = 0;            ///< samples looked at
   float low = 0, median = 0, high = 0;  ///< 1 %, 50 %, 99 % quantiles, steps
   float noise = 0;  ///< median distance of samples from the surface their neighbours suggest, in units of `median`
+  float normal_noise = 0;  ///< median angle of samples' normals to that surface's, radians
 };
 /// Looks at runs of buckets about evenly spaced samples, each run at least 16 radii tall, about `sample_limit` samples
 /// in all (more when one run of that height holds more; a store of no more than the limit is read whole, as one
 /// octree). Radii are not bounded by neighbours: clipped cells lengthen `high` by up to 2. Where the input gave radii
-/// (layout has_radius) the quantiles are those of the given radii. Memory: 20 bytes per sample of a run. Throws nothing
+/// (layout has_radius) the quantiles are those of the given radii. Memory: 32 bytes per sample of a run. Throws nothing
 /// of its own; all-zero radii when the store is empty or all samples coincide.
 RadiusSurvey survey_radii(const SlabStore& store, std::uint64_t sample_limit, std::uint32_t min_samples = 16);
 
@@ -29,11 +30,16 @@ using ReadBucket = std::function<void(std::size_t bucket, LocalSamples& out)>;
 RadiusSurvey survey_radii(const SlabStore& store, const ReadBucket& read, std::uint64_t sample_limit,
                           std::uint32_t min_samples = 16);
 
-/// The median over some hundred samples of the distance to the plane, or sphere, that their neighbours within two radii
+struct Noise {
+  float distance = 0;  ///< in units of the median radius
+  float angle = 0;     ///< of normals, radians, 0 to pi / 2
+};
+/// Medians over some hundred samples: of the distance to the plane, or sphere, that their neighbours within two radii
 /// suggest, in units of `radius` (the cloud's median radius, steps). Exact samples of a surface that the radius
 /// resolves have under 0.02; uniform noise of half a local spacing either way on each coordinate has some 0.1. The
-/// neighbours' positions decide, not the samples' own normals. A function of the store alone; reads about 2^17 samples,
-/// and at most four runs of buckets. 0 where too few samples have neighbours to tell.
-float survey_noise(const SlabStore& store, const ReadBucket& read, float radius);
+/// neighbours' positions decide, not the samples' own normals, whose angle to that surface's is the second. A function
+/// of the store alone; reads about 2^17 samples, and at most four runs of buckets. 0 where too few samples have
+/// neighbours to tell.
+Noise survey_noise(const SlabStore& store, const ReadBucket& read, float radius);
 
 }  // namespace lamina

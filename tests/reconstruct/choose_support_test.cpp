@@ -56,6 +56,17 @@ TEST(ChooseSupport, NoiseWidensTheSupportAndRefitsNormals) {
   EXPECT_EQ(choose_support(by_noise(), survey(1, 2)).feed.blend, before);
 }
 
+TEST(ChooseSupport, RoughNormalsWantTheWideSupportSooner) {
+  RadiusSurvey cloud = survey(kVeryNoisyRough, 2);
+  const StageSettings even = choose_support(by_noise(), cloud);
+  cloud.normal_noise = 0.25F;  // 14 degrees
+  const StageSettings rough = choose_support(by_noise(), cloud);
+  EXPECT_EQ(rough.feed.blend, kVeryNoisyBlend);
+  EXPECT_LT(even.feed.blend, rough.feed.blend);
+  EXPECT_EQ(rough.refit.support, kRoughRefit);
+  EXPECT_EQ(even.refit.support, kNoisyRefit);
+}
+
 TEST(ChooseSupport, GivenNumbersStand) {
   SurfaceSettings settings;
   settings.blend = 1.7;

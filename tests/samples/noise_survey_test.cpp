@@ -52,15 +52,20 @@ Scene noisy_sphere(std::size_t count, double k) {
   return scene;
 }
 
-double noise_of(const Scene& scene, std::size_t buckets) {
+/// Samples whose scene gives them no normals have none.
+Noise survey(const Scene& scene, std::size_t buckets) {
   const auto height = static_cast<std::int32_t>(2 * kSide / static_cast<double>(buckets)) + 1;
   SlabStoreWriter writer({}, {::testing::TempDir(), static_cast<std::int32_t>(-kSide), height, buckets, 1 << 20});
   LocalSamples full = scene.samples;
-  for (auto* a : {&full.nx, &full.ny, &full.nz}) a->assign(full.size(), 0);
+  for (auto* a : {&full.nx, &full.ny, &full.nz}) a->resize(full.size(), 0);
   writer.append(full);
   const SlabStore store = writer.finish();
   const ReadBucket read = [&](std::size_t b, LocalSamples& out) { store.read(b, out); };
-  return static_cast<double>(survey_noise(store, read, static_cast<float>(scene.radius)));
+  return survey_noise(store, read, static_cast<float>(scene.radius));
+}
+
+double noise_of(const Scene& scene, std::size_t buckets) {
+  return static_cast<double>(survey(scene, buckets).distance);
 }
 
 /// Of a uniform distribution, half lies within half its reach: k / 2 spacings, k / 4 radii.
@@ -90,6 +95,21 @@ TEST(SurveyNoise, OfALayerAsThickAsItsNeighbourhoods) {
 TEST(SurveyNoise, LargeCloudsAreSeenInParts) {
   for (const std::size_t buckets : {8U, 300U})
     EXPECT_NEAR(noise_of(noisy_plane(160'000, 0.5), buckets), expected(0.5), 0.15 * expected(0.5)) << buckets;
+}
+
+// Every normal is turned by as much, whichever way it then faces.
+TEST(SurveyNoise, OfNormalsIsTheirAngle) {
+  for (const double tilt : {0.02, 0.2, 1.0}) {
+    Scene scene = noisy_plane(20'000, 0.1);
+    LocalSamples& s = scene.samples;
+    for (std::size_t i = 0; i < s.size(); ++i) {
+      const double side = i % 2 == 0 ? 1 : -1;
+      s.nx.push_back(static_cast<float>(side * -0.6 * std::cos(tilt)));
+      s.ny.push_back(static_cast<float>(side * 0.8 * std::cos(tilt)));
+      s.nz.push_back(static_cast<float>(std::sin(tilt)));
+    }
+    EXPECT_NEAR(static_cast<double>(survey(scene, 50).angle), tilt, 0.02) << tilt;
+  }
 }
 
 TEST(SurveyNoise, IsZeroWhereNothingTells) {
