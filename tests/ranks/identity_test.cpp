@@ -119,7 +119,7 @@ TEST_F(RankIdentity, ChosenByTheNoise) {
   expect_same({test::write_cloud(cloud, folder_ / "in.ply"), "--blend", "auto", "--threads", "1", "--stats",
                folder_ / "s.json"},
               {2});
-  EXPECT_EQ(nlohmann::json::parse(test::read_file(folder_ / "s.json")).at("refit"), kNoisyRefit);
+  EXPECT_EQ(nlohmann::json::parse(test::read_file(folder_ / "s.json")).at("refit"), kRoughRefit);
 }
 
 TEST_F(RankIdentity, MoreRanksThanSlabs) {

@@ -62,7 +62,7 @@ TEST_F(SurfaceRefit, ChoiceIsTheSameForThreadsAndWindows) {
   const std::string once = bytes(s, 1);
   EXPECT_GT(plan_.noise, 0.09);
   EXPECT_GT(plan_.blend, kNoisyBlend);
-  EXPECT_EQ(plan_.refit, kNoisyRefit);
+  EXPECT_EQ(plan_.refit, kRoughRefit);
   EXPECT_TRUE(once == bytes(s, 2));
   s.window = 3;
   EXPECT_TRUE(once == bytes(s, 2));
