@@ -15,6 +15,7 @@ find_package(nlohmann_json REQUIRED)
 find_package(PNG REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(EXPAT REQUIRED)
+find_package(meshoptimizer REQUIRED)  # compression of tiles
 # Several machines on one mesh; without it the program runs alone.
 option(LAMINA_WITH_MPI "Build with MPI where it is found" ON)
 if(LAMINA_WITH_MPI)

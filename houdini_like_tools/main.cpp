@@ -36,6 +36,7 @@ int main(int argc, char** argv) {
       add_clean,
       add_clip,
       add_simplify,
+      add_tiles,
       add_transform,
       add_sort,
       add_normal,

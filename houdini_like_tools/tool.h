@@ -19,6 +19,7 @@ void add_merge(CLI::App& app);
 void add_clean(CLI::App& app);
 void add_clip(CLI::App& app);
 void add_simplify(CLI::App& app);
+void add_tiles(CLI::App& app);
 void add_transform(CLI::App& app);
 void add_sort(CLI::App& app);
 void add_normal(CLI::App& app);

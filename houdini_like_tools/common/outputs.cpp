@@ -80,6 +80,12 @@ std::string volume_text(std::string_view verb, const VolumeEditStats& stats) {
                      bytes_text(stats.bytes));
 }
 
+std::string tiles_text(const TileStats& stats) {
+  return fmt::format("{} tile{} in {} level{}, {} triangles in the finest, {}{}", stats.tiles,
+                     stats.tiles == 1 ? "" : "s", stats.levels, stats.levels == 1 ? "" : "s",
+                     count_text(stats.triangles), bytes_text(stats.bytes), stats.on_earth ? ", on the Earth" : "");
+}
+
 void require_mesh_name(const std::string& output) {
   const std::string ending = file_ending(output);
   if (among(kMeshes, ending)) return;

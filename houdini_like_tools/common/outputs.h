@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "lamina/points_writer.h"
+#include "lamina/tiles.h"
 #include "lamina/volume_tools.h"
 
 namespace lamina::tools {
@@ -24,6 +25,9 @@ PointColumns with_precision(PointColumns columns, Precision precision);
 
 /// "kept 2 grids of 1.2 M voxels and 300 points, 4.5 MB".
 std::string volume_text(std::string_view verb, const VolumeEditStats& stats);
+
+/// "1 234 tiles of 4 levels, 130 M triangles at the finest, 12.3 MB".
+std::string tiles_text(const TileStats& stats);
 
 // Each throws Error(usage) for a name such as "mesh.usd" that promises another format, with the way to what was meant.
 // Names that promise nothing ("-", "out", "mesh.tmp") will do.

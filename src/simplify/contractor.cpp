@@ -86,6 +86,8 @@ std::uint64_t Contractor::run(float dearest, std::uint64_t keep) {
     if (!stars_.contractible(e.u, e.v)) continue;
     const Placed to = place(e.u, e.v);
     if (!keeps_shape(e.u, e.v, to.at) || (tracker_ && !stays_near(e.u, e.v, to))) continue;
+    const double weight = piece_.quadrics[e.u].weight() + piece_.quadrics[e.v].weight();
+    if (weight > 0) deviation2_ = std::max(deviation2_, to.cost / weight);
     size_ -= static_cast<std::uint64_t>(contract(e.u, e.v, to.at));
     if (tracker_) tracker_->accept();
   }

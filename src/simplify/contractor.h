@@ -1,5 +1,6 @@
 // Edges of one piece of a mesh contracted, the cheapest first.
 #pragma once
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -17,7 +18,7 @@ namespace lamina::simplify {
 struct Piece {
   std::vector<meshes::Vec3> positions;
   std::vector<Quadric> quadrics;    ///< of the vertices, about `centre`
-  std::vector<std::uint8_t> fixed;  ///< vertices with triangles elsewhere: they stay, and so does what they are in
+  std::vector<std::uint8_t> fixed;  ///< vertices with triangles elsewhere: they stay
   std::vector<Triangle> triangles;
   meshes::Vec3 centre{};  ///< far from it quadrics lose their digits
   bool floats = false;    ///< positions are floats and stay so
@@ -46,6 +47,8 @@ class Contractor {
   [[nodiscard]] const std::vector<Merge>& merges() const { return merges_; }
   /// Of the triangles that are there; only with a bound.
   [[nodiscard]] std::vector<Errors> errors() const { return tracker_->errors(); }
+  /// Of all contractions so far the largest root mean square distance of a new vertex from the planes it stands for.
+  [[nodiscard]] double deviation() const { return std::sqrt(deviation2_); }
   [[nodiscard]] const Stars& stars() const { return stars_; }
   [[nodiscard]] const Piece& piece() const { return piece_; }  ///< its triangles are in stars()
 
@@ -77,6 +80,7 @@ class Contractor {
   std::vector<std::uint32_t> version_;  ///< how often a vertex has moved
   std::vector<Entry> heap_;
   std::vector<Merge> merges_;
+  double deviation2_ = 0;
   std::vector<std::uint32_t> near_;
 };
 

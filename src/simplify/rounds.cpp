@@ -29,6 +29,9 @@ constexpr double kRoundShrinks = 0.5;            ///< a round leaves no smaller 
 constexpr double kLastRound = 1.15;              ///< of the wanted ones: what the last round begins with at the most
 constexpr double kInTurn = 1.01;  ///< from this many of the wanted ones on, pieces take turns, the cheapest edge of all
 
+constexpr double kHardlyAny =
+    0.01;  ///< of the triangles: where vertices are locked, a round that takes fewer is the last
+
 constexpr int kBoundRounds = 3;  ///< with a bound: a round goes as far as it can, the others clear what it held fast
 
 /// Where a round cuts: different from the two before it.
@@ -95,7 +98,10 @@ class Round {
   std::uint64_t finish() {
     tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) { put_back(p); });
     std::uint64_t contractions = 0;
-    for (const auto& piece : pieces_) contractions += piece->merges().size();
+    for (const auto& piece : pieces_) {
+      contractions += piece->merges().size();
+      work_.deviation = std::max(work_.deviation, piece->deviation());
+    }
     auto& triangles = work_.mesh.triangles;
     std::size_t kept = 0;
     for (std::size_t t = 0; t < triangles.size(); ++t) {
@@ -150,7 +156,7 @@ class Round {
         number[v] = kNone;
         piece.positions.push_back(at(v));
         piece.quadrics.push_back(work_.quadrics[v]);
-        piece.fixed.push_back(owner[v] == kSeveral ? 1 : 0);
+        piece.fixed.push_back(owner[v] == kSeveral || (!work_.locked.empty() && work_.locked[v] != 0) ? 1 : 0);
       }
       pieces_[p] = std::make_unique<Contractor>(std::move(piece));
     });
@@ -271,6 +277,8 @@ std::uint64_t contract_to(WorkMesh& work, std::uint64_t wanted, const RunContext
     contractions += round.finish();
     const bool whole = there <= kPieceTriangles;  // nothing was held fast
     if (last && (whole || (stuck && work.mesh.triangles.size() == there))) break;
+    const auto gone = static_cast<double>(there - work.mesh.triangles.size());
+    if (!work.locked.empty() && gone < kHardlyAny * static_cast<double>(there)) break;
     stuck = work.mesh.triangles.size() == there;
   }
   return contractions;

@@ -17,9 +17,11 @@ struct WorkMesh {
   TriangleMesh& mesh;
   std::vector<Quadric> quadrics;
   meshes::Vec3 centre{};
-  bool floats = false;           ///< all positions are
-  double bound = 0;              ///< how far the mesh may get from what it was; 0: as far as it likes
-  std::vector<Errors> errors{};  ///< of the triangles; empty without a bound
+  bool floats = false;                 ///< all positions are
+  double bound = 0;                    ///< how far the mesh may get from what it was; 0: as far as it likes
+  std::vector<Errors> errors{};        ///< of the triangles; empty without a bound
+  std::vector<std::uint8_t> locked{};  ///< vertices that stay where they are, for good; empty: none
+  double deviation = 0;                ///< largest of all contractions (Contractor::deviation())
 };
 
 /// Sums up planes of triangles and boundary edges.

@@ -3,12 +3,11 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstdint>
-#include <vector>
 
 #include "base/run.h"
 #include "lamina/error.h"
 #include "lamina/measure.h"
+#include "simplify/part.h"
 #include "simplify/rounds.h"
 
 namespace lamina {
@@ -23,29 +22,6 @@ void require_manifold(const TriangleMesh& mesh, const RunContext& run) {
                           "more",
                           r.non_manifold_edges, r.non_manifold_vertices, r.inconsistent_edges, r.duplicate_triangles,
                           r.repeated_index_triangles));
-}
-
-/// Vertices without triangles go; the others keep their order.
-void drop_unused(TriangleMesh& mesh) {
-  std::vector<std::uint32_t> number(mesh.positions.size(), 0);
-  for (const auto& t : mesh.triangles) {
-    for (const std::uint32_t v : t) number[v] = 1;
-  }
-  std::uint32_t kept = 0;
-  for (std::uint32_t v = 0; v < number.size(); ++v) {
-    if (number[v] == 0) continue;
-    number[v] = kept;
-    mesh.positions[kept] = mesh.positions[v];
-    if (!mesh.normals.empty()) mesh.normals[kept] = mesh.normals[v];
-    for (auto& values : mesh.attributes) values[kept] = values[v];
-    ++kept;
-  }
-  mesh.positions.resize(kept);
-  if (!mesh.normals.empty()) mesh.normals.resize(kept);
-  for (auto& values : mesh.attributes) values.resize(kept);
-  for (auto& t : mesh.triangles) {
-    for (std::uint32_t& v : t) v = number[v];
-  }
 }
 
 }  // namespace
@@ -72,7 +48,7 @@ SimplifyStats simplify_mesh(TriangleMesh& mesh, const SimplifySettings& settings
     stats.contractions = settings.error > 0 ? simplify::contract_within(work, run)
                                             : simplify::contract_to(work, settings.triangles, run);
   });
-  drop_unused(mesh);
+  simplify::drop_unused(mesh);
   stats.triangles_after = mesh.triangles.size();
   stats.reached = settings.error > 0 || stats.triangles_after <= settings.triangles;
   return stats;

@@ -1,0 +1,25 @@
+// A tile's content: its mesh as a GLB.
+#pragma once
+#include <array>
+#include <cstdint>
+#include <string>
+
+#include "meshes/vec3.h"
+#include "tiles/tile_mesh.h"
+
+namespace lamina::tiles {
+
+/// In steps of the lattice.
+struct StepBox {
+  meshes::Vec3 low{}, high{};
+};
+
+StepBox box_of_tile(const TriangleMesh& mesh);
+
+/// Binary glTF 2.0 with y up, as 3D Tiles want it: x, z, -y of the lattice. Positions are whole numbers of steps from
+/// the middle of the tile in 16 bits (KHR_mesh_quantization), in floats where these do not do; the node brings them to
+/// units of the mesh from the lattice's origin. Normals in bytes; colours linear, 8 bits in 16, others as floats.
+/// `compress`: EXT_meshopt_compression.
+std::string tile_content(const TriangleMesh& mesh, const TileLattice& lattice, bool compress);
+
+}  // namespace lamina::tiles

@@ -1,0 +1,191 @@
+#include "tiles/tile_source.h"
+
+#include <algorithm>
+#include <deque>
+#include <memory>
+#include <span>
+
+#include "lamina/error.h"
+#include "measure/edge_table.h"
+#include "meshes/block_passes.h"
+
+namespace lamina::tiles {
+namespace {
+
+/// The leaf that each vertex lies in, as they are asked for: neighbours follow each other in meshes that were streamed.
+class VertexLeaves {
+ public:
+  VertexLeaves(meshes::MeshBlocks& mesh, const TileOctree& octree)
+      : mesh_(mesh), octree_(octree), blocks_((mesh.vertices() + meshes::kBlockRows - 1) / meshes::kBlockRows) {}
+
+  std::uint32_t of(std::uint32_t vertex) {
+    const auto& block = blocks_[vertex / meshes::kBlockRows];
+    return (block ? block : load(vertex / meshes::kBlockRows))[vertex % meshes::kBlockRows];
+  }
+
+ private:
+  using Block = std::unique_ptr<std::uint32_t[]>;
+
+  const Block& load(std::size_t number) {
+    constexpr std::size_t kMostBlocks = 4096;  // 64 MB
+    if (loaded_.size() == kMostBlocks) {
+      blocks_[loaded_.front()].reset();
+      loaded_.pop_front();
+    }
+    const std::uint64_t first = std::uint64_t{number} * meshes::kBlockRows;
+    const std::size_t count = std::min<std::uint64_t>(meshes::kBlockRows, mesh_.vertices() - first);
+    mesh_.read_vertices(first, count, rows_);
+    blocks_[number] = std::make_unique<std::uint32_t[]>(meshes::kBlockRows);
+    for (std::size_t v = 0; v < count; ++v) blocks_[number][v] = octree_.leaf_at(rows_.positions[v]);
+    loaded_.push_back(number);
+    return blocks_[number];
+  }
+
+  meshes::MeshBlocks& mesh_;
+  const TileOctree& octree_;
+  std::vector<Block> blocks_;
+  std::deque<std::size_t> loaded_;
+  TriangleMesh rows_;
+};
+
+/// The one that most corners are in, else the first.
+std::uint32_t leaf_of_triangle(const std::array<std::uint32_t, 3>& homes) {
+  if (homes[0] == homes[1] || homes[0] == homes[2]) return homes[0];
+  if (homes[1] == homes[2]) return homes[1];
+  return *std::min_element(homes.begin(), homes.end());
+}
+
+std::vector<std::size_t> colour_attributes(const AttributeLayout& layout) {
+  std::vector<std::size_t> found;
+  for (std::size_t a = 0; a < layout.size(); ++a) {
+    if (is_colour(layout[a].name)) found.push_back(a);
+  }
+  return found;
+}
+
+}  // namespace
+
+TileSource::TileSource(meshes::MeshBlocks& mesh, const TileOctree& octree, const std::string& tmp_dir,
+                       const RunContext& run)
+    : mesh_(mesh),
+      octree_(octree),
+      file_(tmp_dir),
+      leaves_(octree.nodes().size()),
+      most_held_(std::clamp<std::size_t>((std::size_t{48} << 20) / (sizeof(Corners) * leaves_.size()), 32, 1024)),
+      colours_(colour_attributes(mesh.layout())) {
+  read(run);
+}
+
+void TileSource::read(const RunContext& run) {
+  VertexLeaves leaves(mesh_, octree_);
+  std::uint64_t seen = 0;
+  meshes::for_triangles(mesh_, [&](const Corners& t) {
+    if (++seen % (1U << 20) == 0 && run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+    if (measure::repeats_index(t)) {
+      ++left_out_;
+      return;
+    }
+    add(t, {leaves.of(t[0]), leaves.of(t[1]), leaves.of(t[2])});
+  });
+  for (Leaf& leaf : leaves_) spill(leaf);
+  file_.flush();
+  settle_shared();
+}
+
+void TileSource::add(const Corners& corners, const std::array<std::uint32_t, 3>& homes) {
+  const std::uint32_t node = leaf_of_triangle(homes);
+  Leaf& leaf = leaves_[node];
+  leaf.held.push_back(corners);
+  if (leaf.held.size() >= most_held_) spill(leaf);
+  ++triangles_;
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (homes[k] == node) continue;
+    // Most likely it has triangles at home as well.
+    uses_.push_back({corners[k], node});
+    uses_.push_back({corners[k], homes[k]});
+  }
+  if (uses_.size() >= most_uses_) forget_repeated();
+}
+
+void TileSource::spill(Leaf& leaf) {
+  if (leaf.held.empty()) return;
+  leaf.chunks.push_back({file_.append(std::as_bytes(std::span(leaf.held))), leaf.held.size()});
+  leaf.held.clear();
+}
+
+void TileSource::forget_repeated() {
+  std::sort(uses_.begin(), uses_.end());
+  uses_.erase(std::unique(uses_.begin(), uses_.end()), uses_.end());
+  most_uses_ = std::max(most_uses_, 2 * uses_.size());
+}
+
+void TileSource::settle_shared() {
+  forget_repeated();
+  for (std::size_t i = 0; i < uses_.size();) {
+    const std::uint32_t vertex = uses_[i].vertex;
+    std::uint32_t common = uses_[i].leaf;
+    for (; i < uses_.size() && uses_[i].vertex == vertex; ++i) common = octree_.common(common, uses_[i].leaf);
+    shared_.emplace_back(vertex, octree_.nodes()[common].depth);
+  }
+  uses_ = {};
+}
+
+std::vector<TileSource::Corners> TileSource::corners_of(const Leaf& leaf) const {
+  std::size_t count = 0;
+  for (const Chunk& chunk : leaf.chunks) count += chunk.count;
+  std::vector<Corners> corners(count);
+  std::size_t done = 0;
+  for (const Chunk& chunk : leaf.chunks) {
+    file_.read(chunk.offset, std::as_writable_bytes(std::span(corners).subspan(done, chunk.count)));
+    done += chunk.count;
+  }
+  return corners;
+}
+
+TileMesh TileSource::leaf(std::uint32_t node, const TileLattice& lattice) {
+  TileMesh tile;
+  tile.mesh.triangles = corners_of(leaves_[node]);
+  std::vector<std::uint32_t> ids;
+  ids.reserve(3 * tile.mesh.triangles.size());
+  for (const Corners& t : tile.mesh.triangles) ids.insert(ids.end(), t.begin(), t.end());
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  for (Corners& t : tile.mesh.triangles) {
+    for (std::uint32_t& v : t)
+      v = static_cast<std::uint32_t>(std::lower_bound(ids.begin(), ids.end(), v) - ids.begin());
+  }
+  auto from = shared_.begin();
+  for (std::uint32_t v = 0; v < ids.size(); ++v) {
+    from = std::lower_bound(from, shared_.end(), ids[v],
+                            [](const auto& entry, std::uint32_t id) { return entry.first < id; });
+    if (from == shared_.end()) break;
+    if (from->first == ids[v]) tile.shared.push_back({v, ids[v], from->second});
+  }
+  read_vertices(ids, lattice, tile.mesh);
+  return tile;
+}
+
+void TileSource::read_vertices(const std::vector<std::uint32_t>& ids, const TileLattice& lattice, TriangleMesh& out) {
+  constexpr std::uint32_t kWorthReading = 64;  // rows between two that are wanted
+  for (const std::size_t a : colours_) out.layout.push_back(mesh_.layout()[a]);
+  out.attributes.resize(colours_.size());
+  TriangleMesh rows;
+  for (std::size_t begin = 0; begin < ids.size();) {
+    std::size_t end = begin + 1;
+    while (end < ids.size() && ids[end] - ids[end - 1] <= kWorthReading && ids[end] - ids[begin] < meshes::kBlockRows)
+      ++end;
+    {
+      const std::lock_guard lock(reading_);
+      mesh_.read_vertices(ids[begin], ids[end - 1] - ids[begin] + 1, rows);
+    }
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::size_t row = ids[i] - ids[begin];
+      out.positions.push_back(lattice.steps(rows.positions[row]));
+      out.normals.push_back(rows.normals[row]);
+      for (std::size_t a = 0; a < colours_.size(); ++a) out.attributes[a].push_back(rows.attributes[colours_[a]][row]);
+    }
+    begin = end;
+  }
+}
+
+}  // namespace lamina::tiles

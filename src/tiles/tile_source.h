@@ -1,0 +1,66 @@
+// The triangles of a mesh sorted by the leaves of the tree, on disk, and the vertices that several leaves share.
+#pragma once
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/spill_file.h"
+#include "lamina/run.h"
+#include "meshes/writers.h"
+#include "tiles/tile_mesh.h"
+#include "tiles/tile_octree.h"
+
+namespace lamina::tiles {
+
+class TileSource {
+ public:
+  /// Reads all triangles once. Keeps buffers and what is shared: memory goes with the borders of the leaves. Refers to
+  /// all that it is given. Throws Error(internal) when cancelled, Error(budget) for a full disk.
+  TileSource(meshes::MeshBlocks& mesh, const TileOctree& octree, const std::string& tmp_dir, const RunContext& run);
+
+  /// Those of one leaf, with their vertices; safe from several threads. May be empty.
+  [[nodiscard]] TileMesh leaf(std::uint32_t node, const TileLattice& lattice);
+  [[nodiscard]] std::uint64_t triangles() const { return triangles_; }  ///< of all leaves
+  [[nodiscard]] std::uint64_t left_out() const { return left_out_; }    ///< that name a vertex twice
+
+ private:
+  using Corners = std::array<std::uint32_t, 3>;
+  struct Chunk {
+    std::uint64_t offset;
+    std::size_t count;
+  };
+  struct Leaf {
+    std::vector<Corners> held;
+    std::vector<Chunk> chunks;
+  };
+  struct Use {
+    std::uint32_t vertex, leaf;
+    auto operator<=>(const Use&) const = default;
+  };
+
+  void read(const RunContext& run);
+  void add(const Corners& corners, const std::array<std::uint32_t, 3>& homes);
+  void spill(Leaf& leaf);
+  void forget_repeated();
+  void settle_shared();
+  [[nodiscard]] std::vector<Corners> corners_of(const Leaf& leaf) const;
+  void read_vertices(const std::vector<std::uint32_t>& ids, const TileLattice& lattice, TriangleMesh& out);
+
+  meshes::MeshBlocks& mesh_;
+  const TileOctree& octree_;
+  SpillFile file_;
+  std::vector<Leaf> leaves_;  ///< by node
+  std::size_t most_held_;
+  std::vector<Use> uses_;  ///< of vertices in leaves other than their own
+  std::size_t most_uses_ = 1U << 20;
+  std::vector<std::pair<std::uint32_t, int>> shared_;  ///< vertices, ascending, with SharedVertex::depth
+  std::vector<std::size_t> colours_;                   ///< attributes that tiles carry
+  std::uint64_t triangles_ = 0, left_out_ = 0;
+  std::mutex reading_;  ///< of mesh_
+};
+
+}  // namespace lamina::tiles

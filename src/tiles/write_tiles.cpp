@@ -1,0 +1,192 @@
+#include "tiles/write_tiles.h"
+
+#include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/run.h"
+#include "base/staged_folder.h"
+#include "lamina/error.h"
+#include "meshes/held_mesh.h"
+#include "tiles/georeference.h"
+#include "tiles/tile_content.h"
+#include "tiles/tile_mesh.h"
+#include "tiles/tile_octree.h"
+#include "tiles/tile_source.h"
+#include "tiles/tileset.h"
+
+namespace lamina {
+namespace tiles {
+namespace {
+
+constexpr double kMostTriangles = 60'000, kLeastTriangles = 30'000;  ///< of a tile
+constexpr double kShrinks = 0.25;  ///< of its children's triangles a tile has: edges twice as long
+constexpr const char* kContentFolder = "tiles";
+
+/// A leaf is cut by its vertices; a border adds some to every tile.
+std::uint64_t most_leaf_vertices(const meshes::MeshBlocks& mesh) {
+  constexpr double kBeside = 0.96;
+  const double ratio = static_cast<double>(mesh.vertices()) / static_cast<double>(mesh.triangles());
+  return static_cast<std::uint64_t>(std::max(3.0, kBeside * kMostTriangles * ratio));
+}
+
+/// A leaf of usual size fits 16 bits; of a map's coordinates a step is no more than a millimetre.
+TileLattice lattice_of(const Extent& extent, const TileOctree& octree, bool map) {
+  std::vector<double> sides;
+  for (const TileNode& node : octree.nodes()) {
+    if (node.leaf()) sides.push_back(node.side);
+  }
+  const auto middle = sides.begin() + static_cast<std::ptrdiff_t>(sides.size() / 2);
+  std::nth_element(sides.begin(), middle, sides.end());
+  constexpr double kBeside = 1.25;  // triangles reach out of the cells
+  constexpr double kWords = 65534, kMostSteps = 1 << 23;
+  const double longest = extent.longest();
+  TileLattice lattice;
+  if (longest > 0) {
+    double step = std::exp2(std::floor(std::log2(kBeside * *middle / kWords)));
+    if (map) step = std::min(step, std::exp2(-10));
+    lattice.step = std::max(step, std::exp2(std::ceil(std::log2(longest / kMostSteps))));
+  }
+  // A round origin: nothing is lost when it is taken away or added.
+  const double round = longest > 0 ? std::exp2(std::ceil(std::log2(longest)) - 4) : 1;
+  const meshes::Vec3 centre = extent.middle();
+  for (std::size_t k = 0; k < 3; ++k) lattice.origin[k] = std::nearbyint(centre[k] / round) * round;
+  return lattice;
+}
+
+/// Builds the tiles from the leaves up.
+class TileBuilder {
+ public:
+  TileBuilder(TileSource& source, const TileOctree& octree, const TileLattice& lattice, const TileSettings& settings,
+              StagedFolder& folder)
+      : source_(source),
+        octree_(octree),
+        lattice_(lattice),
+        settings_(settings),
+        folder_(folder),
+        entries_(octree.nodes().size()) {}
+
+  /// The tile of a node and all below it, written.
+  TileMesh build(std::uint32_t node, const RunContext& run) {
+    if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+    const TileNode& place = octree_.nodes()[node];
+    if (place.leaf()) {
+      TileMesh tile = source_.leaf(node, lattice_);
+      write(node, tile);
+      return tile;
+    }
+    std::vector<TileMesh> parts(place.children.size());
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, parts.size(), 1),
+        [&](const tbb::blocked_range<std::size_t>& range) {
+          for (std::size_t c = range.begin(); c != range.end(); ++c) parts[c] = build(place.children[c], run);
+        },
+        tbb::simple_partitioner());
+    TileMesh tile = merge_tiles(std::move(parts), place.depth);
+    const auto there = static_cast<double>(tile.mesh.triangles.size());
+    const double wanted = std::clamp(kShrinks * there, kLeastTriangles, kMostTriangles);
+    if (there > wanted) coarsen_tile(tile, static_cast<std::uint64_t>(wanted), run);
+    write(node, tile);
+    return tile;
+  }
+
+  [[nodiscard]] const std::vector<TileEntry>& entries() const { return entries_; }
+
+ private:
+  void write(std::uint32_t node, const TileMesh& tile) {
+    TileEntry& entry = entries_[node];
+    entry.triangles = tile.mesh.triangles.size();
+    if (entry.triangles == 0) return;
+    entry.box = box_of_tile(tile.mesh);
+    entry.error = tile.error;
+    const std::string bytes = tile_content(tile.mesh, lattice_, settings_.compress);
+    entry.bytes = bytes.size();
+    entry.content = fmt::format("{}/{}.glb", kContentFolder, octree_.nodes()[node].name);
+    folder_.write(entry.content, bytes);
+  }
+
+  TileSource& source_;
+  const TileOctree& octree_;
+  const TileLattice& lattice_;
+  const TileSettings& settings_;
+  StagedFolder& folder_;
+  std::vector<TileEntry> entries_;
+};
+
+/// Normals of vertices by the areas of the triangles around them.
+void add_vertex_normals(TriangleMesh& mesh) {
+  using namespace meshes;
+  std::vector<Vec3> sums(mesh.positions.size(), Vec3{});
+  for (const auto& t : mesh.triangles) {
+    const Vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
+    const Vec3 n = cross(b - a, c - a);
+    for (const std::uint32_t v : t) sums[v] = sums[v] + n;
+  }
+  mesh.normals.clear();
+  for (const Vec3& sum : sums) mesh.normals.push_back(to_float(unit(sum)));
+}
+
+std::string temporary_folder_of(const TileSettings& settings, const RunContext& run) {
+  if (!run.tmp_dir.empty()) return run.tmp_dir;
+  const auto parent = std::filesystem::path(settings.folder).lexically_normal().parent_path();
+  return parent.empty() ? "." : parent.string();
+}
+
+}  // namespace
+
+TileStats write_blocks_as_tiles(meshes::MeshBlocks& mesh, const TileSettings& settings, const RunContext& run) {
+  if (mesh.triangles() == 0) {
+    throw Error(ExitCode::unreadable,
+                mesh.vertices() > 0
+                    ? "tiles: there are no triangles, only points; 'lamina surface' makes a mesh of them"
+                    : "tiles: the mesh is empty");
+  }
+  StagedFolder folder(settings.folder);
+  folder.make_folder(kContentFolder);
+  const Extent extent = extent_of(mesh);
+  const TileOctree octree(mesh, extent, most_leaf_vertices(mesh));
+  const std::optional<MapPlane> plane = map_plane(settings.crs);
+  const TileLattice lattice = lattice_of(extent, octree, !settings.crs.empty());
+  TileSource source(mesh, octree, temporary_folder_of(settings, run), run);
+  if (source.triangles() == 0)
+    throw Error(ExitCode::unreadable, "tiles: every triangle of the mesh names a vertex twice");
+  if (source.left_out() > 0)
+    run.warn(fmt::format("tiles: {} triangles that name a vertex twice are left out", source.left_out()));
+  if (!settings.crs.empty() && !plane)
+    run.info("tiles: the coordinate system is no transverse Mercator that is known; tiles have local coordinates");
+  TileBuilder builder(source, octree, lattice, settings, folder);
+  builder.build(0, run);
+  const Tileset tileset{octree, builder.entries(), lattice, settings.crs, plane};
+  folder.write("tileset.json", tileset_json(tileset));
+  folder.publish();
+  return stats_of(tileset);
+}
+
+}  // namespace tiles
+
+TileStats write_tiles(const TriangleMesh& mesh, const TileSettings& settings, const RunContext& run) {
+  TileStats stats;
+  with_threads(run.threads, [&] {
+    if (!mesh.normals.empty() || mesh.triangles.empty()) {
+      meshes::HeldMesh blocks(mesh);
+      stats = tiles::write_blocks_as_tiles(blocks, settings, run);
+      return;
+    }
+    TriangleMesh with_normals = mesh;
+    tiles::add_vertex_normals(with_normals);
+    meshes::HeldMesh blocks(with_normals);
+    stats = tiles::write_blocks_as_tiles(blocks, settings, run);
+  });
+  return stats;
+}
+
+}  // namespace lamina
