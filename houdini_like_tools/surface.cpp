@@ -179,6 +179,7 @@ void run_surface(SurfaceOptions& o) {
     if (v.files.size() > 1)
       context.info(
           fmt::format("{} ... {}: {} files, {}", v.files.front(), v.files.back(), v.files.size(), bytes_text(v.bytes)));
+    if (stats.tiles.tiles > 0) context.info(tiles_text(stats.tiles));
   }
   if (!o.preview.empty() && !settings.dry_run) draw_preview(o, file_to_draw(outputs), context);
   if (!stats_file) return;
@@ -312,6 +313,13 @@ void add_surface(CLI::App& app) {
       ->group(mesh);
 
   add_volume_options(*tool, s.volume);
+  const std::string tiles = "Tiles";
+  tool->add_option("--tiles", s.tiles.folder,
+                   "Also write 3D Tiles, levels of detail for viewers, into this folder, which is made or empty")
+      ->type_name("DIR")
+      ->group(tiles);
+  tool->add_flag("!--tiles-plain", s.tiles.compress, "Their contents without compression (EXT_meshopt_compression)")
+      ->group(tiles);
   add_parts_options(*tool, o->parts);
 
   tool->add_option("--window", s.window,

@@ -20,7 +20,6 @@ struct TilesOptions {
   std::string input;
   TileSettings tiles;
   bool plain = false;
-  BadSamples bad = BadSamples::drop;
   RunOptions run;
 };
 
@@ -28,7 +27,13 @@ void run_tiles(const TilesOptions& o) {
   const RunContext context = make_context(o.run, o.tiles.folder);
   TileSettings settings = o.tiles;
   settings.compress = !o.plain;
-  const TriangleMesh mesh = read_mesh_input(o.input, context, o.bad);
+  const std::string input = pipe_name(o.input);
+  settings.crs = crs_of_mesh(input);
+  if (const auto stats = write_tiles_of_file(input, settings, context)) {
+    context.info(tiles_text(*stats));
+    return;
+  }
+  const TriangleMesh mesh = read_mesh_input(o.input, context);
   if (mesh.triangles.empty())
     throw Error(ExitCode::unreadable, fmt::format("{}: has no faces: a point cloud, not a mesh", shown_name(o.input)));
   context.info(tiles_text(write_tiles(mesh, settings, context)));
@@ -42,7 +47,6 @@ void add_tiles(CLI::App& app) {
   tool->add_option("INPUT", o->input, "Mesh: .ply .obj .off .stl .glb, each also as .gz")->required();
   tool->add_option("-o,--output", o->tiles.folder, "Folder to be made, or an empty one")->required()->type_name("DIR");
   tool->add_flag("--plain", o->plain, "Contents without compression (EXT_meshopt_compression)");
-  add_bad_samples(*tool, o->bad, "Vertices");
   add_run_options(*tool, o->run);
   add_notes(*tool,
             "DIR/tileset.json is what viewers open. Every leaf has 30,000 to 60,000 triangles of the mesh as they are; "

@@ -143,6 +143,11 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
                    {"points", s.volume.points},
                    {"bytes", s.volume.bytes}};
   }
+  if (!settings.tiles.folder.empty()) {
+    j["tiles"] = {{"folder", settings.tiles.folder}, {"tiles", s.tiles.tiles},         {"leaves", s.tiles.leaves},
+                  {"levels", s.tiles.levels},        {"triangles", s.tiles.triangles}, {"bytes", s.tiles.bytes},
+                  {"error", s.tiles.error},          {"on_earth", s.tiles.on_earth}};
+  }
   j["clusters"] = {{"seen", s.clusters.corners},
                    {"collapsed", s.clusters.collapsed},
                    {"patches", s.clusters.patches},

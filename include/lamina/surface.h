@@ -14,6 +14,7 @@
 #include "lamina/normals.h"
 #include "lamina/run.h"
 #include "lamina/sample.h"
+#include "lamina/tiles.h"
 #include "lamina/volume_export.h"
 
 namespace lamina {
@@ -88,6 +89,7 @@ struct SurfaceSettings {
   int window = 1;      ///< >= 1: slabs that each stage advances at once; more is faster on many cores and takes memory
   bool dry_run = false;  ///< only plan: read the input, write nothing
   VolumeExport volume;   ///< grids to write beside the mesh
+  TileSettings tiles;    ///< 3D Tiles to write beside the mesh; their coordinate system is the input's
 };
 
 /// What the settings mean for this cloud. Lengths in the input's units.
@@ -152,6 +154,7 @@ struct SurfaceStats {
   HoleStats holes;
   std::optional<NormalsReport> normals;  ///< where they were found
   VolumeExportStats volume;              ///< where grids were asked for
+  TileStats tiles;                       ///< where they were asked for
   std::vector<StageTime> stages;
   double wall = 0, cpu = 0;
   std::uint64_t peak_memory = 0;  ///< bytes, of the process

@@ -1,6 +1,7 @@
 // Meshes as 3D Tiles: a tree of levels of detail that viewers load piece by piece.
 #pragma once
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "lamina/mesh.h"
@@ -31,5 +32,14 @@ struct TileStats {
 /// empty or cannot be written, Error(unreadable) for a mesh without triangles or with coordinates that are not finite,
 /// Error(internal) when cancelled.
 TileStats write_tiles(const TriangleMesh& mesh, const TileSettings& settings, const RunContext& run = {});
+
+/// The same of a mesh file that need not fit in memory: a binary PLY of triangles, as this program writes them, with
+/// normals. Nothing for any other file, which is to be read whole. Throws Error(unreadable) for a damaged one.
+std::optional<TileStats> write_tiles_of_file(const std::string& path, const TileSettings& settings,
+                                             const RunContext& run = {});
+
+/// The coordinate reference system that a PLY names in a comment (PointSourceInfo::crs); empty where it names none, and
+/// for other files.
+std::string crs_of_mesh(const std::string& path);
 
 }  // namespace lamina

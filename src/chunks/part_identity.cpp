@@ -15,9 +15,9 @@ std::string mesh_settings(const SurfaceSettings& settings) {
   const auto& [input, more_inputs, reading, output, more_outputs, frame, bad_samples, normals, normal_search,
                guess_trade, radius_scale, density, clean, max_radius, blend, refit, steps, step_tolerance, fit, diffuse,
                cell, levels, boundary, cluster, chord, vertex_levels, vertex_curvature, vertex_filled, close_holes,
-               watertight, trim, prune_triangles, prune_size, local, window, dry_run, volume] = settings;
+               watertight, trim, prune_triangles, prune_size, local, window, dry_run, volume, tiles] = settings;
   // Jobs of several runs refuse these: require_mesh_alone().
-  (void)prune_triangles, (void)prune_size, (void)local;
+  (void)prune_triangles, (void)prune_size, (void)local, (void)tiles;
   (void)input, (void)more_inputs, (void)output, (void)more_outputs, (void)normals, (void)normal_search,
       (void)guess_trade, (void)window, (void)dry_run;
   const auto number = [](const std::optional<double>& v) { return v ? fmt::format("{}", *v) : "auto"; };
@@ -51,6 +51,10 @@ void require_mesh_alone(const SurfaceSettings& settings, const std::string& opti
   if (settings.volume.wanted()) {
     throw Error(ExitCode::usage,
                 fmt::format("{} makes the mesh alone: leave --vdb and --vdb-points to a run of their own", option));
+  }
+  if (!settings.tiles.folder.empty()) {
+    throw Error(ExitCode::usage,
+                fmt::format("{} makes the mesh alone: leave --tiles away, and make them of it: lamina tiles", option));
   }
   if (settings.prune_triangles.value_or(0) > 0 || settings.prune_size.value > 0 || settings.local)
     throw Error(ExitCode::usage,

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <functional>
 #include <limits>
 #include <string>
 #include <utility>
@@ -74,13 +75,18 @@ struct MeshSink::Impl {
     }
   }
 
-  void commit(const RunContext& run) {
-    require_open();
-    require_indices();
+  /// All of it in the files.
+  StoredMesh stored() {
     check_written(vertex_writer.flush(output.fd()));
     check_written(face_writer.flush(face_file.get()));
     check_written(writer.drain());
-    const StoredMesh mesh{output.fd(), mesh_header_bytes(settings), face_file.get(), 0, vertices, triangles};
+    return {output.fd(), mesh_header_bytes(settings), face_file.get(), 0, vertices, triangles};
+  }
+
+  void commit(const RunContext& run) {
+    require_open();
+    require_indices();
+    const StoredMesh mesh = stored();
     write_files(
         mesh, settings, [this] { publish(); }, run);
     committed = true;
@@ -150,6 +156,12 @@ std::uint64_t MeshSink::vertices() const {
 }
 std::uint64_t MeshSink::triangles() const {
   return impl_->triangles;
+}
+void MeshSink::read_back(const std::function<void(meshes::MeshBlocks&)>& use, const RunContext& run) {
+  impl_->require_open();
+  impl_->require_indices();
+  const StoredMesh mesh = impl_->stored();
+  use(*stored_blocks(mesh, impl_->settings, run));
 }
 void MeshSink::commit(const RunContext& run) {
   impl_->commit(run);

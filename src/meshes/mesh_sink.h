@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -12,6 +13,10 @@
 
 #include "lamina/attributes.h"
 #include "lamina/run.h"
+
+namespace lamina::meshes {
+class MeshBlocks;
+}
 
 namespace lamina {
 
@@ -61,6 +66,8 @@ class MeshSink {
   void append_triangles(const std::vector<std::array<std::uint32_t, 3>>& triangles);
   [[nodiscard]] std::uint64_t vertices() const;
   [[nodiscard]] std::uint64_t triangles() const;
+  /// Gives what has been appended to `use`, to be read back. Throws what that throws, and as commit().
+  void read_back(const std::function<void(meshes::MeshBlocks&)>& use, const RunContext& run = {});
   /// Fills in the header (`uint` indices where more than 2^31 - 1 vertices need them; up to 2^32 - 1), appends the
   /// faces, renames to the final name; in another format than PLY, which has its own limits, writes the file anew
   /// (see write_files()). Throws Error(budget) on disk full, Error(internal) when cancelled; the name of an output that

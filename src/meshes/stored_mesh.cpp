@@ -74,7 +74,9 @@ class StoredBlocks final : public meshes::MeshBlocks {
     out.resize(count);
     const std::byte* from = bytes_.data();
     for (auto& triangle : out) {
-      ++from;  // how many there are: three
+      if (const auto corners = take<std::uint8_t>(from); corners != 3)
+        throw Error(ExitCode::unreadable,
+                    fmt::format("{}: a face has {} corners, where only triangles are", path_, corners));
       for (std::uint32_t& v : triangle) v = take<std::uint32_t>(from);
     }
   }
@@ -147,6 +149,11 @@ const std::string& staging_path(const MeshSinkSettings& settings) {
 
 void require_outputs(const MeshSinkSettings& settings) {
   for (const std::string& path : other_paths(settings)) const OutputFile trial(path, settings.tmp_dir);
+}
+
+std::unique_ptr<meshes::MeshBlocks> stored_blocks(const StoredMesh& mesh, const MeshSinkSettings& settings,
+                                                  const RunContext& run) {
+  return std::make_unique<StoredBlocks>(mesh, settings, settings.path, run);
 }
 
 void write_files(const StoredMesh& mesh, const MeshSinkSettings& settings, const std::function<void()>& publish,

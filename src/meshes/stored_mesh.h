@@ -2,10 +2,12 @@
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "lamina/run.h"
 #include "meshes/mesh_sink.h"
+#include "meshes/writers.h"
 
 namespace lamina {
 
@@ -24,6 +26,11 @@ const std::string& staging_path(const MeshSinkSettings& settings);
 
 /// Throws Error(budget) naming the first of the other names that cannot be written, Error(usage) as OutputFile does.
 void require_outputs(const MeshSinkSettings& settings);
+
+/// The mesh's records, read as they are asked for; refers to all that it is given. Reading throws Error(internal) when
+/// cancelled, Error(unreadable) for a face that is no triangle.
+std::unique_ptr<meshes::MeshBlocks> stored_blocks(const StoredMesh& mesh, const MeshSinkSettings& settings,
+                                                  const RunContext& run);
 
 /// Writes the mesh under each name in its format: in passes over the records, of which blocks are held, so that memory
 /// does not go with its size. Where one is a PLY, `publish` makes the staged records it, last. A file appears under its

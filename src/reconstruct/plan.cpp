@@ -198,6 +198,8 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
   plan.volume = s.volume;
   plan.volume.shift = cloud.shift;
   plan.volume.crs = cloud.info.crs;
+  plan.tiles = s.tiles;
+  plan.tiles.crs = cloud.shift ? std::string() : cloud.info.crs;  // shifted coordinates are not those of the system
   if (!cloud.info.crs.empty()) plan.comments.push_back("crs " + cloud.info.crs);
   if (cloud.shift) plan.comments.push_back("shift " + shift_text(*cloud.shift));
 }

@@ -60,6 +60,7 @@ struct ReconstructionPlan {
   HoleSettings holes;
   PruneRule pruning;
   VolumeExport volume;
+  TileSettings tiles;
   std::vector<std::string> comments;  ///< of the mesh file
   AttributeLayout mesh_attributes;
   bool double_positions = false;

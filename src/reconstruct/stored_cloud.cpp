@@ -151,6 +151,10 @@ void require_two_files(const SurfaceSettings& settings) {
     if (std::find(outputs.begin(), outputs.end(), grids) != outputs.end() || is_input(grids))
       throw Error(ExitCode::usage, fmt::format("{}: is named twice; give the grids a file of their own", grids));
   }
+  if (std::find(outputs.begin(), outputs.end(), settings.tiles.folder) != outputs.end() &&
+      !settings.tiles.folder.empty())
+    throw Error(ExitCode::usage,
+                fmt::format("{}: is named twice; give the tiles a folder of their own", settings.tiles.folder));
   for (auto name = outputs.begin(); name != outputs.end(); ++name) {
     if (std::find(outputs.begin(), name, *name) != name)
       throw Error(ExitCode::usage, fmt::format("{}: is named twice; give each --output a name of its own", *name));

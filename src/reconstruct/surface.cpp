@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "base/staged_folder.h"
 #include "lamina/error.h"
 #include "levelset/surface_volume.h"
 #include "meshes/mesh_format.h"
@@ -14,6 +15,7 @@
 #include "reconstruct/plan.h"
 #include "reconstruct/pruner.h"
 #include "reconstruct/stored_cloud.h"
+#include "tiles/write_tiles.h"
 
 namespace lamina {
 namespace {
@@ -40,6 +42,21 @@ class PrunedSlabs final : public SlabSink {
   Pruner& pruner_;
 };
 
+/// Tiles that cannot be written do not keep the mesh from being: what was wrong with them.
+std::optional<Error> write_tiles_beside(const ReconstructionPlan& plan, MeshSink& sink, Job& job) {
+  if (plan.tiles.folder.empty()) return std::nullopt;
+  try {
+    const auto write = [&](meshes::MeshBlocks& mesh) {
+      job.stats.tiles = tiles::write_blocks_as_tiles(mesh, plan.tiles, job.run);
+    };
+    job.watch.time("tiles", [&] { sink.read_back(write, job.run); });
+  } catch (const Error& error) {
+    if (job.run.cancelled()) throw;
+    return error;
+  }
+  return std::nullopt;
+}
+
 /// The mesh of a plan into its files, whose names and folder `layout` has.
 void write_surface(const ReconstructionPlan& plan, StoredCloud& cloud, const MeshSinkSettings& layout, Job& job) {
   meshes::warn_of_losses(layout, job.run);
@@ -65,9 +82,11 @@ void write_surface(const ReconstructionPlan& plan, StoredCloud& cloud, const Mes
     volume->commit();
     job.stats.volume = volume->stats();
   }
+  const std::optional<Error> no_tiles = write_tiles_beside(plan, sink, job);
   job.watch.time("commit", [&] { sink.commit(job.run); });
   job.stats.vertices = sink.vertices();
   job.stats.triangles = sink.triangles();
+  if (no_tiles) throw Error(*no_tiles);
 }
 
 void reconstruct(const SurfaceSettings& settings, Job& job) {
@@ -78,6 +97,7 @@ void reconstruct(const SurfaceSettings& settings, Job& job) {
   // An output that cannot be written is better known now than after the input has been read.
   if (!settings.dry_run) {
     const MeshSink trial(out);
+    if (!settings.tiles.folder.empty()) const StagedFolder folder(settings.tiles.folder);
   }
   StoredCloud cloud = read_cloud(settings, out.tmp_dir, job);
   if (settings.local) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 #include <unordered_map>
 
 #include "lamina/error.h"
@@ -52,19 +53,23 @@ Extent extent_of(meshes::MeshBlocks& mesh) {
   return box;
 }
 
-TileOctree::TileOctree(meshes::MeshBlocks& mesh, const Extent& extent, std::uint64_t most)
-    : extent_(extent), most_(std::max<std::uint64_t>(most, 1)) {
+TileOctree::TileOctree(meshes::MeshBlocks& mesh, const Extent& extent, std::uint64_t wanted) : extent_(extent) {
+  constexpr std::uint64_t kCells = 64;  // in a tile
+  most_ = std::max<std::uint64_t>(wanted / kCells, 1);
   const double side = extent.longest();
   scale_ = side > 0 ? std::ldexp(1, kDeepest) / side : 0;
   cells_.emplace_back();
   cells_[0].vertices = mesh.vertices();
-  // A surface has four times as many cells a level; the last ones counted are to be a small part of a tile.
-  const double parts = 64 * static_cast<double>(mesh.vertices()) / static_cast<double>(most_);
+  // A surface has four times as many cells a level.
+  const double parts = static_cast<double>(mesh.vertices()) / static_cast<double>(most_);
   int levels = std::clamp(static_cast<int>(std::ceil(std::log2(std::max(parts, 1.0)) / 2)), 1, 10);
   while (count_and_split(mesh, levels)) levels = 3;
+  std::vector<Filled> filled;
+  list_cells(0, {}, filled);
+  const auto leaves = std::llround(static_cast<double>(mesh.vertices()) / static_cast<double>(wanted));
   nodes_.emplace_back();
   nodes_[0].name = "0";
-  make_tiles(0, 0);
+  make_tiles({filled, static_cast<std::uint64_t>(std::max(leaves, 1LL))}, 0);
 }
 
 std::array<std::uint32_t, 3> TileOctree::place(const Vec3& at) const {
@@ -143,47 +148,74 @@ std::uint32_t TileOctree::add_node(std::uint32_t parent, int digit) {
   return number;
 }
 
-/// The tiles of a cell below a node that stands for it.
-void TileOctree::make_tiles(std::uint32_t cell, std::uint32_t node) {
-  const double side = extent_.longest();
-  while (cells_[cell].split) {  // a cell with one child is that child
-    const auto& child = cells_[cell].child;
-    if (std::count(child.begin(), child.end(), 0U) != 7) break;
-    cells_[cell].tile = node;
-    cell = *std::find_if(child.begin(), child.end(), [](std::uint32_t c) { return c != 0; });
-  }
-  cells_[cell].tile = node;
-  if (!cells_[cell].split) {
-    nodes_[node].side = std::ldexp(side, -cells_[cell].depth);
+void TileOctree::list_cells(std::uint32_t cell, const std::array<double, 3>& low, std::vector<Filled>& out) const {
+  const Cell& here = cells_[cell];
+  const double half = std::ldexp(0.5, kDeepest - here.depth);
+  if (!here.split) {
+    out.push_back({{low[0] + half, low[1] + half, low[2] + half}, half, here.vertices, cell});
     return;
   }
-  // Leaves side by side are filled up to `most_`.
-  std::vector<std::vector<std::uint32_t>> tiles;
-  std::uint64_t filled = 0;
-  std::size_t open = tiles.max_size();
-  const std::array<std::uint32_t, 8> child = cells_[cell].child;
-  for (const std::uint32_t c : child) {
-    if (c == 0) continue;
-    const bool leaf = !cells_[c].split;
-    if (leaf && open < tiles.size() && filled + cells_[c].vertices <= most_) {
-      tiles[open].push_back(c);
-      filled += cells_[c].vertices;
-      continue;
-    }
-    tiles.push_back({c});
-    if (!leaf) continue;
-    open = tiles.size() - 1;
-    filled = cells_[c].vertices;
+  for (std::size_t digit = 0; digit < here.child.size(); ++digit) {
+    if (here.child[digit] == 0) continue;
+    std::array<double, 3> corner = low;
+    for (std::size_t k = 0; k < 3; ++k) corner[k] += (digit >> k & 1U) != 0 ? half : 0;
+    list_cells(here.child[digit], corner, out);
   }
-  for (std::size_t t = 0; t < tiles.size(); ++t) {
-    const std::uint32_t below = add_node(node, static_cast<int>(t));
-    if (tiles[t].size() == 1) {
-      make_tiles(tiles[t][0], below);
-      continue;
-    }
-    for (const std::uint32_t c : tiles[t]) cells_[c].tile = below;
-    nodes_[below].side = std::ldexp(side, -cells_[cell].depth);
+}
+
+/// Cut in two across the longest side, `times` times or until nothing is left to be cut.
+void TileOctree::share_out(const Lot& lot, int times, std::vector<Lot>& out) {
+  if (times == 0 || lot.leaves == 1 || lot.cells.size() == 1) {
+    out.push_back(lot);
+    return;
   }
+  std::array<double, 3> low = lot.cells[0].middle, high = low;
+  std::uint64_t vertices = 0;
+  for (const Filled& cell : lot.cells) {
+    vertices += cell.vertices;
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], cell.middle[k] - cell.half);
+      high[k] = std::max(high[k], cell.middle[k] + cell.half);
+    }
+  }
+  std::size_t axis = 0;
+  for (std::size_t k = 1; k < 3; ++k) {
+    if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
+  }
+  std::sort(lot.cells.begin(), lot.cells.end(), [axis](const Filled& a, const Filled& b) {
+    return std::tie(a.middle[axis], a.cell) < std::tie(b.middle[axis], b.cell);
+  });
+  const std::uint64_t lower = lot.leaves / 2;
+  const double wanted = static_cast<double>(vertices) * static_cast<double>(lower) / static_cast<double>(lot.leaves);
+  std::size_t count = 0;
+  double below = 0;
+  while (count + 1 < lot.cells.size() &&
+         (count == 0 || below + 0.5 * static_cast<double>(lot.cells[count].vertices) < wanted))
+    below += static_cast<double>(lot.cells[count++].vertices);
+  share_out({lot.cells.first(count), lower}, times - 1, out);
+  share_out({lot.cells.subspan(count), lot.leaves - lower}, times - 1, out);
+}
+
+/// A node with few leaves has all of them as children, others have four.
+void TileOctree::make_tiles(const Lot& lot, std::uint32_t node) {
+  constexpr std::uint64_t kMostLeaves = 8;
+  constexpr int kToTheEnd = 4, kInFour = 2;
+  if (lot.leaves == 1 || lot.cells.size() == 1) {
+    std::array<double, 3> low = lot.cells[0].middle, high = low;
+    for (const Filled& cell : lot.cells) {
+      cells_[cell.cell].tile = node;
+      for (std::size_t k = 0; k < 3; ++k) {
+        low[k] = std::min(low[k], cell.middle[k] - cell.half);
+        high[k] = std::max(high[k], cell.middle[k] + cell.half);
+      }
+    }
+    const double longest = std::max({high[0] - low[0], high[1] - low[1], high[2] - low[2]});
+    nodes_[node].side = scale_ > 0 ? longest / scale_ : 0;
+    return;
+  }
+  std::vector<Lot> lots;
+  share_out(lot, lot.leaves <= kMostLeaves ? kToTheEnd : kInFour, lots);
+  for (std::size_t i = 0; i < lots.size(); ++i) make_tiles(lots[i], add_node(node, static_cast<int>(i)));
 }
 
 std::uint32_t TileOctree::leaf_at(const Vec3& at) const {

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -33,12 +34,14 @@ struct TileNode {
   [[nodiscard]] bool leaf() const { return children.empty(); }
 };
 
-/// Cells are cut in eight until none has more than `most` vertices. Neighbouring small ones under one cell are one tile
-/// together; a cell with one tile is that tile. Cut by vertices, of which a mesh has half as many as triangles.
+/// Cells of an octree are cut in eight until none has more than a small part of a tile; tiles are boxes of cells with
+/// nearly as many vertices each, and so are the tiles above them of their tiles. Cut by vertices, of which a mesh has
+/// half as many as triangles.
 class TileOctree {
  public:
-  /// Reads the vertices once, and once more where some lie much closer than others.
-  TileOctree(meshes::MeshBlocks& mesh, const Extent& extent, std::uint64_t most);
+  /// With `wanted` vertices a leaf, more or less. Reads the vertices once, and once more where some lie much closer
+  /// than others.
+  TileOctree(meshes::MeshBlocks& mesh, const Extent& extent, std::uint64_t wanted);
 
   [[nodiscard]] const std::vector<TileNode>& nodes() const {
     return nodes_;
@@ -60,17 +63,31 @@ class TileOctree {
   struct Counted {
     std::uint64_t key, vertices;
   };
+  /// A cell with vertices, in units of the finest.
+  struct Filled {
+    std::array<double, 3> middle{};
+    double half = 0;
+    std::uint64_t vertices = 0;
+    std::uint32_t cell = 0;
+  };
+  /// Cells for some number of leaves.
+  struct Lot {
+    std::span<Filled> cells;
+    std::uint64_t leaves;
+  };
 
   [[nodiscard]] std::array<std::uint32_t, 3> place(const meshes::Vec3& at) const;
   [[nodiscard]] std::uint32_t cell_at(const std::array<std::uint32_t, 3>& place) const;
   bool count_and_split(meshes::MeshBlocks& mesh, int levels);
   void split(std::uint32_t cell, const Counted* begin, const Counted* end, int levels);
-  void make_tiles(std::uint32_t cell, std::uint32_t node);
+  void list_cells(std::uint32_t cell, const std::array<double, 3>& low, std::vector<Filled>& out) const;
+  static void share_out(const Lot& lot, int times, std::vector<Lot>& out);
+  void make_tiles(const Lot& lot, std::uint32_t node);
   std::uint32_t add_node(std::uint32_t parent, int digit);
 
   Extent extent_;
-  double scale_ = 0;  ///< finest cells a unit
-  std::uint64_t most_;
+  double scale_ = 0;        ///< finest cells a unit
+  std::uint64_t most_ = 1;  ///< vertices in a cell
   std::vector<Cell> cells_;
   std::vector<TileNode> nodes_;
 };

@@ -1,5 +1,7 @@
 #include "tiles/tile_source.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <deque>
 #include <memory>
@@ -81,6 +83,10 @@ void TileSource::read(const RunContext& run) {
   std::uint64_t seen = 0;
   meshes::for_triangles(mesh_, [&](const Corners& t) {
     if (++seen % (1U << 20) == 0 && run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+    if (std::max({t[0], t[1], t[2]}) >= mesh_.vertices()) {
+      throw Error(ExitCode::unreadable, fmt::format("tiles: triangle {} names vertex {}, the mesh has {}", seen - 1,
+                                                    std::max({t[0], t[1], t[2]}), mesh_.vertices()));
+    }
     if (measure::repeats_index(t)) {
       ++left_out_;
       return;

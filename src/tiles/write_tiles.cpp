@@ -17,6 +17,8 @@
 #include "base/staged_folder.h"
 #include "lamina/error.h"
 #include "meshes/held_mesh.h"
+#include "meshes/stored_mesh.h"
+#include "meshes/stored_ply.h"
 #include "tiles/georeference.h"
 #include "tiles/tile_content.h"
 #include "tiles/tile_mesh.h"
@@ -28,15 +30,13 @@ namespace lamina {
 namespace tiles {
 namespace {
 
-constexpr double kMostTriangles = 60'000, kLeastTriangles = 30'000;  ///< of a tile
 constexpr double kShrinks = 0.25;  ///< of its children's triangles a tile has: edges twice as long
 constexpr const char* kContentFolder = "tiles";
 
-/// A leaf is cut by its vertices; a border adds some to every tile.
-std::uint64_t most_leaf_vertices(const meshes::MeshBlocks& mesh) {
-  constexpr double kBeside = 0.96;
+/// A leaf is cut by its vertices.
+std::uint64_t leaf_vertices(const meshes::MeshBlocks& mesh, double triangles) {
   const double ratio = static_cast<double>(mesh.vertices()) / static_cast<double>(mesh.triangles());
-  return static_cast<std::uint64_t>(std::max(3.0, kBeside * kMostTriangles * ratio));
+  return static_cast<std::uint64_t>(std::max(3.0, triangles * ratio));
 }
 
 /// A leaf of usual size fits 16 bits; of a map's coordinates a step is no more than a millimetre.
@@ -66,12 +66,13 @@ TileLattice lattice_of(const Extent& extent, const TileOctree& octree, bool map)
 /// Builds the tiles from the leaves up.
 class TileBuilder {
  public:
-  TileBuilder(TileSource& source, const TileOctree& octree, const TileLattice& lattice, const TileSettings& settings,
-              StagedFolder& folder)
+  TileBuilder(TileSource& source, const TileOctree& octree, const TileLattice& lattice, const TileSizes& sizes,
+              bool compress, StagedFolder& folder)
       : source_(source),
         octree_(octree),
         lattice_(lattice),
-        settings_(settings),
+        sizes_(sizes),
+        compress_(compress),
         folder_(folder),
         entries_(octree.nodes().size()) {}
 
@@ -93,7 +94,7 @@ class TileBuilder {
         tbb::simple_partitioner());
     TileMesh tile = merge_tiles(std::move(parts), place.depth);
     const auto there = static_cast<double>(tile.mesh.triangles.size());
-    const double wanted = std::clamp(kShrinks * there, kLeastTriangles, kMostTriangles);
+    const double wanted = std::clamp(kShrinks * there, sizes_.least, sizes_.most);
     if (there > wanted) coarsen_tile(tile, static_cast<std::uint64_t>(wanted), run);
     write(node, tile);
     return tile;
@@ -108,7 +109,7 @@ class TileBuilder {
     if (entry.triangles == 0) return;
     entry.box = box_of_tile(tile.mesh);
     entry.error = tile.error;
-    const std::string bytes = tile_content(tile.mesh, lattice_, settings_.compress);
+    const std::string bytes = tile_content(tile.mesh, lattice_, compress_);
     entry.bytes = bytes.size();
     entry.content = fmt::format("{}/{}.glb", kContentFolder, octree_.nodes()[node].name);
     folder_.write(entry.content, bytes);
@@ -117,7 +118,8 @@ class TileBuilder {
   TileSource& source_;
   const TileOctree& octree_;
   const TileLattice& lattice_;
-  const TileSettings& settings_;
+  TileSizes sizes_;
+  bool compress_;
   StagedFolder& folder_;
   std::vector<TileEntry> entries_;
 };
@@ -143,7 +145,8 @@ std::string temporary_folder_of(const TileSettings& settings, const RunContext& 
 
 }  // namespace
 
-TileStats write_blocks_as_tiles(meshes::MeshBlocks& mesh, const TileSettings& settings, const RunContext& run) {
+TileStats write_blocks_as_tiles(meshes::MeshBlocks& mesh, const TileSettings& settings, const RunContext& run,
+                                const TileSizes& sizes) {
   if (mesh.triangles() == 0) {
     throw Error(ExitCode::unreadable,
                 mesh.vertices() > 0
@@ -153,7 +156,7 @@ TileStats write_blocks_as_tiles(meshes::MeshBlocks& mesh, const TileSettings& se
   StagedFolder folder(settings.folder);
   folder.make_folder(kContentFolder);
   const Extent extent = extent_of(mesh);
-  const TileOctree octree(mesh, extent, most_leaf_vertices(mesh));
+  const TileOctree octree(mesh, extent, leaf_vertices(mesh, sizes.leaf));
   const std::optional<MapPlane> plane = map_plane(settings.crs);
   const TileLattice lattice = lattice_of(extent, octree, !settings.crs.empty());
   TileSource source(mesh, octree, temporary_folder_of(settings, run), run);
@@ -163,7 +166,7 @@ TileStats write_blocks_as_tiles(meshes::MeshBlocks& mesh, const TileSettings& se
     run.warn(fmt::format("tiles: {} triangles that name a vertex twice are left out", source.left_out()));
   if (!settings.crs.empty() && !plane)
     run.info("tiles: the coordinate system is no transverse Mercator that is known; tiles have local coordinates");
-  TileBuilder builder(source, octree, lattice, settings, folder);
+  TileBuilder builder(source, octree, lattice, sizes, settings.compress, folder);
   builder.build(0, run);
   const Tileset tileset{octree, builder.entries(), lattice, settings.crs, plane};
   folder.write("tileset.json", tileset_json(tileset));
@@ -187,6 +190,22 @@ TileStats write_tiles(const TriangleMesh& mesh, const TileSettings& settings, co
     stats = tiles::write_blocks_as_tiles(blocks, settings, run);
   });
   return stats;
+}
+
+std::optional<TileStats> write_tiles_of_file(const std::string& path, const TileSettings& settings,
+                                             const RunContext& run) {
+  const std::optional<meshes::StoredPly> ply = meshes::open_stored_ply(path);
+  if (!ply) return std::nullopt;
+  TileStats stats;
+  with_threads(run.threads, [&] {
+    const auto blocks = stored_blocks(ply->mesh, ply->layout, run);
+    stats = tiles::write_blocks_as_tiles(*blocks, settings, run);
+  });
+  return stats;
+}
+
+std::string crs_of_mesh(const std::string& path) {
+  return meshes::crs_of_ply(path);
 }
 
 }  // namespace lamina
