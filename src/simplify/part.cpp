@@ -17,9 +17,9 @@ bool same_direction(const TriangleMesh& mesh, const measure::Side& a, const meas
 }
 
 /// Contractions know manifolds only.
-void lock_non_manifold(const TriangleMesh& mesh, std::vector<std::uint8_t>& locked) {
+void lock_non_manifold(const TriangleMesh& mesh, const measure::EdgeTable& edges, std::vector<std::uint8_t>& locked) {
   std::vector<std::uint8_t> rims(mesh.positions.size(), 0);  // edges of one triangle at a vertex, up to 3
-  measure::EdgeTable(mesh).for_each_edge([&](std::span<const measure::Side> sides) {
+  edges.for_each_edge([&](std::span<const measure::Side> sides) {
     const std::uint32_t corner = sides[0].corner;
     const auto& t = mesh.triangles[corner / 3];
     const bool wrong = sides.size() > 2 || (sides.size() == 2 && same_direction(mesh, sides[0], sides[1]));
@@ -60,8 +60,9 @@ std::vector<std::uint32_t> drop_unused(TriangleMesh& mesh) {
 
 PartResult simplify_part(TriangleMesh& mesh, std::vector<std::uint8_t> locked, std::uint64_t triangles,
                          const RunContext& run) {
-  lock_non_manifold(mesh, locked);
-  WorkMesh work = make_work_mesh(mesh);
+  const measure::EdgeTable edges(mesh);
+  lock_non_manifold(mesh, edges, locked);
+  WorkMesh work = make_work_mesh(mesh, edges);
   work.locked = std::move(locked);
   contract_to(work, triangles, run);
   PartResult result;

@@ -140,6 +140,7 @@ class Round {
       piece.centre = work_.centre;
       piece.floats = work_.floats;
       piece.bound = work_.bound;
+      piece.triangles.reserve(triangles_of(p).size());
       for (const std::uint32_t t : triangles_of(p)) {
         Triangle local = triangles[t];
         for (std::uint32_t& v : local) {
@@ -152,6 +153,9 @@ class Round {
         piece.triangles.push_back(local);
         if (work_.bound > 0) piece.errors.push_back(work_.errors[t]);
       }
+      piece.positions.reserve(vertices.size());
+      piece.quadrics.reserve(vertices.size());
+      piece.fixed.reserve(vertices.size());
       for (const std::uint32_t v : vertices) {
         number[v] = kNone;
         piece.positions.push_back(at(v));
@@ -220,7 +224,7 @@ class Round {
 
 }  // namespace
 
-WorkMesh make_work_mesh(TriangleMesh& mesh) {
+WorkMesh make_work_mesh(TriangleMesh& mesh, const measure::EdgeTable& edges) {
   WorkMesh work{mesh, std::vector<Quadric>(mesh.positions.size())};
   Vec3 low = mesh.positions[mesh.triangles[0][0]], high = low;
   work.floats = true;
@@ -244,7 +248,7 @@ WorkMesh make_work_mesh(TriangleMesh& mesh) {
     const Quadric plane = plane_quadric(at(t[0]), (1 / twice) * n, 0.5 * twice, kNormalNoise);
     for (const std::uint32_t v : t) work.quadrics[v] += plane;
   }
-  measure::EdgeTable(mesh).for_each_edge([&](std::span<const measure::Side> sides) {
+  edges.for_each_edge([&](std::span<const measure::Side> sides) {
     if (sides.size() != 1) return;
     const std::uint32_t corner = sides[0].corner;
     const Triangle& t = mesh.triangles[corner / 3];

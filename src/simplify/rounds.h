@@ -8,6 +8,7 @@
 
 #include "lamina/mesh.h"
 #include "lamina/run.h"
+#include "measure/edge_table.h"
 #include "simplify/contractor.h"
 
 namespace lamina::simplify {
@@ -24,8 +25,8 @@ struct WorkMesh {
   double deviation = 0;                ///< largest of all contractions (Contractor::deviation())
 };
 
-/// Sums up planes of triangles and boundary edges.
-WorkMesh make_work_mesh(TriangleMesh& mesh);
+/// Sums up planes of triangles and boundary edges. `edges`: of the mesh.
+WorkMesh make_work_mesh(TriangleMesh& mesh, const measure::EdgeTable& edges);
 
 /// Contracts edges until `wanted` triangles are left, or no edge can go. Returns the number of contractions. Vertices
 /// that have gone stay in the arrays. Throws Error(internal) when cancelled.

@@ -7,6 +7,7 @@
 #include "base/run.h"
 #include "lamina/error.h"
 #include "lamina/measure.h"
+#include "measure/edge_table.h"
 #include "simplify/part.h"
 #include "simplify/rounds.h"
 
@@ -43,7 +44,7 @@ SimplifyStats simplify_mesh(TriangleMesh& mesh, const SimplifySettings& settings
   SimplifyStats stats;
   stats.triangles_before = mesh.triangles.size();
   with_threads(run.threads, [&] {
-    simplify::WorkMesh work = simplify::make_work_mesh(mesh);
+    simplify::WorkMesh work = simplify::make_work_mesh(mesh, measure::EdgeTable(mesh));
     work.bound = settings.error;
     stats.contractions = settings.error > 0 ? simplify::contract_within(work, run)
                                             : simplify::contract_to(work, settings.triangles, run);

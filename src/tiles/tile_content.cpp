@@ -130,7 +130,8 @@ TileOrder order_of(const TriangleMesh& mesh) {
   given.reserve(3 * mesh.triangles.size());
   for (const auto& t : mesh.triangles) given.insert(given.end(), t.begin(), t.end());
   order.indices.resize(given.size());
-  meshopt_optimizeVertexCache(order.indices.data(), given.data(), given.size(), vertices);
+  constexpr unsigned int kCache = 16;
+  meshopt_optimizeVertexCacheFifo(order.indices.data(), given.data(), given.size(), vertices, kCache);
   constexpr std::uint32_t kUnplaced = 0xFFFFFFFF;
   std::vector<std::uint32_t> place(vertices, kUnplaced);
   for (unsigned int& v : order.indices) {
@@ -170,6 +171,7 @@ void add_positions(ContentWriter& writer, ContentJson& primitive, const Triangle
   bool words = true;
   for (std::size_t k = 0; k < 3; ++k) words = words && low[k] >= -kMost && high[k] <= kMost;
   std::string rows, coded;
+  rows.reserve(12 * count);
   for (const std::uint32_t v : order.vertices) {
     for (const double c : y_up(mesh.positions[v] - middle)) {
       if (words) {

@@ -25,6 +25,15 @@ TileMesh merge_tiles(std::vector<TileMesh> parts, int depth) {
   std::vector<SharedVertex> shared;
   all.mesh.layout = parts[0].mesh.layout;
   all.mesh.attributes.resize(all.mesh.layout.size());
+  std::size_t vertices = 0, triangles = 0;
+  for (const TileMesh& part : parts) {
+    vertices += part.mesh.positions.size();
+    triangles += part.mesh.triangles.size();
+  }
+  all.mesh.positions.reserve(vertices);
+  all.mesh.normals.reserve(vertices);
+  for (auto& values : all.mesh.attributes) values.reserve(vertices);
+  all.mesh.triangles.reserve(triangles);
   for (TileMesh& part : parts) {
     const auto first = static_cast<std::uint32_t>(all.mesh.positions.size());
     for (SharedVertex v : part.shared) {

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <deque>
 #include <memory>
 #include <span>
@@ -56,6 +57,51 @@ std::uint32_t leaf_of_triangle(const std::array<std::uint32_t, 3>& homes) {
   if (homes[1] == homes[2]) return homes[1];
   return *std::min_element(homes.begin(), homes.end());
 }
+
+/// The vertices of some triangles, numbered in ascending order: a bit for each of the range they lie in.
+class VertexNumbers {
+ public:
+  explicit VertexNumbers(std::span<const std::array<std::uint32_t, 3>> triangles) {
+    if (triangles.empty()) return;
+    low_ = triangles[0][0];
+    std::uint32_t high = low_;
+    for (const auto& t : triangles) {
+      low_ = std::min({low_, t[0], t[1], t[2]});
+      high = std::max({high, t[0], t[1], t[2]});
+    }
+    words_.resize((high - low_) / 64 + 1);
+    for (const auto& t : triangles) {
+      for (const std::uint32_t v : t) words_[(v - low_) / 64].bits |= std::uint64_t{1} << (v - low_) % 64;
+    }
+    std::uint32_t before = 0;
+    for (Word& word : words_) {
+      word.before = before;
+      before += static_cast<std::uint32_t>(std::popcount(word.bits));
+    }
+  }
+
+  [[nodiscard]] std::uint32_t of(std::uint32_t vertex) const {
+    const Word& word = words_[(vertex - low_) / 64];
+    const std::uint64_t below = (std::uint64_t{1} << (vertex - low_) % 64) - 1;
+    return word.before + static_cast<std::uint32_t>(std::popcount(word.bits & below));
+  }
+  [[nodiscard]] std::vector<std::uint32_t> vertices() const {
+    std::vector<std::uint32_t> all;
+    for (std::size_t w = 0; w < words_.size(); ++w) {
+      for (std::uint64_t bits = words_[w].bits; bits != 0; bits &= bits - 1)
+        all.push_back(low_ + static_cast<std::uint32_t>(64 * w + static_cast<std::size_t>(std::countr_zero(bits))));
+    }
+    return all;
+  }
+
+ private:
+  struct Word {
+    std::uint64_t bits = 0;
+    std::uint32_t before = 0;  ///< vertices in the words before it
+  };
+  std::vector<Word> words_;
+  std::uint32_t low_ = 0;
+};
 
 std::vector<std::size_t> colour_attributes(const AttributeLayout& layout) {
   std::vector<std::size_t> found;
@@ -151,15 +197,11 @@ std::vector<TileSource::Corners> TileSource::corners_of(const Leaf& leaf) const 
 TileMesh TileSource::leaf(std::uint32_t node, const TileLattice& lattice) {
   TileMesh tile;
   tile.mesh.triangles = corners_of(leaves_[node]);
-  std::vector<std::uint32_t> ids;
-  ids.reserve(3 * tile.mesh.triangles.size());
-  for (const Corners& t : tile.mesh.triangles) ids.insert(ids.end(), t.begin(), t.end());
-  std::sort(ids.begin(), ids.end());
-  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  const VertexNumbers numbers(tile.mesh.triangles);
   for (Corners& t : tile.mesh.triangles) {
-    for (std::uint32_t& v : t)
-      v = static_cast<std::uint32_t>(std::lower_bound(ids.begin(), ids.end(), v) - ids.begin());
+    for (std::uint32_t& v : t) v = numbers.of(v);
   }
+  const std::vector<std::uint32_t> ids = numbers.vertices();
   auto from = shared_.begin();
   for (std::uint32_t v = 0; v < ids.size(); ++v) {
     from = std::lower_bound(from, shared_.end(), ids[v],
@@ -175,6 +217,9 @@ void TileSource::read_vertices(const std::vector<std::uint32_t>& ids, const Tile
   constexpr std::uint32_t kWorthReading = 64;  // rows between two that are wanted
   for (const std::size_t a : colours_) out.layout.push_back(mesh_.layout()[a]);
   out.attributes.resize(colours_.size());
+  out.positions.reserve(ids.size());
+  out.normals.reserve(ids.size());
+  for (auto& values : out.attributes) values.reserve(ids.size());
   TriangleMesh rows;
   for (std::size_t begin = 0; begin < ids.size();) {
     std::size_t end = begin + 1;
