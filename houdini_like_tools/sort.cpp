@@ -57,9 +57,6 @@ void run_store(SortOptions& o) {
 
 void run_sort(SortOptions& o) {
   if (!o.store.empty()) return run_store(o);
-  if (o.output.empty()) throw Error(ExitCode::usage, "--output is required, or --store");
-  if (o.inputs.size() > 1)
-    throw Error(ExitCode::usage, "several inputs go into a --store only; put them into one file first: lamina merge");
   const RunContext context = make_context(o.run, o.output);
   const auto source = open_point_input(o.inputs.front(), o.points, context);
   const auto writer = open_points_writer(
@@ -164,6 +161,12 @@ void add_sort(CLI::App& app) {
                "  lamina sort scan.ply --store scan.store\n"
                "  lamina sort scan.ply --store cleaned.store --outliers 3 --normals auto\n"
                "  lamina sort scan.ply --attribute confidence --reverse -o best_first.ply");
+  tool->parse_complete_callback([o] {
+    if (!o->store.empty()) return;
+    if (o->output.empty()) throw CLI::ValidationError("--output is required, or --store");
+    if (o->inputs.size() > 1)
+      throw CLI::ValidationError("several inputs go into a --store only; put them into one file first: lamina merge");
+  });
   tool->callback([o] { run_sort(*o); });
 }
 

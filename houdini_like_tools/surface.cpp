@@ -362,9 +362,11 @@ void add_surface(CLI::App& app) {
                "  lamina surface scan.ply --dry-run\n"
                "  lamina surface scan.ply --preset photogrammetry --prune 50 -o mesh_of_photos.ply\n"
                "  lamina surface scan.ply -o smooth.ply --blend 2 --vdb smooth.vdb --stats smooth.json");
-  tool->callback([o, tool, output, dry] {
+  tool->parse_complete_callback([o, output, dry] {
+    if (output->count() == 0 && dry->count() == 0 && o->parts.tasks == 0) throw CLI::RequiredError("--output");
+  });
+  tool->callback([o, tool] {
     if (o->parts.tasks > 0) return print_tasks(*tool, o->inputs.front(), o->outputs, o->parts);
-    if (output->count() == 0 && dry->count() == 0) throw CLI::RequiredError("--output");
     run_surface(*o);
   });
 }

@@ -13,6 +13,7 @@
 
 #include "common/console.h"
 #include "common/help.h"
+#include "common/job.h"
 #include "common/text.h"
 #include "lamina/error.h"
 #include "lamina/ranks.h"
@@ -98,6 +99,22 @@ bool is_short_of_memory(const std::exception& e) {
 
 }  // namespace
 
+Failure failure_in_flight() {
+  try {
+    throw;
+  } catch (const Error& e) {
+    return {e.code(), e.what()};
+  } catch (const CLI::ParseError& e) {
+    return {ExitCode::usage, e.what()};
+  } catch (const std::bad_alloc&) {
+    return {ExitCode::budget, "out of memory; free some, or see --max-memory to plan the job"};
+  } catch (const std::exception& e) {
+    const bool short_of = is_short_of_memory(e);
+    return {short_of ? ExitCode::budget : ExitCode::internal,
+            fmt::format("{}: {}", short_of ? "out of memory for threads" : "internal error", e.what())};
+  }
+}
+
 int run_program(int argc, const char* const* argv, const std::vector<AddTool>& tools) {
   CLI::App app{"Lamina: streaming surface reconstruction from oriented points", "lamina"};
   app.set_version_flag("--version", "lamina " + std::string(version()));
@@ -106,6 +123,7 @@ int run_program(int argc, const char* const* argv, const std::vector<AddTool>& t
   app.get_formatter()->label("SUBCOMMAND", "TOOL");
   try {
     for (const AddTool add : tools) add(app);
+    add_jobs(app, tools);
     for (CLI::App* tool : app.get_subcommands({}))
       if (!tool->get_group().empty()) tool->group("Tools");
     cancel_on_signals();
@@ -113,16 +131,10 @@ int run_program(int argc, const char* const* argv, const std::vector<AddTool>& t
     return exit_code(ExitCode::ok);
   } catch (const CLI::ParseError& e) {
     return answer_parse_error(app, e);
-  } catch (const Error& e) {
-    complain("lamina: {}\n", e.what());
-    return exit_code(e.code());
-  } catch (const std::bad_alloc&) {
-    complain("lamina: out of memory; free some, or see --max-memory to plan the job\n");
-    return exit_code(ExitCode::budget);
-  } catch (const std::exception& e) {
-    const bool short_of = is_short_of_memory(e);
-    complain("lamina: {}: {}\n", short_of ? "out of memory for threads" : "internal error", e.what());
-    return exit_code(short_of ? ExitCode::budget : ExitCode::internal);
+  } catch (...) {
+    const Failure failure = failure_in_flight();
+    complain("lamina: {}\n", failure.reason);
+    return exit_code(failure.code);
   }
 }
 

@@ -13,6 +13,7 @@ namespace lamina::tools {
 namespace {
 
 constexpr std::array kRunOptions{"--threads", "--quiet", "--tmp-dir", "--max-memory"};
+constexpr std::string_view kEverywhere = "--print-job";
 
 constexpr std::string_view kPreface = R"(# Reference
 
@@ -155,7 +156,8 @@ std::string tool_section(const CLI::App& tool) {
   const bool shared = has_all_run_options(table);
   std::vector<OptionEntry> own;
   for (const OptionEntry& entry : table) {
-    if (entry.names.back() == "--help" || (shared && is_run_option(entry))) continue;
+    if (entry.names.back() == "--help" || entry.names.back() == kEverywhere || (shared && is_run_option(entry)))
+      continue;
     own.push_back(entry);
     if (entry.positional) own.back().group = "Arguments";
   }
@@ -175,12 +177,14 @@ std::string run_section(const std::vector<const CLI::App*>& tools) {
     if (!has_all_run_options(table)) {
       without.push_back(tool->get_name());
     } else if (options.empty()) {
-      std::copy_if(table.begin(), table.end(), std::back_inserter(options), is_run_option);
+      std::copy_if(table.begin(), table.end(), std::back_inserter(options),
+                   [](const OptionEntry& entry) { return is_run_option(entry) || entry.names.back() == kEverywhere; });
     }
   }
-  std::string text =
-      fmt::format("\n## Run options\n\nAll tools but `{}` take these.\n\n| | default | meaning |\n|---|---|---|\n",
-                  fmt::join(without, "`, `"));
+  std::string text = fmt::format(
+      "\n## Run options\n\nAll tools but `{}` take these, and every tool takes `{}` ([jobs.md](jobs.md)).\n\n"
+      "| | default | meaning |\n|---|---|---|\n",
+      fmt::join(without, "`, `"), kEverywhere);
   for (const OptionEntry& entry : options) text += row(entry);
   return text;
 }

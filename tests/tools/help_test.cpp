@@ -52,6 +52,7 @@ TEST(Help, EveryExampleOfEveryToolWorks) {
   sphere_mesh(folder / "mesh.ply");
   sphere_mesh(folder / "other.obj", 1.01);
   ASSERT_EQ(run_lamina({"convert", folder / "mesh.ply", "--voxelsize", "0.05", "-o", folder / "mesh.vdb"}).code, 0);
+  write_file(folder / "job.json", run_lamina({"check", folder / "mesh.ply", "--print-job"}).out);
   for (const std::string& tool : tools()) {
     const auto lines = examples(run_lamina({tool, "--help"}).out);
     EXPECT_FALSE(lines.empty()) << tool << " has no example";
