@@ -85,13 +85,13 @@ void add_clip(CLI::App& app) {
   auto o = std::make_shared<ClipOptions>();
   add_files(*tool, o->input, "Points (streamed), mesh (triangles are cut) or .vdb (voxels are kept or not)", o->output,
             "File of the same kind");
-  add_numbers(*tool, "--box", ',', 6, "X0,Y0,Z0,X1,Y1,Z1", "Keep what lies in this box, given by two corners",
+  add_numbers(*tool, "--box", {"X0,Y0,Z0,X1,Y1,Z1", 6}, "Keep what lies in this box, given by two corners",
               [o](const auto& v) {
                 o->region.box = Box{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
               })
       ->group("Region");
   add_repeated_numbers(
-      *tool, "--plane", 6, "X,Y,Z,NX,NY,NZ",
+      *tool, "--plane", {"X,Y,Z,NX,NY,NZ", 6},
       "Keep what lies on the side of the plane through X,Y,Z to which NX,NY,NZ points; may be repeated",
       [o](const auto& v) {
         o->region.half_spaces.push_back({{v[0], v[1], v[2]}, {v[3], v[4], v[5]}});

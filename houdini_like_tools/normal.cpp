@@ -57,6 +57,7 @@ void run_normal(NormalOptions& o) {
   for (const std::string& name : o.inputs) names.push_back(pipe_name(name));
   PointSettings reading = o.reading;
   reading.tmp_dir = context.tmp_dir;
+  reading.all_fields = true;
   std::unique_ptr<PointSource> source = open_points(names, reading);
   for (const std::string& remark : source->info().remarks) context.info(remark);
   const std::string path = shown_name(source->info().path);

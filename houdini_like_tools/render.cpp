@@ -55,7 +55,7 @@ void run_render(const RenderOptions& o) {
 }
 
 void add_camera_options(CLI::App& tool, RenderSettings& s) {
-  add_numbers(tool, "--view", ',', 2, "AZIMUTH,ELEVATION",
+  add_numbers(tool, "--view", {"AZIMUTH,ELEVATION", 2},
               "Where the camera stands, in degrees around and above; 0,0 is the front [30,20]",
               [&s](const auto& v) {
                 s.azimuth = v[0];
@@ -77,7 +77,7 @@ void add_camera_options(CLI::App& tool, RenderSettings& s) {
       ->check(CLI::IsMember({"x", "y", "z"}).description(""))
       ->type_name("x|y|z")
       ->group("Camera");
-  add_numbers(tool, "--zoom", ',', 4, "X,Y,Z,RADIUS",
+  add_numbers(tool, "--zoom", {"X,Y,Z,RADIUS", 4},
               "Look at a place: this ball fills the picture, and what hides it is cut away [everything]",
               [&s](const auto& v) {
                 if (!(v[3] > 0)) throw CLI::ValidationError("--zoom", "the radius must be positive");
@@ -117,7 +117,7 @@ void add_paint_options(CLI::App& tool, PaintOptions& paint) {
   tool.add_option("--reference", paint.reference, "The mesh or .vdb level set from which --paint distance measures")
       ->type_name("FILE")
       ->group("Look");
-  add_numbers(tool, "--paint-range", ',', 2, "LOW,HIGH",
+  add_numbers(tool, "--paint-range", {"LOW,HIGH", 2},
               "Values of the first and the last colour [0, or the least, and what 99 % do not exceed]",
               [&paint](const auto& v) {
                 if (!(v[1] > v[0])) throw CLI::ValidationError("--paint-range", "HIGH must be above LOW");
@@ -155,7 +155,7 @@ void add_render(CLI::App& app) {
       ->required()
       ->type_name("FILE")
       ->group("Picture");
-  add_numbers(*tool, "--size", 'x', 2, "WxH", "Pixels of the whole picture, sides of 1 to 16384 [1024x1024]",
+  add_numbers(*tool, "--size", {"WxH", 2, 'x'}, "Pixels of the whole picture, sides of 1 to 16384 [1024x1024]",
               [o](const std::vector<double>& v) {
                 for (const double side : v) {
                   if (side != std::floor(side) || side < 1 || side > 16384) {

@@ -113,17 +113,17 @@ void add_transform(CLI::App& app) {
           "First: multiply by this, one number or one for each axis")
       ->type_name("S|X,Y,Z")
       ->group(group);
-  add_numbers(*tool, "--rotate", ',', 3, "X,Y,Z", "Then turn about the x, then the y, then the z axis, degrees",
+  add_numbers(*tool, "--rotate", {"X,Y,Z", 3}, "Then turn about the x, then the y, then the z axis, degrees",
               [o](const auto& v) { o->settings.rotate = vector(v); })
       ->group(group);
-  add_numbers(*tool, "--translate", ',', 3, "X,Y,Z", "Last: move by this", [o](const auto& v) {
+  add_numbers(*tool, "--translate", {"X,Y,Z", 3}, "Last: move by this", [o](const auto& v) {
     o->settings.translate = vector(v);
   })->group(group);
-  add_numbers(*tool, "--pivot", ',', 3, "X,Y,Z", "Turn and scale about this point [0,0,0]", [o](const auto& v) {
+  add_numbers(*tool, "--pivot", {"X,Y,Z", 3}, "Turn and scale about this point [0,0,0]", [o](const auto& v) {
     o->settings.pivot = vector(v);
   })->group(group);
   auto* matrix =
-      add_numbers(*tool, "--matrix", ',', 16, "M11,M12,...,M44",
+      add_numbers(*tool, "--matrix", {"M11,M12,...,M44", 16},
                   "Instead: a 4x4 matrix row by row, the translation in the last column", [o](const auto& v) {
                     o->has_matrix = true;
                     for (int i = 0; i < 16; ++i) o->matrix(i / 4, i % 4) = v[static_cast<std::size_t>(i)];

@@ -94,7 +94,8 @@ void add_point_options(CLI::App& app, PointSettings& reading, const std::string&
            for (const std::string& text : texts) select.where.push_back(condition_of(text));
          },
          "Only points with such a value, as in 'intensity>10'; of LAS also classification, return_number, "
-         "number_of_returns, scan_angle, user_data, point_source and gps_time. Given again: all must hold")
+         "number_of_returns, scan_angle, user_data, point_source, gps_time, class_flags, scanner_channel, "
+         "scan_direction and edge_of_flight_line. Given again: all must hold")
       ->type_name("CONDITION")
       ->allow_extra_args(false)
       ->group(group);
@@ -112,6 +113,7 @@ std::unique_ptr<PointSource> open_point_input(const std::string& path, const Poi
                                               const RunContext& context) {
   PointSettings settings = reading;
   settings.tmp_dir = context.tmp_dir;
+  settings.all_fields = true;
   std::unique_ptr<PointSource> source = open_points(path, settings);
   for (const std::string& remark : source->info().remarks) context.info(remark);
   return source;

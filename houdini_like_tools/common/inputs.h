@@ -21,7 +21,7 @@ void add_bad_samples(CLI::App& app, BadSamples& bad, const std::string& what = "
 /// How point files are read and what is taken of them: PointSettings.
 void add_point_options(CLI::App& app, PointSettings& reading, const std::string& group = "Input");
 
-/// open_points(), saying what the reader found worth saying.
+/// open_points() with all fields of the records, saying what the reader found worth saying.
 std::unique_ptr<PointSource> open_point_input(const std::string& path, const PointSettings& reading,
                                               const RunContext& context);
 

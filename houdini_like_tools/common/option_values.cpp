@@ -10,10 +10,9 @@
 namespace lamina::tools {
 namespace {
 
-std::vector<double> numbers_or_usage(const std::string& name, const std::string& text, char separator,
-                                     std::size_t count, const std::string& form) {
-  auto values = read_numbers(text, separator, count);
-  if (!values) throw CLI::ValidationError(name, fmt::format("'{}' is not of the form {}", text, form));
+std::vector<double> numbers_or_usage(const std::string& name, const std::string& text, const NumbersForm& form) {
+  auto values = read_numbers(text, form.separator, form.count);
+  if (!values) throw CLI::ValidationError(name, fmt::format("'{}' is not of the form {}", text, form.shown));
   return *values;
 }
 
@@ -33,27 +32,25 @@ std::optional<std::vector<double>> read_numbers(std::string_view text, char sepa
   return values;
 }
 
-CLI::Option* add_numbers(CLI::App& app, const std::string& name, char separator, std::size_t count,
-                         const std::string& form, const std::string& description,
-                         const std::function<void(const std::vector<double>&)>& take) {
+CLI::Option* add_numbers(CLI::App& app, const std::string& name, const NumbersForm& form,
+                         const std::string& description, const std::function<void(const std::vector<double>&)>& take) {
   return app
       .add_option_function<std::string>(
-          name, [=](const std::string& text) { take(numbers_or_usage(name, text, separator, count, form)); },
-          description)
-      ->type_name(form);
+          name, [=](const std::string& text) { take(numbers_or_usage(name, text, form)); }, description)
+      ->type_name(form.shown);
 }
 
-CLI::Option* add_repeated_numbers(CLI::App& app, const std::string& name, std::size_t count, const std::string& form,
+CLI::Option* add_repeated_numbers(CLI::App& app, const std::string& name, const NumbersForm& form,
                                   const std::string& description,
                                   const std::function<void(const std::vector<double>&)>& take) {
   return app
       .add_option_function<std::vector<std::string>>(
           name,
           [=](const std::vector<std::string>& texts) {
-            for (const std::string& text : texts) take(numbers_or_usage(name, text, ',', count, form));
+            for (const std::string& text : texts) take(numbers_or_usage(name, text, form));
           },
           description)
-      ->type_name(form)
+      ->type_name(form.shown)
       ->allow_extra_args(false);
 }
 

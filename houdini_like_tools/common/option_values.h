@@ -28,13 +28,19 @@ CLI::Option* add_length(CLI::App& app, const std::string& names, Length& value, 
 /// Exactly `count` finite numbers between separators; nothing when the text is anything else.
 std::optional<std::vector<double>> read_numbers(std::string_view text, char separator, std::size_t count);
 
-/// Adds an option of that form. It may be given again only when `take` is meant to be called for each.
-CLI::Option* add_numbers(CLI::App& app, const std::string& name, char separator, std::size_t count,
-                         const std::string& form, const std::string& description,
-                         const std::function<void(const std::vector<double>&)>& take);
+/// How several numbers stand in one word.
+struct NumbersForm {
+  std::string shown;  ///< for the help, as in X,Y,Z
+  std::size_t count = 1;
+  char separator = ',';
+};
+
+/// Adds an option of that form.
+CLI::Option* add_numbers(CLI::App& app, const std::string& name, const NumbersForm& form,
+                         const std::string& description, const std::function<void(const std::vector<double>&)>& take);
 
 /// An option that can be repeated, `take` being called once for each.
-CLI::Option* add_repeated_numbers(CLI::App& app, const std::string& name, std::size_t count, const std::string& form,
+CLI::Option* add_repeated_numbers(CLI::App& app, const std::string& name, const NumbersForm& form,
                                   const std::string& description,
                                   const std::function<void(const std::vector<double>&)>& take);
 

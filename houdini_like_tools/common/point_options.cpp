@@ -24,7 +24,7 @@ void take_viewpoint(NormalsSettings& settings, const std::string& text) {
 }  // namespace
 
 void add_clean_options(CLI::App& app, CleanSettings& s, const std::string& group) {
-  add_numbers(app, "--clip", ',', 6, "X0,Y0,Z0,X1,Y1,Z1", "Take only samples in this box, given by two corners",
+  add_numbers(app, "--clip", {"X0,Y0,Z0,X1,Y1,Z1", 6}, "Take only samples in this box, given by two corners",
               [&s](const std::vector<double>& v) {
                 s.pick.clip = Box{{v[0], v[1], v[2]}, {v[3], v[4], v[5]}};
               })
@@ -90,7 +90,7 @@ void add_normals_options(CLI::App& tool, NormalsSettings& s, const std::string& 
       ->type_name("X,Y,Z|pose|none")
       ->allow_extra_args(false)
       ->group(group);
-  add_numbers(tool, "--up", ',', 3, "X,Y,Z", "Normals face this direction: 0,0,1 for scans from the air",
+  add_numbers(tool, "--up", {"X,Y,Z", 3}, "Normals face this direction: 0,0,1 for scans from the air",
               [&s](const std::vector<double>& v) {
                 s.viewpoints.push_back({{v[0], v[1], v[2]}, true});
               })

@@ -73,8 +73,8 @@ class PointSource {
 /// What a value of a point must be, as in `intensity>10`.
 struct PointCondition {
   enum class Relation : std::uint8_t { less, at_most, equal, not_equal, at_least, more };
-  std::string name;  ///< x, y, z or an attribute; of LAS also classification, return_number, number_of_returns,
-                     ///< scan_angle, user_data, point_source and gps_time
+  std::string name;  ///< x, y, z or an attribute; of LAS also classification, return_number and the other fields
+                     ///< of its records (PointSettings::all_fields)
   Relation relation = Relation::equal;
   double value = 0;
 };
@@ -112,6 +112,10 @@ struct PointSettings {
   /// x and y, which must be degrees of longitude and latitude, become metres in a plane: transverse Mercator around the
   /// whole degrees next to the first point. Heights stay.
   bool project_degrees = false;
+  /// Of LAS: the fields of its records become attributes, too, where any point has them: return_number,
+  /// number_of_returns, classification, class_flags, scanner_channel, scan_direction, edge_of_flight_line, scan_angle,
+  /// user_data, point_source, gps_time. For jobs that write points again.
+  bool all_fields = false;
   PointSelection select{};
 };
 

@@ -12,7 +12,8 @@
 
 #include "base/little_endian.h"
 #include "laz/arithmetic_decoder.h"
-#include "laz/layer_decoders.h"
+#include "laz/core_layer.h"
+#include "laz/layers.h"
 #include "laz/point_chunk.h"
 
 namespace lamina::laz {
@@ -45,23 +46,23 @@ class Layers {
   std::span<const std::byte> rest_;
 };
 
-/// A layer's decoder and code; nothing where it is empty, which says that no value changes, or where nobody wants it.
-template <class Decoder>
+/// A layer and its code; nothing where it is empty, which says that no value changes, or where nobody wants it.
+template <class Values>
 struct Layer {
   std::optional<ArithmeticDecoder> code;
-  std::unique_ptr<Decoder> decoder;
+  std::unique_ptr<Values> values;
 
   template <class... First>
   void open(std::span<const std::byte> bytes, bool wanted, const First&... first) {
     if (bytes.empty() || !wanted) return;
     code.emplace(bytes);
-    decoder = std::make_unique<Decoder>(first...);
+    values = std::make_unique<Values>(first...);
   }
 
   void decode(const PointContext* contexts, std::size_t count, std::byte* to, std::size_t stride) {
-    if (!decoder) return;
+    if (!values) return;
     ArithmeticDecoder in_registers = *code;
-    decoder->decode(in_registers, contexts, count, to, stride);
+    values->code(in_registers, contexts, count, to, stride);
     *code = in_registers;
   }
   void require_end() const {
@@ -111,7 +112,7 @@ class LayeredDecoder {
     const std::size_t stride = layout_.bytes;
     for (std::size_t i = 0; i < count; ++i) std::memcpy(to + i * stride, first_, stride);
     ArithmeticDecoder in_registers = core_code_;
-    core_->decode(in_registers, count, contexts_.data(), to, stride);
+    core_->code(in_registers, count, contexts_.data(), to, stride);
     core_code_ = in_registers;
     for_each([&](auto& layer) { layer.decode(contexts_.data(), count, to, stride); });
   }

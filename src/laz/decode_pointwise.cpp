@@ -9,7 +9,7 @@
 #include "base/little_endian.h"
 #include "laz/arithmetic_decoder.h"
 #include "laz/colour_codec.h"
-#include "laz/gps_time_decoder.h"
+#include "laz/gps_time_codec.h"
 #include "laz/integer_codec.h"
 #include "laz/model_bank.h"
 #include "laz/point_chunk.h"
@@ -104,7 +104,7 @@ struct PointwiseDecoder {
   void decode(ArithmeticDecoder& code, std::byte* to) {
     core.decode(code, to);
     to += CorePointDecoder::kBytes;
-    if (time) to = store_little(to, time->decode(code));
+    if (time) to = store_little(to, time->code(code));
     if (colour) {
       last_colour = colour->code(code, last_colour);
       to = store_little(to, last_colour);
@@ -116,7 +116,7 @@ struct PointwiseDecoder {
   }
 
   CorePointDecoder core;
-  std::optional<GpsTimeDecoder<true>> time;
+  std::optional<GpsTimeCodec<true>> time;
   std::optional<ColourCodec> colour;
   Colour last_colour{};
   std::vector<SymbolModel<256>> extra;

@@ -9,8 +9,7 @@
 
 namespace lamina::laz {
 
-/// A chunk of `count` >= 1 records of formats 6 and 7 for decode_layered(). They are all only returns of their pulses,
-/// as points without pulses are: x, y, z, intensity, colours and extra bytes may differ, all else is as in the first.
+/// A chunk of `count` >= 1 records of formats 6 to 8, for decode_layered().
 std::vector<std::byte> encode_layered(const RecordLayout& layout, const std::byte* records, std::size_t count);
 
 /// The code of a table of chunks, which have the same number of points but for the last.

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <set>
 #include <string_view>
+#include <utility>
 
 #include "base/little_endian.h"
 #include "base/scalar_type.h"
@@ -91,6 +93,19 @@ std::string projection_record(std::uint16_t id, const std::string& content) {
   return record + content;
 }
 
+double attribute_of(const SampleBatch& batch, std::size_t attribute, std::size_t row) {
+  const bool exact = attribute < batch.exact.size() && !batch.exact[attribute].empty();
+  return exact ? batch.exact[attribute][row] : double{batch.attributes[attribute][row]};
+}
+
+/// The least and the largest number in the record's bits.
+std::pair<double, double> room_of(const LasField& field) {
+  constexpr double kLargestAngle = 30000;  // half a turn, as the specification has it
+  if (field.scale != 1) return {-kLargestAngle, kLargestAngle};
+  const unsigned bits = field.bits > 0 ? field.bits : 8U * static_cast<unsigned>(byte_size(field.stored));
+  return {0, static_cast<double>((1U << bits) - 1)};
+}
+
 }  // namespace
 
 LasLayout::LasLayout(const PointColumns& columns) : columns_(columns) {
@@ -107,6 +122,11 @@ LasLayout::LasLayout(const PointColumns& columns) : columns_(columns) {
     const ScalarType type = columns.attributes[static_cast<std::size_t>(at)].type;
     if (type == ScalarType::uint8 || type == ScalarType::uint16) intensity_ = static_cast<int>(at);
   }
+  for (const LasField& field : las_fields(point_format())) {
+    if (const auto at = find(std::string(field.name).c_str()); at < size) {
+      fields_.push_back({field, static_cast<std::size_t>(at)});
+    }
+  }
   if (columns.normals) {
     for (const char* name : {"nx", "ny", "nz"}) extras_.push_back({name});
   }
@@ -114,7 +134,8 @@ LasLayout::LasLayout(const PointColumns& columns) : columns_(columns) {
   if (!columns.quality.empty()) extras_.push_back({columns.quality});
   for (std::size_t a = 0; a < columns.attributes.size(); ++a) {
     const bool colour = colours_ && std::find(colour_.begin(), colour_.end(), a) != colour_.end();
-    if (colour || intensity_ == static_cast<int>(a)) continue;
+    const bool field = std::any_of(fields_.begin(), fields_.end(), [&](const OwnPlace& p) { return p.attribute == a; });
+    if (colour || field || intensity_ == static_cast<int>(a)) continue;
     others_.push_back(a);
     extras_.push_back({columns.attributes[a].name, columns.attributes[a].type});
   }
@@ -132,13 +153,15 @@ LasLayout::LasLayout(const PointColumns& columns) : columns_(columns) {
   if (extras_.size() > 300) throw Error(ExitCode::internal, "a LAS has room for 300 columns besides its own");
 }
 
-std::string LasLayout::header(const std::array<LasAxis, 3>& axes, std::uint64_t count,
-                              const std::string& packing) const {
+std::string LasLayout::header(const LasTotals& totals, const std::string& packing) const {
+  const std::array<LasAxis, 3>& axes = totals.axes;
   const std::size_t records = extras_.empty() ? 0 : kRecordHeaderBytes + kDescriptorBytes * extras_.size();
   std::string b(kHeaderBytes + records, '\0');
   b.replace(0, 4, "LASF");
-  constexpr std::uint16_t kTextProjection = 16;
-  if (system_text_) put_at(b, 6, kTextProjection);
+  constexpr unsigned kTextProjection = 16, kAdjustedTimes = 1;
+  put_at(
+      b, 6,
+      static_cast<std::uint16_t>((system_text_ ? kTextProjection : 0) | (totals.adjusted_times ? kAdjustedTimes : 0)));
   b[24] = 1;
   b[25] = 4;
   const std::string maker = fmt::format("lamina {}", version()).substr(0, kName);
@@ -157,8 +180,8 @@ std::string LasLayout::header(const std::array<LasAxis, 3>& axes, std::uint64_t 
     put_at(b, 179 + 16 * k, axes[k].high);
     put_at(b, 187 + 16 * k, axes[k].low);
   }
-  put_at(b, 247, count);
-  put_at(b, 255, count);  // all of them first returns
+  put_at(b, 247, totals.rows);
+  for (std::size_t k = 0; k < totals.by_return.size(); ++k) put_at(b, 255 + 8 * k, totals.by_return.at(k));
   if (records == 0) return b + system_ + packing;
   std::size_t at = kHeaderBytes;
   b.replace(at + 2, 9, "LASF_Spec");
@@ -173,27 +196,72 @@ std::string LasLayout::header(const std::array<LasAxis, 3>& axes, std::uint64_t 
   return b + system_ + packing;
 }
 
+void LasLayout::count(const SampleBatch& batch, const std::string& file, LasTotals& totals) const {
+  const OwnPlace* returns = nullptr;
+  for (const OwnPlace& own : fields_) {
+    const LasField& field = own.field;
+    if (field.name == "return_number") returns = &own;
+    if (field.name == "gps_time") {
+      for (std::size_t i = 0; i < batch.size() && !totals.adjusted_times; ++i) {
+        const double time = attribute_of(batch, own.attribute, i);
+        totals.adjusted_times = time < 0 || time > kSecondsOfWeek;
+      }
+      continue;
+    }
+    const auto [lowest, highest] = room_of(field);
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      const double value = attribute_of(batch, own.attribute, i) / field.scale;
+      const bool is_whole = field.scale != 1 || value == std::floor(value);
+      if (is_whole && value >= lowest && value <= highest) continue;
+      throw Error(ExitCode::usage,
+                  fmt::format("{}: LAS has room for a {} of {} to {}{}, and one is {}; PLY and E57 take any", file,
+                              field.name, lowest * field.scale, highest * field.scale,
+                              field.scale == 1 ? " without a fraction" : "", value * field.scale));
+    }
+  }
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    const double number = returns == nullptr ? 1 : attribute_of(batch, returns->attribute, i);
+    if (number >= 1 && number <= static_cast<double>(totals.by_return.size())) {
+      ++totals.by_return.at(static_cast<std::size_t>(number) - 1);
+    }
+  }
+  totals.rows += batch.size();
+}
+
+void LasLayout::put_fields(const SampleBatch& batch, std::size_t row, std::byte* record) const {
+  constexpr std::byte kOnlyReturn{0x11};
+  record[14] = kOnlyReturn;
+  for (const OwnPlace& own : fields_) {
+    const LasField& field = own.field;
+    const double value = attribute_of(batch, own.attribute, row);
+    std::byte* to = record + field.offset;
+    if (field.bits == 0) {
+      put_typed(to, field.stored, field.scale == 1 ? value : std::round(value / field.scale));
+      continue;
+    }
+    const unsigned mask = ((1U << field.bits) - 1) << field.shift;
+    *to =
+        static_cast<std::byte>((std::to_integer<unsigned>(*to) & ~mask) | static_cast<unsigned>(value) << field.shift);
+  }
+}
+
 void LasLayout::encode(const SampleBatch& batch, const std::array<LasAxis, 3>& axes, std::size_t first, std::size_t n,
                        std::byte* out) const {
-  const auto attribute = [&](std::size_t a, std::size_t i) {
-    const bool exact = a < batch.exact.size() && !batch.exact[a].empty();
-    return exact ? batch.exact[a][i] : double{batch.attributes[a][i]};
-  };
   const std::array<const std::vector<double>*, 3> position{&batch.x, &batch.y, &batch.z};
-  constexpr std::byte kOnlyReturn{0x11};
   for (std::size_t i = first; i < first + n; ++i) {
     std::byte* to = out + (i - first) * record_bytes_;
     std::fill(to, to + record_bytes_, std::byte{});
     for (std::size_t k = 0; k < 3; ++k) {
       store_little(to + 4 * k, to_scalar<std::int32_t>(((*position[k])[i] - axes[k].offset) / axes[k].scale));
     }
-    if (intensity_ >= 0)
-      store_little(to + 12, to_scalar<std::uint16_t>(attribute(static_cast<std::size_t>(intensity_), i)));
-    to[14] = kOnlyReturn;
+    if (intensity_ >= 0) {
+      store_little(to + 12, to_scalar<std::uint16_t>(attribute_of(batch, static_cast<std::size_t>(intensity_), i)));
+    }
+    put_fields(batch, i, to);
     for (std::size_t k = 0; k < 3 && colours_; ++k) {
       const std::size_t a = colour_.at(k);
       store_little(to + las_colour_offset(7) + 2 * k,
-                   to_scalar<std::uint16_t>(attribute(a, i) * colour_scale(columns_.attributes[a].type)));
+                   to_scalar<std::uint16_t>(attribute_of(batch, a, i) * colour_scale(columns_.attributes[a].type)));
     }
     to += las_record_bytes(point_format());
     if (columns_.normals) {
@@ -201,7 +269,7 @@ void LasLayout::encode(const SampleBatch& batch, const std::array<LasAxis, 3>& a
     }
     if (!columns_.radius.empty()) to = store_little(to, batch.radius[i]);
     if (!columns_.quality.empty()) to = store_little(to, batch.quality[i]);
-    for (const std::size_t a : others_) to = put_typed(to, columns_.attributes[a].type, attribute(a, i));
+    for (const std::size_t a : others_) to = put_typed(to, columns_.attributes[a].type, attribute_of(batch, a, i));
   }
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "lamina/points_writer.h"
+#include "points/las_fields.h"
 #include "points/writers.h"
 
 namespace lamina {
@@ -14,6 +15,14 @@ namespace lamina {
 struct LasExtraColumn {
   std::string name;
   ScalarType type = ScalarType::float32;
+};
+
+/// What the header says of all points.
+struct LasTotals {
+  std::uint64_t rows = 0;
+  std::array<LasAxis, 3> axes{};
+  std::array<std::uint64_t, 15> by_return{};  ///< points that are a pulse's first return, second, ...
+  bool adjusted_times = false;                ///< some GPS time is none of a week
 };
 
 class LasLayout {
@@ -25,8 +34,9 @@ class LasLayout {
   [[nodiscard]] int point_format() const { return colours_ ? 7 : 6; }
   [[nodiscard]] std::size_t record_bytes() const { return record_bytes_; }
   /// Header and records before the points; `packing` is LAZ's record, empty for LAS.
-  [[nodiscard]] std::string header(const std::array<LasAxis, 3>& axes, std::uint64_t count,
-                                   const std::string& packing) const;
+  [[nodiscard]] std::string header(const LasTotals& totals, const std::string& packing) const;
+  /// Adds the batch's returns and times. Throws Error(usage) naming `file` and a value that a record has no room for.
+  void count(const SampleBatch& batch, const std::string& file, LasTotals& totals) const;
   /// The coordinate system to name before the points: well-known text, or EPSG:NUMBER, which becomes GeoTIFF keys (of
   /// degrees where it is `geographic`). Anything else has no place there.
   void name_system(const std::string& crs, bool geographic);
@@ -35,7 +45,16 @@ class LasLayout {
               std::byte* out) const;
 
  private:
+  /// An attribute that has its own place in a record.
+  struct OwnPlace {
+    LasField field;
+    std::size_t attribute = 0;
+  };
+
+  void put_fields(const SampleBatch& batch, std::size_t row, std::byte* record) const;
+
   PointColumns columns_;
+  std::vector<OwnPlace> fields_;  ///< of las_fields()
   bool colours_ = false;
   std::array<std::size_t, 3> colour_{};  ///< attributes red, green, blue
   int intensity_ = -1;                   ///< its attribute, -1: none

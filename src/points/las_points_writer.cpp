@@ -64,12 +64,14 @@ class LasPointsWriter final : public PointsWriter {
       const auto [low, high] = std::minmax_element(position[k]->begin(), position[k]->end());
       low_[k] = std::min(low_[k], *low);
       high_[k] = std::max(high_[k], *high);
+      for (const double v : *position[k]) decimals_[k].add(v);
     }
     for (std::size_t first = 0; first < batch.size(); first += kBlock) {
       const std::size_t n = std::min(kBlock, batch.size() - first);
       codec_.encode(batch, first, n, block_.data());
       waiting_.append(std::span(block_).first(n * codec_.row_bytes()), disk_);
     }
+    layout_.count(batch, rows_out_.name(), totals_);
     rows_ += batch.size();
   }
 
@@ -77,14 +79,14 @@ class LasPointsWriter final : public PointsWriter {
     rows_out_.require_all(rows_);
     waiting_.flush(disk_);
     waiting_.check(disk_.drain());
-    std::array<LasAxis, 3> axes{};
-    for (std::size_t k = 0; k < 3; ++k) axes[k] = rows_ == 0 ? LasAxis{} : choose_steps(low_[k], high_[k]);
+    for (std::size_t k = 0; k < 3; ++k)
+      totals_.axes[k] = rows_ == 0 ? LasAxis{} : choose_steps(low_[k], high_[k], decimals_[k].most());
     RecordSink records(layout_);
-    const std::string header = layout_.header(axes, rows_, RecordSink::packing(layout_));
+    const std::string header = layout_.header(totals_, RecordSink::packing(layout_));
     const std::string start = header + records.lead();
     rows_out_.check(write_all(rows_out_.fd(), start.data(), start.size()));
     records.begin(start.size());
-    write_rows(axes, records);
+    write_rows(totals_.axes, records);
     rows_out_.publish(header + records.lead(), start.size() + records.written());
   }
 
@@ -106,17 +108,27 @@ class LasPointsWriter final : public PointsWriter {
 
   PointsWriterSettings settings_;
   LasLayout layout_;
+  LasTotals totals_;
   RowCodec codec_;
   StagedRows rows_out_;
   SpillFile waiting_;                                  ///< rows as they came
   BackgroundWriter disk_{SpillFile::kBufferBytes, 4};  // ends before the file does
   std::vector<std::byte> block_;
+  std::array<Decimals, 3> decimals_{};  ///< of each axis
   std::array<double, 3> low_{kInfinity, kInfinity, kInfinity}, high_{-kInfinity, -kInfinity, -kInfinity};
 };
 
 }  // namespace
 
-LasAxis choose_steps(double low, double high) {
+void Decimals::add(double value) {
+  for (; most_ < kMost; ++most_, tenth_ *= 10) {
+    const double steps = value * tenth_;
+    // As near to a whole number as products of doubles are.
+    if (std::abs(steps - std::round(steps)) <= 4 * std::numeric_limits<double>::epsilon() * std::abs(steps)) return;
+  }
+}
+
+LasAxis choose_steps(double low, double high, int decimals) {
   LasAxis axis{low, high};
   // Whole offsets keep coordinates readable; any within the span will do.
   axis.offset = std::floor(low + (high - low) / 2);
@@ -124,6 +136,7 @@ LasAxis choose_steps(double low, double high) {
   const double finest = std::max({std::abs(low), std::abs(high), reach}) * 0x1p-52;
   const double step = std::max(reach / kMostSteps, finest);
   axis.scale = step > 0 ? std::pow(10, std::ceil(std::log10(step))) : 0.001;
+  if (decimals < Decimals::kMost) axis.scale = std::max(axis.scale, std::pow(10, -decimals));
   return axis;
 }
 

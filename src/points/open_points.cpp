@@ -55,7 +55,7 @@ std::unique_ptr<PointSource> open_all_points(const std::string& path, const Poin
     case PointFormat::pcd:
       return open_pcd(std::move(file), path, settings.tmp_dir);
     case PointFormat::las:
-      return open_las(std::move(file), path, settings.select);
+      return open_las(std::move(file), path, settings);
     case PointFormat::ptx:
       return open_ptx(std::move(file), path);
     case PointFormat::e57:

@@ -16,7 +16,7 @@ namespace lamina {
 class HiddenValues {
  public:
   virtual ~HiddenValues() = default;
-  /// The names of LAS: classification, return_number, number_of_returns, scan_angle, user_data, point_source, gps_time.
+  /// The names of las_fields().
   [[nodiscard]] virtual bool has_hidden(std::string_view name) const = 0;
   /// How many points are of each class; empty where they have none.
   [[nodiscard]] virtual std::vector<std::uint64_t> class_counts() const = 0;

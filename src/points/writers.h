@@ -58,8 +58,21 @@ struct LasAxis {
   double scale = 1, offset = 0;  ///< coordinate = integer * scale + offset
 };
 
-/// The smallest power of ten that lets 32 bits span [low, high], but no finer than doubles are there.
-LasAxis choose_steps(double low, double high);
+/// How many decimals an axis' coordinates have.
+class Decimals {
+ public:
+  static constexpr int kMost = 10;  ///< or more: coordinates that nobody has rounded
+  void add(double value);
+  [[nodiscard]] int most() const { return most_; }
+
+ private:
+  int most_ = 0;
+  double tenth_ = 1;  ///< 10 to the power of most_
+};
+
+/// The smallest power of ten that lets 32 bits span [low, high], but no finer than doubles are there, nor than so many
+/// decimals: points of another LAS keep its steps where these are powers of ten.
+LasAxis choose_steps(double low, double high, int decimals = Decimals::kMost);
 
 /// LAS 1.4 of point format 6, or 7 where there are colours, which then have 16 bits (8-bit ones times 257, floats of
 /// 0-1 times 65535). An integer `intensity` of at most 16 bits has its own place; normals, radius, quality and all else

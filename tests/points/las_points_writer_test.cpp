@@ -70,5 +70,21 @@ TEST(LasPointsWriter, StepsAreTheFinestPowerOfTenThatSpansThePoints) {
   }
 }
 
+TEST(LasPointsWriter, StepsAreNoFinerThanTheCoordinates) {
+  const auto steps_of = [](const std::vector<double>& values) {
+    Decimals decimals;
+    for (const double v : values) decimals.add(v);
+    return choose_steps(values.front(), values.back(), decimals.most()).scale;
+  };
+  EXPECT_EQ(steps_of({636001.76, 636002.8, 637179.22}), 0.01);
+  EXPECT_EQ(steps_of({-12.125, 3, 80}), 0.001);
+  EXPECT_EQ(steps_of({0, 7, 90}), 1);
+  EXPECT_EQ(steps_of({0, 1.0 / 3, 90}), 1e-7);
+  // Every step of a file is kept, whatever the offset it counts from.
+  Decimals decimals;
+  for (int i = 0; i < 100'000; ++i) decimals.add(i * 16'807 % 2'000'003 * 0.001 + 4'567'890.5);
+  EXPECT_EQ(decimals.most(), 3);
+}
+
 }  // namespace
 }  // namespace lamina

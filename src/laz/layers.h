@@ -1,5 +1,6 @@
-// The layers of LAS 1.4's points, a decoder each. Every value is predicted from the last point of the same scanner
-// channel; a channel that comes up begins with what the point before had.
+// The layers of LAS 1.4's points. Every value is predicted from the last point of the same scanner channel; a channel
+// that comes up begins with what the point before had. One code for both ways, as integer_codec.h: an encoder finds the
+// values in the records, a decoder puts them there.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -8,13 +9,10 @@
 #include <utility>
 
 #include "base/little_endian.h"
-#include "laz/arithmetic_decoder.h"
 #include "laz/colour_codec.h"
-#include "laz/gps_time_decoder.h"
+#include "laz/gps_time_codec.h"
 #include "laz/integer_codec.h"
 #include "laz/model_bank.h"
-#include "laz/return_contexts.h"
-#include "laz/running_median.h"
 
 namespace lamina::laz {
 
@@ -43,6 +41,8 @@ class Channels {
 
   [[nodiscard]] State& now() { return *states_[now_]; }
   [[nodiscard]] unsigned number() const { return now_; }
+  /// Of a channel that has come up before.
+  [[nodiscard]] const State& of(unsigned channel) const { return *states_[channel]; }
   /// Whether the channel has come up before.
   [[nodiscard]] bool knows(unsigned channel) const { return states_[channel] != nullptr; }
   /// The state of `channel`, which becomes the present one.
@@ -64,50 +64,16 @@ inline unsigned channel_in(const std::byte* record) {
   return std::to_integer<unsigned>(record[15]) >> 4 & 3;
 }
 
-/// Returns, x and y, and which other values change.
-class CoreLayer {
- public:
-  explicit CoreLayer(const std::byte* first);
-  void decode(ArithmeticDecoder& code, std::size_t count, PointContext* contexts, std::byte* to, std::size_t stride);
-
- private:
-  struct Value {
-    std::uint32_t x = 0, y = 0;
-    unsigned n = 0, r = 0;  ///< number of returns, return number
-  };
-  struct State {
-    explicit State(const Value& first) : last(first) {}
-    [[nodiscard]] const Value& value() const { return last; }
-
-    Value last;
-    bool time_changed = false;
-    std::array<RunningMedian, 12> x_steps, y_steps;
-    std::array<SymbolModel<128>, 8> changed;
-    SymbolModel<3> channel_step;
-    ModelBank<16, 16> numbers_of_returns, return_numbers;
-    SymbolModel<13> return_step;
-    IntegerCodec<32, 2> x_code;
-    IntegerCodec<32, 22> y_code;
-  };
-
-  static Value value_in(const std::byte* record);
-  static unsigned return_number(ArithmeticDecoder& code, State& state, unsigned change, bool time_changed);
-  static void decode_place(ArithmeticDecoder& code, State& state, PointContext& context);
-
-  Channels<State> channels_;
-  std::byte flags_;  ///< byte 15 of the first point without its channel
-};
-
-/// A layer of one value a point, which State decodes.
+/// A layer of one value a point, which State codes.
 template <class State>
 class ValueLayer {
  public:
   explicit ValueLayer(const std::byte* first) : channels_(channel_in(first), State::value_in(first)) {}
 
-  void decode(ArithmeticDecoder& code, const PointContext* contexts, std::size_t count, std::byte* to,
-              std::size_t stride) {
-    for (std::size_t i = 0; i < count; ++i, to += stride) {
-      channels_.go_to(contexts[i].channel).decode(code, contexts[i], to);
+  template <class Coder>
+  void code(Coder& coder, const PointContext* contexts, std::size_t count, std::byte* records, std::size_t stride) {
+    for (std::size_t i = 0; i < count; ++i, records += stride) {
+      channels_.go_to(contexts[i].channel).code(coder, contexts[i], records);
     }
   }
 
@@ -120,8 +86,9 @@ class HeightState {
   explicit HeightState(std::uint32_t z) : last_(z) { by_level_.fill(z); }
   static std::uint32_t value_in(const std::byte* record) { return load_little<std::uint32_t>(record + kPlace); }
   [[nodiscard]] std::uint32_t value() const { return last_; }
-  void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
-    last_ = by_level_[c.level] = code_.code(code, by_level_[c.level], c.height_context);
+  template <class Coder>
+  void code(Coder& coder, const PointContext& c, std::byte* record) {
+    last_ = by_level_[c.level] = code_.code(coder, by_level_[c.level], c.height_context, value_in(record));
     store_little(record + kPlace, last_);
   }
 
@@ -137,8 +104,9 @@ class ClassState {
   explicit ClassState(unsigned value) : last_(value) {}
   static unsigned value_in(const std::byte* record) { return std::to_integer<unsigned>(record[kPlace]); }
   [[nodiscard]] unsigned value() const { return last_; }
-  void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
-    last_ = code.symbol(models_[(last_ & 0x1F) * 2 + (c.place == PointContext::kSingle ? 1 : 0)]);
+  template <class Coder>
+  void code(Coder& coder, const PointContext& c, std::byte* record) {
+    last_ = coder.symbol(models_[(last_ & 0x1F) * 2 + (c.place == PointContext::kSingle ? 1 : 0)], value_in(record));
     record[kPlace] = static_cast<std::byte>(last_);
   }
 
@@ -157,8 +125,9 @@ class FlagsState {
     return (flags & 0x0F) | (flags >> 2 & 0x30);
   }
   [[nodiscard]] unsigned value() const { return last_; }
-  void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
-    last_ = code.symbol(models_[last_]);
+  template <class Coder>
+  void code(Coder& coder, const PointContext& c, std::byte* record) {
+    last_ = coder.symbol(models_[last_], value_in(record));
     record[kPlace] = static_cast<std::byte>((last_ & 0x0F) | (last_ & 0x30) << 2 | c.channel << 4);
   }
 
@@ -173,9 +142,10 @@ class IntensityState {
   explicit IntensityState(std::uint16_t value) : last_(value) { by_place_.fill(value); }
   static std::uint16_t value_in(const std::byte* record) { return load_little<std::uint16_t>(record + kPlace); }
   [[nodiscard]] std::uint16_t value() const { return last_; }
-  void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
+  template <class Coder>
+  void code(Coder& coder, const PointContext& c, std::byte* record) {
     std::uint16_t& at_place = by_place_[c.place * 2U + (c.time_changed ? 1 : 0)];
-    last_ = at_place = static_cast<std::uint16_t>(code_.code(code, at_place, c.place));
+    last_ = at_place = static_cast<std::uint16_t>(code_.code(coder, at_place, c.place, value_in(record)));
     store_little(record + kPlace, last_);
   }
 
@@ -191,8 +161,11 @@ class AngleState {
   explicit AngleState(std::uint16_t value) : last_(value) {}
   static std::uint16_t value_in(const std::byte* record) { return load_little<std::uint16_t>(record + kPlace); }
   [[nodiscard]] std::uint16_t value() const { return last_; }
-  void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
-    if (c.angle_changed) last_ = static_cast<std::uint16_t>(code_.code(code, last_, c.time_changed ? 1 : 0));
+  template <class Coder>
+  void code(Coder& coder, const PointContext& c, std::byte* record) {
+    if (c.angle_changed) {
+      last_ = static_cast<std::uint16_t>(code_.code(coder, last_, c.time_changed ? 1 : 0, value_in(record)));
+    }
     store_little(record + kPlace, last_);
   }
 
@@ -207,8 +180,9 @@ class UserState {
   explicit UserState(unsigned value) : last_(value) {}
   static unsigned value_in(const std::byte* record) { return std::to_integer<unsigned>(record[kPlace]); }
   [[nodiscard]] unsigned value() const { return last_; }
-  void decode(ArithmeticDecoder& code, const PointContext&, std::byte* record) {
-    last_ = code.symbol(models_[last_ / 4]);
+  template <class Coder>
+  void code(Coder& coder, const PointContext&, std::byte* record) {
+    last_ = coder.symbol(models_[last_ / 4], value_in(record));
     record[kPlace] = static_cast<std::byte>(last_);
   }
 
@@ -223,8 +197,9 @@ class SourceState {
   explicit SourceState(std::uint16_t value) : last_(value) {}
   static std::uint16_t value_in(const std::byte* record) { return load_little<std::uint16_t>(record + kPlace); }
   [[nodiscard]] std::uint16_t value() const { return last_; }
-  void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
-    if (c.source_changed) last_ = static_cast<std::uint16_t>(code_.code(code, last_, 0));
+  template <class Coder>
+  void code(Coder& coder, const PointContext& c, std::byte* record) {
+    if (c.source_changed) last_ = static_cast<std::uint16_t>(code_.code(coder, last_, 0, value_in(record)));
     store_little(record + kPlace, last_);
   }
 
@@ -239,15 +214,16 @@ class TimeState {
   explicit TimeState(std::uint64_t value) : last_(value), code_(value) {}
   static std::uint64_t value_in(const std::byte* record) { return load_little<std::uint64_t>(record + kPlace); }
   [[nodiscard]] std::uint64_t value() const { return last_; }
-  void decode(ArithmeticDecoder& code, const PointContext& c, std::byte* record) {
-    if (c.time_changed) last_ = code_.decode(code);
+  template <class Coder>
+  void code(Coder& coder, const PointContext& c, std::byte* record) {
+    if (c.time_changed) last_ = code_.code(coder, value_in(record));
     store_little(record + kPlace, last_);
   }
 
  private:
   static constexpr std::size_t kPlace = 22;
   std::uint64_t last_;
-  GpsTimeDecoder<false> code_;
+  GpsTimeCodec<false> code_;
 };
 
 /// Values at a place that depends on the format. With channels apart (RecordLayout::channels_apart) as the other
@@ -259,18 +235,18 @@ class PlacedLayer {
   PlacedLayer(const std::byte* first, std::size_t place, bool channels_apart)
       : channels_(channel_in(first), load_little<T>(first + place)), place_(place), channels_apart_(channels_apart) {}
 
-  void decode(ArithmeticDecoder& code, const PointContext* contexts, std::size_t count, std::byte* to,
-              std::size_t stride) {
-    to += place_;
-    for (std::size_t i = 0; i < count; ++i, to += stride) {
+  template <class Coder>
+  void code(Coder& coder, const PointContext* contexts, std::size_t count, std::byte* records, std::size_t stride) {
+    records += place_;
+    for (std::size_t i = 0; i < count; ++i, records += stride) {
       const PointContext& c = contexts[i];
       const unsigned channel = channels_apart_ || c.channel_changed ? c.channel : 0U;
       T& before = channels_.now().last;
       const bool takes_before = !channels_apart_ && channels_.knows(channel);
       State& state = channels_.go_to(channel);
       T& last = takes_before ? before : state.last;
-      last = state.codec.code(code, last);
-      store_little(to, last);
+      last = state.codec.code(coder, last, load_little<T>(records));
+      store_little(records, last);
     }
   }
 
