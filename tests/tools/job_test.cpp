@@ -132,6 +132,16 @@ TEST(Job, StepsHandFilesOn) {
   EXPECT_TRUE(read_text(folder / "typed.ply") == read_text(folder / "mesh_of_clipped.ply"));
 }
 
+TEST(Job, TheExampleOfThePageRuns) {
+  const JobFolder folder;
+  const std::string page = read_text(LAMINA_SOURCE_DIR "/docs/jobs.md"), fence = "```json\n";
+  const std::size_t begin = page.find(fence) + fence.size();
+  ASSERT_EQ(folder.shell("lamina convert scan.ply -o scan.xyz").code, 0);
+  const Outcome outcome = folder.run(page.substr(begin, page.find("```", begin) - begin));
+  EXPECT_EQ(outcome.code, 0) << outcome.err;
+  EXPECT_THAT(outcome.out, HasSubstr("manifold"));
+}
+
 TEST(Job, AFailingStepEndsTheJobWithItsCode) {
   const JobFolder folder;
   const Outcome outcome = folder.run(R"({"lamina_job": 1, "steps": [
