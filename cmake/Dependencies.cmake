@@ -16,6 +16,8 @@ find_package(PNG REQUIRED)
 find_package(ZLIB REQUIRED)
 find_package(EXPAT REQUIRED)
 find_package(meshoptimizer REQUIRED)  # compression of tiles
+# Serves tiles to a browser on this machine; without it they go into pages only.
+pkg_check_modules(HTTPLIB IMPORTED_TARGET cpp-httplib)
 # Several machines on one mesh; without it the program runs alone.
 option(LAMINA_WITH_MPI "Build with MPI where it is found" ON)
 if(LAMINA_WITH_MPI)

@@ -12,6 +12,7 @@ install(DIRECTORY ${PROJECT_BINARY_DIR}/share/man/ DESTINATION ${CMAKE_INSTALL_M
   COMPONENT program FILES_MATCHING PATTERN "*.1")
 install(FILES ${PROJECT_BINARY_DIR}/share/lamina.bash DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
   RENAME lamina COMPONENT program)
+install(FILES ${PROJECT_BINARY_DIR}/share/lamina/viewer.js DESTINATION ${CMAKE_INSTALL_DATADIR}/lamina COMPONENT program OPTIONAL)
 # Where Debian wants the licence of a package.
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${LAMINA_DOC_DIR}/lamina RENAME copyright COMPONENT program)
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${LAMINA_DOC_DIR}/liblamina-dev RENAME copyright

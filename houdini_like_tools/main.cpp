@@ -28,6 +28,7 @@ int main(int argc, char** argv) {
       add_compare,
       add_check,
       add_render,
+      add_view,
       add_volume,
       add_info,
       add_measure,

@@ -11,6 +11,7 @@ void add_scatter(CLI::App& app);
 void add_compare(CLI::App& app);
 void add_check(CLI::App& app);
 void add_render(CLI::App& app);
+void add_view(CLI::App& app);
 void add_volume(CLI::App& app);
 void add_info(CLI::App& app);
 void add_measure(CLI::App& app);

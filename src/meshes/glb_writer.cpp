@@ -11,6 +11,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -266,7 +267,7 @@ std::string describe_glb(const MeshBlocks& mesh, const std::vector<GlbColumn>& c
 /// Pieces of a file, handed on in large ones.
 class GlbBytes {
  public:
-  explicit GlbBytes(ResultFile& out) : out_(out) { bytes_.reserve(kGlbBuffer + 64); }
+  explicit GlbBytes(const std::function<void(std::string_view)>& out) : out_(out) { bytes_.reserve(kGlbBuffer + 64); }
   template <class T>
   void add(T value) {
     append_little(bytes_, value);
@@ -276,12 +277,12 @@ class GlbBytes {
     if (bytes_.size() >= kGlbBuffer) flush();
   }
   void flush() {
-    out_.write(bytes_);
+    out_(bytes_);
     bytes_.clear();
   }
 
  private:
-  ResultFile& out_;
+  const std::function<void(std::string_view)>& out_;
   std::string bytes_;
 };
 
@@ -303,16 +304,20 @@ std::uint64_t glb_data_bytes(const AttributeLayout& layout, bool normals, std::u
 }
 
 void write_glb(MeshBlocks& mesh, ResultFile& out) {
+  write_glb(mesh, out.name(), [&out](std::string_view bytes) { out.write(bytes); });
+}
+
+void write_glb(MeshBlocks& mesh, const std::string& name, const std::function<void(std::string_view)>& sink) {
   const std::uint64_t data = glb_data_bytes(mesh.layout(), mesh.has_normals(), mesh.vertices(), mesh.triangles());
-  require_glb_size(data, out.name());
-  const GlbBox box = mesh.vertices() > 0 ? box_of(mesh, out.name()) : GlbBox{};
+  require_glb_size(data, name);
+  const GlbBox box = mesh.vertices() > 0 ? box_of(mesh, name) : GlbBox{};
   const std::vector<GlbColumn> columns = columns_of(mesh.layout(), mesh.has_normals(), box);
   const std::string json = describe_glb(mesh, columns, box);
   const std::uint64_t all =
       glb::kHeaderBytes + glb::kChunkHeaderBytes + json.size() + (data > 0 ? glb::kChunkHeaderBytes + data : 0);
-  require_glb_size(all, out.name());
+  require_glb_size(all, name);
 
-  GlbBytes bytes(out);
+  GlbBytes bytes(sink);
   for (const std::uint32_t word : {glb::kMagic, glb::kVersion, static_cast<std::uint32_t>(all),
                                    static_cast<std::uint32_t>(json.size()), glb::kJsonChunk})
     bytes.add(word);

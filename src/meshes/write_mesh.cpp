@@ -5,9 +5,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -52,6 +54,11 @@ bool holds_floats(const TriangleMesh& mesh) {
 }
 
 }  // namespace
+
+void write_glb(const TriangleMesh& mesh, const std::string& name, const std::function<void(std::string_view)>& sink) {
+  HeldMesh blocks(mesh);
+  write_glb(blocks, name, sink);
+}
 
 void write_ply(const TriangleMesh& mesh, ResultFile& out) {
   const bool as_float = holds_floats(mesh);

@@ -4,7 +4,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/output_file.h"
@@ -48,6 +50,11 @@ inline constexpr std::uint64_t kMostGlbBytes = 0xFFFFFFFF;
 /// length become 0 0 1, others of another length than 1 are made unit; attributes that are not finite become 0. Throws
 /// Error(budget) for meshes beyond 4 GB, Error(usage) for positions that are not finite or too far apart for floats.
 void write_glb(MeshBlocks& mesh, ResultFile& out);
+
+/// The same of a mesh in memory, or of points where it has no triangles, handed on in pieces; `name` is for messages.
+void write_glb(const TriangleMesh& mesh, const std::string& name, const std::function<void(std::string_view)>& sink);
+/// What both do.
+void write_glb(MeshBlocks& mesh, const std::string& name, const std::function<void(std::string_view)>& sink);
 
 /// Of the other formats. Keeps blocks, for STL at most a million positions, too.
 /// OBJ: `v x y z [r g b]` with colours from 0 to 1, `vn`, faces `f v//vn`. Positions read back as the same bits.

@@ -1,0 +1,152 @@
+// Opens pages of lamina view in a headless Chromium and looks at what they show: a coloured mesh, a cloud at
+// georeferenced coordinates, a tile set. Whatever a page writes to the console fails it, and so does any request.
+// Usage: node pages.mjs LAMINA WORK_FOLDER [PICTURES]
+import { execFileSync } from 'node:child_process';
+import { mkdirSync, rmSync, writeFileSync } from 'node:fs';
+import { join } from 'node:path';
+import { Chromium, decodePng } from './chromium.mjs';
+
+const [lamina, folder, pictures] = process.argv.slice(2);
+const size = { width: 900, height: 600 };
+const faults = [];
+
+function expect(truth, what) {
+  if (!truth) faults.push(what);
+  console.log(`${truth ? 'ok' : 'NOT OK'}: ${what}`);
+}
+
+function run(...options) {
+  execFileSync(lamina, [...options, '--quiet'], { stdio: ['ignore', 'ignore', 'inherit'] });
+}
+
+/** A ball of red, green and blue thirds with an attribute that grows with z, as an ascii PLY of points with normals. */
+function ball(name, count, [x, y, z]) {
+  const lines = [`ply\nformat ascii 1.0\nelement vertex ${count}\n` +
+    ['x', 'y', 'z'].map((n) => `property double ${n}\n`).join('') + ['nx', 'ny', 'nz', 'height'].map((n) => `property float ${n}\n`).join('') +
+    ['red', 'green', 'blue'].map((n) => `property uchar ${n}\n`).join('') + 'end_header'];
+  for (let i = 0; i < count; ++i) {
+    const nz = 1 - (2 * i + 1) / count, around = i * Math.PI * (3 - Math.sqrt(5)), flat = Math.sqrt(1 - nz * nz);
+    const n = [flat * Math.cos(around), flat * Math.sin(around), nz];
+    const colour = [[220, 40, 40], [40, 200, 40], [40, 60, 220]][Math.floor(((nz + 1) / 2.0001) * 3)];
+    lines.push([x + n[0], y + n[1], z + n[2], ...n, nz, ...colour].join(' '));
+  }
+  writeFileSync(join(folder, name), `${lines.join('\n')}\n`);
+}
+
+/** The picture right of the panel: which share is no background, and how much of that is red, green, blue. */
+function judge(png) {
+  const { width, height, channels, pixels } = decodePng(png);
+  const count = { model: 0, all: 0, red: 0, green: 0, blue: 0 };
+  for (let y = 0; y < height; ++y) {
+    for (let x = 300; x < width; ++x) {
+      const at = (y * width + x) * channels;
+      const [r, g, b] = pixels.subarray(at, at + 3);
+      ++count.all;
+      if (Math.max(r, g, b) - Math.min(r, g, b) < 24) continue;
+      ++count.model;
+      if (r > 1.4 * Math.max(g, b)) ++count.red;
+      if (g > 1.4 * Math.max(r, b)) ++count.green;
+      if (b > 1.4 * Math.max(r, g)) ++count.blue;
+    }
+  }
+  return { share: count.model / count.all, red: count.red / count.model, green: count.green / count.model, blue: count.blue / count.model };
+}
+
+const browser = new Chromium(process.env.CHROMIUM ?? 'chromium');
+
+async function look(name, url, act) {
+  const page = await browser.open(url, size);
+  await page.until("document.documentElement?.dataset.state === 'shown'");
+  const see = async (what) => {
+    const picture = await page.picture();
+    if (pictures) writeFileSync(join(pictures, `${name}_${what}.png`), picture);
+    return judge(picture);
+  };
+  const choose = (label, value) => page.evaluate(`(() => {
+    const control = document.getElementById([...document.querySelectorAll('label')].find((l) => l.textContent === ${JSON.stringify(label)}).htmlFor);
+    control.value = ${JSON.stringify(value)};
+    control.dispatchEvent(new Event('change'));
+  })()`);
+  await act(page, see, choose);
+  expect(page.complaints.length === 0, `${name}: nothing on the console${page.complaints.map((text) => `; ${text}`).join('')}`);
+  expect(page.requests.slice(1).every((asked) => /^(blob|data):/.test(asked)), `${name}: asks for nothing`);
+  await page.close();
+}
+
+const near = (value, wanted, within) => Math.abs(value - wanted) < within;
+
+async function lookAtMesh() {
+  ball('ball.ply', 4000, [0, 0, 0]);
+  run('surface', join(folder, 'ball.ply'), '-o', join(folder, 'mesh.ply'));
+  run('view', join(folder, 'mesh.ply'), '--up', 'z', '-o', join(folder, 'mesh.html'));
+  await look('mesh', `file://${join(folder, 'mesh.html')}`, async (page, see, choose) => {
+    const colours = await see('colours');
+    // A ball that fills the height: pi / 4 of the square of it.
+    expect(near(colours.share, 0.66, 0.12), `mesh: fills its part of the picture (${colours.share.toFixed(2)})`);
+    expect(Math.min(colours.red, colours.green, colours.blue) > 0.03, `mesh: has all three colours (${JSON.stringify(colours)})`);
+    await choose('Show', '_height');
+    const scale = await page.evaluate("document.querySelector('.scale input').value + ' ' + document.querySelectorAll('.scale input')[1].value");
+    const [low, high] = scale.split(' ').map(Number);
+    expect(near(low, -0.98, 0.05) && near(high, 0.98, 0.05), `mesh: the scale spans the attribute (${scale})`);
+    const painted = await see('height');
+    expect(painted.red < 0.01 && painted.green > 0.2, `mesh: is painted anew (${JSON.stringify(painted)})`);
+    await page.press('m');
+    await page.click(594, 220);
+    await page.click(594, 380);
+    const length = Number(await page.evaluate("document.querySelector('.value.large').textContent"));
+    expect(length > 0.3 && length < 1.2, `mesh: a distance on the ball (${length})`);
+    await page.press('m');
+    await page.press('x');
+    const cut = await see('cut');
+    expect(cut.share < 0.95 * painted.share, `mesh: the plane cuts something off (${cut.share.toFixed(2)})`);
+    await page.press('b');
+    await page.press('l');
+    await page.press('g');
+    await page.press('t');
+    await see('edges_flat_light');
+  });
+}
+
+async function lookAtPoints() {
+  ball('far.ply', 6000, [500000, 4000000, 100]);
+  run('view', join(folder, 'far.ply'), '--points', '3000', '-o', join(folder, 'points.html'));
+  await look('points', `file://${join(folder, 'points.html')}`, async (page, see) => {
+    const seen = await see('colours');
+    expect(seen.share > 0.4 && Math.min(seen.red, seen.green, seen.blue) > 0.03, `points: are seen with their colours (${JSON.stringify(seen)})`);
+    const facts = await page.evaluate("document.querySelector('.facts').textContent");
+    expect(/3.000 of 6.000 points/.test(facts), `points: the page says that it shows a subset (${facts})`);
+    await page.click(594, 300);
+    const place = await page.evaluate("document.querySelector('.place').textContent");
+    const [x, y, z] = place.match(/-?[\d.]+/g).map(Number);
+    expect(near(x, 500000, 1.1) && near(y, 4000000, 1.1) && near(z, 100, 1.1), `points: places are those of the file (${place})`);
+    const distance = Math.hypot(x - 500000, y - 4000000, z - 100);
+    expect(near(distance, 1, 0.002), `points: to a millimetre or two (${distance})`);
+  });
+}
+
+async function lookAtTiles() {
+  try {
+    run('tiles', join(folder, 'mesh.ply'), '-o', join(folder, 'tiles'));
+  } catch {
+    console.log('no lamina tiles here');
+    return;
+  }
+  run('view', join(folder, 'tiles'), '-o', join(folder, 'tiles.html'));
+  await look('tiles', `file://${join(folder, 'tiles.html')}`, async (page, see) => {
+    await page.until("/[1-9].* triangles/.test(document.querySelector('.drawn').textContent)");
+    const seen = await see('colours');
+    expect(near(seen.share, 0.66, 0.12), `tiles: fill their part of the picture (${seen.share.toFixed(2)})`);
+    expect(Math.min(seen.red, seen.green, seen.blue) > 0.03, `tiles: have all three colours (${JSON.stringify(seen)})`);
+  });
+}
+
+rmSync(folder, { recursive: true, force: true });
+mkdirSync(folder, { recursive: true });
+try {
+  await lookAtMesh();
+  await lookAtPoints();
+  await lookAtTiles();
+} finally {
+  await browser.close();
+}
+process.exitCode = faults.length > 0 ? 1 : 0;

@@ -1,0 +1,179 @@
+// A tile set: drawn in the detail that the view wants, out of the page or from the server that served it.
+import { Box3, Group, Matrix4, Vector3 } from 'three';
+import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
+import { TilesRenderer } from '3d-tiles-renderer';
+import { GLTFExtensionsPlugin } from '3d-tiles-renderer/plugins';
+import { blockNames, readBlock } from './data.js';
+import { attributesOf, dress, someOf } from './model.js';
+
+const mediaTypes = { json: 'application/json', glb: 'model/gltf-binary' };
+
+/** Files that stand in the page are taken from there. The name of the host is made up: none is ever asked. */
+const pageRoot = 'https://page.invalid/';
+
+class PageFilesPlugin {
+  constructor() {
+    this.name = 'PAGE_FILES_PLUGIN';
+    this.names = blockNames('file:');
+  }
+
+  async fetchData(url) {
+    const name = decodeURI(new URL(url, pageRoot).pathname.replace(/^\/+/, ''));
+    if (!this.names.has(name)) return new Response(null, { status: 404, statusText: `${name} is not in the page` });
+    const type = mediaTypes[name.split('.').pop()] ?? 'application/octet-stream';
+    return new Response(await readBlock(`file:${name}`, { keep: true }), { headers: { 'Content-Type': type } });
+  }
+}
+
+export class TileModel {
+  static async load(description, stage) {
+    const model = new TileModel(description, stage);
+    await model.ready;
+    return model;
+  }
+
+  constructor(description, stage) {
+    this.kind = 'tiles';
+    this.stage = stage;
+    this.geometries = [];
+    this.attributes = new Map();
+    this.hasColours = false;
+    this.look = { show: 'plain' };
+    this.group = new Group();
+    this.origin = new Vector3();
+    this.box = new Box3();
+    this.tiles = new TilesRenderer(description.embedded ? `${pageRoot}tileset.json` : description.tileset);
+    if (description.embedded) this.tiles.registerPlugin(new PageFilesPlugin());
+    this.tiles.registerPlugin(new GLTFExtensionsPlugin({ meshoptDecoder: MeshoptDecoder }));
+    this.tiles.errorTarget = 1;
+    this.tiles.setCamera(stage.camera);
+    this.group.add(this.tiles.group);
+    this.onChange = () => {};
+    this.onOutline = () => {};
+    this.listen();
+  }
+
+  listen() {
+    const { tiles } = this;
+    tiles.addEventListener('load-model', ({ scene }) => this.addTile(scene));
+    tiles.addEventListener('dispose-model', ({ scene }) => this.removeTile(scene));
+    for (const event of ['needs-update', 'needs-render', 'tile-visibility-change', 'tiles-load-end']) {
+      tiles.addEventListener(event, () => this.stage.draw());
+    }
+    tiles.addEventListener('load-error', ({ url, error }) => console.error(`${url}: ${error.message}`));
+    this.ready = new Promise((resolve, reject) => {
+      tiles.addEventListener('load-root-tileset', () => {
+        this.place();
+        resolve();
+      });
+      tiles.addEventListener('load-error', ({ error }) => reject(error));
+      tiles.update();
+    });
+  }
+
+  /** The scene's origin goes to the middle of the tiles. A tile set on the globe is shown in the frame of its root. */
+  place() {
+    const { tiles } = this;
+    const given = tiles.root.transform;
+    const root = given ? new Matrix4().fromArray(given) : new Matrix4();
+    const turned = [0, 5, 10].some((k) => Math.abs(root.elements[k] - 1) > 1e-9);
+    tiles.group.matrixAutoUpdate = true;
+    tiles.getOrientedBoundingBox(this.box, placement);
+    const corners = this.box.clone();
+    const toRoot = turned ? root.clone().invert() : new Matrix4();
+    corners.applyMatrix4(new Matrix4().multiplyMatrices(toRoot, placement));
+    corners.getCenter(this.origin);
+    const middle = this.origin.clone();
+    const said = tiles.rootTileset?.asset?.extras?.origin;
+    if (turned && said) this.origin.add(new Vector3(...said));
+    this.radius = 0.5 * corners.getSize(new Vector3()).length() || 1;
+    this.box.copy(corners).translate(middle.clone().negate());
+    const ends = [this.box.min, this.box.max];
+    this.outline = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => new Vector3(ends[k & 1].x, ends[(k >> 1) & 1].y, ends[k >> 2].z));
+    const move = new Matrix4().makeTranslation(-middle.x, -middle.y, -middle.z).multiply(toRoot);
+    move.decompose(tiles.group.position, tiles.group.quaternion, tiles.group.scale);
+    tiles.group.updateMatrixWorld(true);
+  }
+
+  addTile(scene) {
+    if (this.geometries.length === 0) this.trace(scene);
+    scene.traverse((object) => {
+      if (!object.isMesh && !object.isPoints) return;
+      const { geometry } = object;
+      this.geometries.push(geometry);
+      if (!geometry.hasAttribute('normal') && object.isMesh) geometry.computeVertexNormals();
+      for (const [key, name] of attributesOf(geometry)) this.attributes.set(key, name);
+      this.hasColours ||= geometry.hasAttribute('color');
+      dress(object, this.look);
+    });
+    this.onChange();
+    this.stage.draw();
+  }
+
+  /** The first tile has the coarse shape of all: a better outline than the box. */
+  trace(scene) {
+    const places = [];
+    scene.updateMatrixWorld(true);
+    scene.traverse((object) => {
+      if (!object.isMesh && !object.isPoints) return;
+      const toScene = new Matrix4().multiplyMatrices(this.tiles.group.matrixWorld, object.matrixWorld);
+      places.push(...someOf(object.geometry).map((place) => place.applyMatrix4(toScene)));
+    });
+    this.outline = places;
+    this.onOutline();
+  }
+
+  removeTile(scene) {
+    scene.traverse((object) => {
+      if (!object.geometry || object.userData.isOverlay) return;
+      this.geometries = this.geometries.filter((geometry) => geometry !== object.geometry);
+    });
+  }
+
+  setLook(look) {
+    this.look = look;
+    this.tiles.forEachLoadedModel((scene) => {
+      const drawables = [];
+      scene.traverse((object) => ((object.isMesh || object.isPoints) && !object.userData.isOverlay ? drawables.push(object) : null));
+      for (const drawable of drawables) dress(drawable, look);
+    });
+  }
+
+  get error() {
+    return this.tiles.errorTarget;
+  }
+
+  set error(pixels) {
+    this.tiles.errorTarget = pixels;
+    this.stage.draw();
+  }
+
+  update() {
+    this.stage.camera.updateMatrixWorld();
+    this.tiles.setResolutionFromRenderer(this.stage.camera, this.stage.renderer);
+    this.tiles.update();
+  }
+
+  get loading() {
+    const { stats } = this.tiles;
+    return stats.queued + stats.downloading + stats.parsing > 0;
+  }
+
+  /** What is drawn at the moment. */
+  shown() {
+    const levels = new Map();
+    let triangles = 0;
+    for (const tile of this.tiles.visibleTiles) {
+      const level = tile.internal.depth;
+      levels.set(level, (levels.get(level) ?? 0) + 1);
+      tile.engineData?.scene?.traverse((object) => {
+        if (object.isMesh && !object.userData.isOverlay) {
+          triangles += (object.geometry.index ?? object.geometry.getAttribute('position')).count / 3;
+        }
+      });
+    }
+    return { tiles: this.tiles.visibleTiles.size, triangles, levels };
+  }
+}
+
+const placement = new Matrix4();
