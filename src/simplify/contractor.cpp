@@ -26,15 +26,14 @@ Contractor::Contractor(Piece piece)
       size_(stars_.triangles().size()),
       version_(piece_.positions.size()) {
   if (piece_.bound > 0) tracker_.emplace(piece_.positions, stars_.triangles(), std::move(piece_.errors), piece_.bound);
-  heap_.reserve(2 * size_);
+  later_.reserve(2 * size_);
   for (std::uint32_t u = 0; u < version_.size(); ++u) {
     if (piece_.fixed[u] != 0) continue;
     stars_.neighbours(u, near_);
     for (const std::uint32_t v : near_) {
-      if (u < v && piece_.fixed[v] == 0) heap_.push_back({static_cast<float>(place(u, v).cost), u, v, 0});
+      if (u < v) offer(u, v);
     }
   }
-  std::make_heap(heap_.begin(), heap_.end());
 }
 
 Contractor::Placed Contractor::place(std::uint32_t u, std::uint32_t v) const {
@@ -61,25 +60,52 @@ Contractor::Placed Contractor::place(std::uint32_t u, std::uint32_t v) const {
 void Contractor::offer(std::uint32_t u, std::uint32_t v) {
   if (piece_.fixed[v] != 0) return;
   if (u > v) std::swap(u, v);
-  heap_.push_back({static_cast<float>(place(u, v).cost), u, v, version_[u] + version_[v]});
+  const Entry edge{static_cast<float>(place(u, v).cost), u, v, version_[u] + version_[v]};
+  if (edge.cost > limit_) {
+    later_.push_back(edge);
+    least_later_ = std::min(least_later_, edge.cost);
+    return;
+  }
+  heap_.push_back(edge);
   std::push_heap(heap_.begin(), heap_.end());
 }
 
-float Contractor::next_cost() {
-  while (!heap_.empty()) {
-    const Entry& e = heap_.front();
-    if (e.version == version_[e.u] + version_[e.v] && !stars_.around(e.u).empty() && !stars_.around(e.v).empty())
-      return e.cost;
+void Contractor::raise_limit(float limit) {
+  if (limit <= limit_) return;
+  limit_ = limit;
+  least_later_ = std::numeric_limits<float>::infinity();
+  std::size_t kept = 0;
+  for (const Entry& e : later_) {
+    if (stale(e)) continue;
+    if (e.cost <= limit_) {
+      heap_.push_back(e);
+      continue;
+    }
+    least_later_ = std::min(least_later_, e.cost);
+    later_[kept++] = e;
+  }
+  later_.resize(kept);
+  std::make_heap(heap_.begin(), heap_.end());
+}
+
+void Contractor::drop_stale() {
+  while (!heap_.empty() && stale(heap_.front())) {
     std::pop_heap(heap_.begin(), heap_.end());
     heap_.pop_back();
   }
-  return std::numeric_limits<float>::infinity();
+}
+
+float Contractor::next_cost() {
+  drop_stale();
+  return heap_.empty() ? least_later_ : heap_.front().cost;
 }
 
 std::uint64_t Contractor::run(float dearest, std::uint64_t keep) {
   const std::uint64_t before = size_;
+  raise_limit(dearest);
   while (size_ > keep) {
-    if (const float cost = next_cost(); cost > dearest || std::isinf(cost)) break;
+    drop_stale();
+    if (heap_.empty() || heap_.front().cost > dearest || std::isinf(heap_.front().cost)) break;
     const Entry e = heap_.front();
     std::pop_heap(heap_.begin(), heap_.end());
     heap_.pop_back();

@@ -37,11 +37,14 @@ class Contractor {
  public:
   explicit Contractor(Piece piece);
 
-  /// What the next contraction costs; nothing that is finite when none is left.
+  /// What the next contraction costs, or a little less; nothing that is finite when none is left.
   [[nodiscard]] float next_cost();
   /// Contracts while the next one costs no more than `dearest` and more than `keep` triangles are there. Returns
   /// how many triangles went.
   std::uint64_t run(float dearest, std::uint64_t keep);
+
+  /// Contractions of any cost are asked for from now on, in small steps.
+  void expect_all() { raise_limit(std::numeric_limits<float>::infinity()); }
 
   [[nodiscard]] std::uint64_t size() const { return size_; }  ///< triangles that are there
   [[nodiscard]] const std::vector<Merge>& merges() const { return merges_; }
@@ -67,6 +70,11 @@ class Contractor {
     double cost;
   };
 
+  [[nodiscard]] bool stale(const Entry& e) const {
+    return e.version != version_[e.u] + version_[e.v] || stars_.around(e.u).empty() || stars_.around(e.v).empty();
+  }
+  void raise_limit(float limit);
+  void drop_stale();
   [[nodiscard]] Placed place(std::uint32_t u, std::uint32_t v) const;
   void offer(std::uint32_t u, std::uint32_t v);
   [[nodiscard]] bool stays_near(std::uint32_t u, std::uint32_t v, const Placed& to);
@@ -78,7 +86,10 @@ class Contractor {
   std::uint64_t size_;
   std::optional<Tracker> tracker_;
   std::vector<std::uint32_t> version_;  ///< how often a vertex has moved
-  std::vector<Entry> heap_;
+  std::vector<Entry> heap_;             ///< what costs no more than limit_
+  std::vector<Entry> later_;            ///< the other edges: most of them will be others before it is their turn
+  float limit_ = -1;
+  float least_later_ = std::numeric_limits<float>::infinity();  ///< cost of them, stale ones included
   std::vector<Merge> merges_;
   double deviation2_ = 0;
   std::vector<std::uint32_t> near_;

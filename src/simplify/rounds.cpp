@@ -170,6 +170,7 @@ class Round {
   bool in_turn(std::uint64_t goal) {
     using Turn = std::pair<float, std::size_t>;
     std::priority_queue<Turn, std::vector<Turn>, std::greater<>> queue;
+    tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) { pieces_[p]->expect_all(); });
     for (std::size_t p = 0; p < pieces_.size(); ++p) queue.emplace(pieces_[p]->next_cost(), p);
     while (size_ > goal && !queue.empty() && !std::isinf(queue.top().first)) {
       const std::size_t p = queue.top().second;

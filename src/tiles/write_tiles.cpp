@@ -59,7 +59,7 @@ TileLattice lattice_of(const Extent& extent, const TileOctree& octree, bool map)
   // A round origin: nothing is lost when it is taken away or added.
   const double round = longest > 0 ? std::exp2(std::ceil(std::log2(longest)) - 4) : 1;
   const meshes::Vec3 centre = extent.middle();
-  for (std::size_t k = 0; k < 3; ++k) lattice.origin[k] = std::nearbyint(centre[k] / round) * round;
+  for (std::size_t k = 0; k < 3; ++k) lattice.origin[k] = std::nearbyint(centre[k] / round) * round + 0.0;
   return lattice;
 }
 
