@@ -25,6 +25,9 @@ set(lamina_link_packages libopenvdb-dev libimath-dev libboost-iostreams-dev libt
 if(MPI_C_FOUND)
   list(APPEND lamina_link_packages libopenmpi-dev)
 endif()
+if(HTTPLIB_FOUND)
+  list(APPEND lamina_link_packages libcpp-httplib-dev)
+endif()
 list(JOIN lamina_link_packages ", " CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS)
 include(CPack)
 

@@ -223,7 +223,7 @@ export class Panel {
     const { description, model } = this.viewer;
     const lines = [];
     if (description.kind === 'mesh') {
-      lines.push(`${countText(description.triangles)} triangles, ${countText(description.vertices)} vertices`);
+      lines.push(`${countText(description.triangles)} triangles`, `${countText(description.vertices)} vertices`);
       const loops = description.boundaryLoops;
       lines.push(loops === 0 ? 'closed: no boundary'
         : `${countText(loops)} boundary ${loops === 1 ? 'loop' : 'loops'} of ${countText(description.boundaryEdges)} edges`);
