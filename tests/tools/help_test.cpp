@@ -53,13 +53,16 @@ TEST(Help, EveryExampleOfEveryToolWorks) {
   sphere_mesh(folder / "other.obj", 1.01);
   ASSERT_EQ(run_lamina({"convert", folder / "mesh.ply", "--voxelsize", "0.05", "-o", folder / "mesh.vdb"}).code, 0);
   write_file(folder / "job.json", run_lamina({"check", folder / "mesh.ply", "--print-job"}).out);
+  // Pages want a part that the build takes from npm, where that is.
+  const bool pages =
+      std::filesystem::exists(std::filesystem::path(LAMINA_PROGRAM).parent_path() / "share/lamina/viewer.js");
   for (const std::string& tool : tools()) {
     const auto lines = examples(run_lamina({tool, "--help"}).out);
     EXPECT_FALSE(lines.empty()) << tool << " has no example";
     for (const std::string& line : lines) {
       EXPECT_THAT(line, StartsWith("lamina " + tool + " "));
       const auto outcome = run_shell("cd " + test::quoted(folder.path()) + " && " + line);
-      EXPECT_EQ(outcome.code, 0) << line << "\n" << outcome.err;
+      EXPECT_EQ(outcome.code, tool == "view" && !pages ? 2 : 0) << line << "\n" << outcome.err;
     }
   }
 }
