@@ -20,8 +20,8 @@ function run(...options) {
 }
 
 /** A ball of red, green and blue thirds with an attribute that grows with z, as an ascii PLY of points with normals. */
-function ball(name, count, [x, y, z]) {
-  const lines = [`ply\nformat ascii 1.0\nelement vertex ${count}\n` +
+function ball(name, count, [x, y, z], comment = '') {
+  const lines = [`ply\nformat ascii 1.0\n${comment}element vertex ${count}\n` +
     ['x', 'y', 'z'].map((n) => `property double ${n}\n`).join('') + ['nx', 'ny', 'nz', 'height'].map((n) => `property float ${n}\n`).join('') +
     ['red', 'green', 'blue'].map((n) => `property uchar ${n}\n`).join('') + 'end_header'];
   for (let i = 0; i < count; ++i) {
@@ -140,12 +140,34 @@ async function lookAtTiles() {
   });
 }
 
+/** On the Earth: an axis of the map points somewhere else there, and a metre of it is a little longer. */
+async function lookAtEarth() {
+  ball('utm.ply', 4000, [500000, 4000000, 100], 'comment crs EPSG:32633\n');
+  try {
+    run('surface', join(folder, 'utm.ply'), '-o', join(folder, 'utm_mesh.ply'), '--tiles', join(folder, 'utm'));
+  } catch {
+    return;
+  }
+  run('view', join(folder, 'utm'), '-o', join(folder, 'utm.html'));
+  await look('earth', `file://${join(folder, 'utm.html')}`, async (page, see) => {
+    await page.until("/[1-9].* triangles/.test(document.querySelector('.drawn').textContent)");
+    const seen = await see('colours');
+    expect(near(seen.share, 0.66, 0.12), `earth: the tiles fill their part of the picture (${seen.share.toFixed(2)})`);
+    await page.click(594, 300);
+    const place = await page.evaluate("document.querySelector('.place').textContent");
+    const [x, y, z] = (place.match(/-?[\d.]+/g) ?? [0, 0, 0]).map(Number);
+    const distance = Math.hypot(x - 500000, y - 4000000, z - 100);
+    expect(near(distance, 1, 0.01), `earth: places are those of the map (${place}: ${distance})`);
+  });
+}
+
 rmSync(folder, { recursive: true, force: true });
 mkdirSync(folder, { recursive: true });
 try {
   await lookAtMesh();
   await lookAtPoints();
   await lookAtTiles();
+  await lookAtEarth();
 } finally {
   await browser.close();
 }

@@ -233,7 +233,8 @@ export class Panel {
     }
     const size = ['x', 'y', 'z'].map((axis) => numberText(model.box.max[axis] - model.box.min[axis], model.radius));
     lines.push(size.join(' × '));
-    if (description.crs) lines.push(description.crs);
+    const crs = description.crs ?? model.crs;
+    if (crs) lines.push(crs);
     this.facts.replaceChildren(...lines.map((line) => make('div', { textContent: line })));
   }
 }

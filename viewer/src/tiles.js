@@ -77,21 +77,24 @@ export class TileModel {
     const given = tiles.root.transform;
     const root = given ? new Matrix4().fromArray(given) : new Matrix4();
     const turned = [0, 5, 10].some((k) => Math.abs(root.elements[k] - 1) > 1e-9);
-    tiles.group.matrixAutoUpdate = true;
     tiles.getOrientedBoundingBox(this.box, placement);
     const corners = this.box.clone();
     const toRoot = turned ? root.clone().invert() : new Matrix4();
     corners.applyMatrix4(new Matrix4().multiplyMatrices(toRoot, placement));
     corners.getCenter(this.origin);
     const middle = this.origin.clone();
-    const said = tiles.rootTileset?.asset?.extras?.origin;
-    if (turned && said) this.origin.add(new Vector3(...said));
+    const said = tiles.rootTileset?.asset?.extras;
+    if (turned && said?.origin) this.origin.add(new Vector3(...said.origin));
+    // Well-known text begins with the system's name.
+    if (said?.crs) this.crs = said.crs.match(/"([^"]+)"/)?.[1] ?? said.crs;
     this.radius = 0.5 * corners.getSize(new Vector3()).length() || 1;
     this.box.copy(corners).translate(middle.clone().negate());
     const ends = [this.box.min, this.box.max];
     this.outline = [0, 1, 2, 3, 4, 5, 6, 7].map((k) => new Vector3(ends[k & 1].x, ends[(k >> 1) & 1].y, ends[k >> 2].z));
-    const move = new Matrix4().makeTranslation(-middle.x, -middle.y, -middle.z).multiply(toRoot);
-    move.decompose(tiles.group.position, tiles.group.quaternion, tiles.group.scale);
+    // As it is: a map's scale turned back is no position, rotation and scale, and at the Earth's radius that shows.
+    tiles.group.matrixAutoUpdate = false;
+    tiles.group.matrix.makeTranslation(-middle.x, -middle.y, -middle.z).multiply(toRoot);
+    tiles.group.matrixWorldNeedsUpdate = true;
     tiles.group.updateMatrixWorld(true);
   }
 
