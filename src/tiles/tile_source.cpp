@@ -58,20 +58,21 @@ std::uint32_t leaf_of_triangle(const std::array<std::uint32_t, 3>& homes) {
   return *std::min_element(homes.begin(), homes.end());
 }
 
-/// The vertices of some triangles, numbered in ascending order: a bit for each of the range they lie in.
+/// The vertices of some triangles, numbered in ascending order: a bit for each in the pages that have any. Those of a
+/// leaf lie in few pages of a streamed mesh; but what closes its holes comes at the very end.
 class VertexNumbers {
  public:
   explicit VertexNumbers(std::span<const std::array<std::uint32_t, 3>> triangles) {
-    if (triangles.empty()) return;
-    low_ = triangles[0][0];
-    std::uint32_t high = low_;
     for (const auto& t : triangles) {
-      low_ = std::min({low_, t[0], t[1], t[2]});
-      high = std::max({high, t[0], t[1], t[2]});
+      for (const std::uint32_t v : t) {
+        if (pages_.empty() || pages_.back() != v / kPage) pages_.push_back(v / kPage);
+      }
     }
-    words_.resize((high - low_) / 64 + 1);
+    std::sort(pages_.begin(), pages_.end());
+    pages_.erase(std::unique(pages_.begin(), pages_.end()), pages_.end());
+    words_.resize(pages_.size() * kWords);
     for (const auto& t : triangles) {
-      for (const std::uint32_t v : t) words_[(v - low_) / 64].bits |= std::uint64_t{1} << (v - low_) % 64;
+      for (const std::uint32_t v : t) word_of(v).bits |= std::uint64_t{1} << v % 64;
     }
     std::uint32_t before = 0;
     for (Word& word : words_) {
@@ -80,27 +81,39 @@ class VertexNumbers {
     }
   }
 
-  [[nodiscard]] std::uint32_t of(std::uint32_t vertex) const {
-    const Word& word = words_[(vertex - low_) / 64];
-    const std::uint64_t below = (std::uint64_t{1} << (vertex - low_) % 64) - 1;
+  /// Of one that is in a triangle.
+  [[nodiscard]] std::uint32_t of(std::uint32_t vertex) {
+    const Word& word = word_of(vertex);
+    const std::uint64_t below = (std::uint64_t{1} << vertex % 64) - 1;
     return word.before + static_cast<std::uint32_t>(std::popcount(word.bits & below));
   }
   [[nodiscard]] std::vector<std::uint32_t> vertices() const {
     std::vector<std::uint32_t> all;
     for (std::size_t w = 0; w < words_.size(); ++w) {
+      const auto first = pages_[w / kWords] * kPage + static_cast<std::uint32_t>(w % kWords) * 64;
       for (std::uint64_t bits = words_[w].bits; bits != 0; bits &= bits - 1)
-        all.push_back(low_ + static_cast<std::uint32_t>(64 * w + static_cast<std::size_t>(std::countr_zero(bits))));
+        all.push_back(first + static_cast<std::uint32_t>(std::countr_zero(bits)));
     }
     return all;
   }
 
  private:
+  static constexpr std::uint32_t kPage = 4096;  ///< vertices
+  static constexpr std::size_t kWords = kPage / 64;
   struct Word {
     std::uint64_t bits = 0;
     std::uint32_t before = 0;  ///< vertices in the words before it
   };
-  std::vector<Word> words_;
-  std::uint32_t low_ = 0;
+  Word& word_of(std::uint32_t vertex) {
+    const std::uint32_t page = vertex / kPage;
+    if (pages_[last_] != page)
+      last_ = static_cast<std::size_t>(std::lower_bound(pages_.begin(), pages_.end(), page) - pages_.begin());
+    return words_[last_ * kWords + vertex % kPage / 64];
+  }
+
+  std::vector<std::uint32_t> pages_;  ///< ascending
+  std::vector<Word> words_;           ///< of all pages
+  std::size_t last_ = 0;              ///< page that was asked for
 };
 
 std::vector<std::size_t> colour_attributes(const AttributeLayout& layout) {
@@ -197,7 +210,7 @@ std::vector<TileSource::Corners> TileSource::corners_of(const Leaf& leaf) const 
 TileMesh TileSource::leaf(std::uint32_t node, const TileLattice& lattice) {
   TileMesh tile;
   tile.mesh.triangles = corners_of(leaves_[node]);
-  const VertexNumbers numbers(tile.mesh.triangles);
+  VertexNumbers numbers(tile.mesh.triangles);
   for (Corners& t : tile.mesh.triangles) {
     for (std::uint32_t& v : t) v = numbers.of(v);
   }
