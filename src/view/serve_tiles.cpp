@@ -64,9 +64,9 @@ void send_file(const std::string& path, httplib::Response& response) {
     response.status = 404;
     return;
   }
-  if (bytes == 0) return response.set_content("", media_type(path).c_str());
+  if (bytes == 0) return response.set_content("", media_type(path));
   response.set_content_provider(
-      bytes, media_type(path).c_str(), [file](std::size_t offset, std::size_t length, httplib::DataSink& sink) {
+      bytes, media_type(path), [file](std::size_t offset, std::size_t length, httplib::DataSink& sink) {
         std::string piece(std::min<std::size_t>(length, 1u << 18), '\0');
         file->seekg(static_cast<std::streamoff>(offset));
         file->read(piece.data(), static_cast<std::streamsize>(piece.size()));
