@@ -27,3 +27,9 @@ if(LAMINA_SANITIZE)
     target_compile_options(lamina_flags INTERFACE -include ${PROJECT_SOURCE_DIR}/tests/tsan/annotated_tbb.h)
   endif()
 endif()
+
+# For libraries that become part of a shared object, the Python module, too. Calls and inlining stay what they are in a program.
+function(lamina_position_independent target)
+  set_target_properties(${target} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  target_compile_options(${target} PRIVATE -fno-semantic-interposition)
+endfunction()

@@ -8,6 +8,7 @@
 #include "common/inputs.h"
 #include "lamina/error.h"
 #include "lamina/measure.h"
+#include "tables.h"
 #include "tool.h"
 
 namespace lamina::tools {
@@ -18,37 +19,6 @@ struct CheckOptions {
   RunContext run;
   bool json = false;
 };
-
-nlohmann::ordered_json as_json(const std::string& path, const CheckReport& r) {
-  nlohmann::ordered_json j{{"mesh", path},
-                           {"vertices", r.vertices},
-                           {"triangles", r.triangles},
-                           {"edges", r.edges},
-                           {"non_finite_vertices", r.non_finite_vertices},
-                           {"unreferenced_vertices", r.unreferenced_vertices},
-                           {"duplicate_vertices", r.duplicate_vertices},
-                           {"non_manifold_edges", r.non_manifold_edges},
-                           {"non_manifold_vertices", r.non_manifold_vertices},
-                           {"inconsistent_edges", r.inconsistent_edges},
-                           {"repeated_index_triangles", r.repeated_index_triangles},
-                           {"zero_area_triangles", r.zero_area_triangles},
-                           {"duplicate_triangles", r.duplicate_triangles},
-                           {"boundary_edges", r.boundary_edges},
-                           {"boundary_loops", r.boundary_loops},
-                           {"longest_loop_edges", r.longest_loop_edges},
-                           {"longest_loop_length", r.longest_loop_length},
-                           {"components", r.components},
-                           {"largest_component_triangles", r.largest_component_triangles},
-                           {"largest_component_boundary_edges", r.largest_component_boundary_edges},
-                           {"euler_characteristic", r.euler_characteristic}};
-  if (r.genus)
-    j["genus"] = *r.genus;
-  else
-    j["genus"] = nullptr;
-  j["manifold"] = r.manifold();
-  j["closed"] = r.closed();
-  return j;
-}
 
 void print_table(const CheckReport& r) {
   const auto row = [](const char* label, const auto& value) { fmt::print("{:<26} {:>12}\n", label, value); };
@@ -93,22 +63,62 @@ std::string objections(const CheckReport& r, bool closed) {
   return text;
 }
 
+void print_json(const std::string& mesh, const CheckReport& report) {
+  nlohmann::ordered_json j{{"mesh", mesh}};
+  j.update(check_json(report));
+  fmt::print("{}\n", j.dump(2));
+}
+
 void run_check(const CheckOptions& o) {
   const TriangleMesh mesh = read_mesh_input(o.mesh, o.run, NonFinite::keep);
   if (mesh.triangles.empty())
     throw Error(ExitCode::unreadable, fmt::format("{}: has no faces: a point cloud, not a mesh", o.mesh));
   const CheckReport report = check_mesh(mesh, o.run);
   if (o.json)
-    fmt::print("{}\n", as_json(o.mesh, report).dump(2));
+    print_json(o.mesh, report);
   else
     print_table(report);
-  const bool met = o.expect.empty() || (o.expect == "closed" ? report.closed() : report.manifold());
-  if (!met)
-    throw Error(ExitCode::check_failed,
-                fmt::format("{}: not {}: {}", o.mesh, o.expect, objections(report, o.expect == "closed")));
+  require_expected(o.mesh, o.expect, report);
 }
 
 }  // namespace
+
+nlohmann::ordered_json check_json(const CheckReport& r) {
+  nlohmann::ordered_json j{{"vertices", r.vertices},
+                           {"triangles", r.triangles},
+                           {"edges", r.edges},
+                           {"non_finite_vertices", r.non_finite_vertices},
+                           {"unreferenced_vertices", r.unreferenced_vertices},
+                           {"duplicate_vertices", r.duplicate_vertices},
+                           {"non_manifold_edges", r.non_manifold_edges},
+                           {"non_manifold_vertices", r.non_manifold_vertices},
+                           {"inconsistent_edges", r.inconsistent_edges},
+                           {"repeated_index_triangles", r.repeated_index_triangles},
+                           {"zero_area_triangles", r.zero_area_triangles},
+                           {"duplicate_triangles", r.duplicate_triangles},
+                           {"boundary_edges", r.boundary_edges},
+                           {"boundary_loops", r.boundary_loops},
+                           {"longest_loop_edges", r.longest_loop_edges},
+                           {"longest_loop_length", r.longest_loop_length},
+                           {"components", r.components},
+                           {"largest_component_triangles", r.largest_component_triangles},
+                           {"largest_component_boundary_edges", r.largest_component_boundary_edges},
+                           {"euler_characteristic", r.euler_characteristic}};
+  if (r.genus)
+    j["genus"] = *r.genus;
+  else
+    j["genus"] = nullptr;
+  j["manifold"] = r.manifold();
+  j["closed"] = r.closed();
+  return j;
+}
+
+void require_expected(const std::string& mesh, const std::string& expect, const CheckReport& report) {
+  const bool met = expect.empty() || (expect == "closed" ? report.closed() : report.manifold());
+  if (!met)
+    throw Error(ExitCode::check_failed,
+                fmt::format("{}: not {}: {}", mesh, expect, objections(report, expect == "closed")));
+}
 
 void add_check(CLI::App& app) {
   auto* tool = app.add_subcommand("check", "Check that a mesh is finite, manifold, oriented and closed");

@@ -8,6 +8,7 @@
 #include "common/inputs.h"
 #include "lamina/error.h"
 #include "lamina/measure.h"
+#include "tables.h"
 #include "tool.h"
 
 namespace lamina::tools {
@@ -56,17 +57,24 @@ void run_compare(const CompareOptions& o) {
     print_table(r);
     return;
   }
-  const nlohmann::ordered_json j{{"a", o.a},
-                                 {"b", o.b},
-                                 {"seed", o.settings.seed},
-                                 {"vertices", o.settings.vertices},
-                                 {"diagonal", r.diagonal},
-                                 {"a_to_b", as_json(r.a_to_b, r.diagonal)},
-                                 {"b_to_a", as_json(r.b_to_a, r.diagonal)}};
+  nlohmann::ordered_json j{{"a", o.a}, {"b", o.b}, {"seed", o.settings.seed}, {"vertices", o.settings.vertices}};
+  j.update(compare_json(r));
   fmt::print("{}\n", j.dump(2));
 }
 
 }  // namespace
+
+nlohmann::ordered_json compare_json(const CompareResult& r) {
+  return {
+      {"diagonal", r.diagonal}, {"a_to_b", as_json(r.a_to_b, r.diagonal)}, {"b_to_a", as_json(r.b_to_a, r.diagonal)}};
+}
+
+void add_compare_options(CLI::App& tool, CompareSettings& settings) {
+  tool.add_option("--count", settings.count, "Samples per side, spread by area")->type_name("N")->capture_default_str();
+  tool.add_flag("--vertices", settings.vertices,
+                "Measure at the vertices instead of at samples: the part of the error that is their own");
+  tool.add_option("--seed", settings.seed, "Another seed, other samples")->type_name("N")->capture_default_str();
+}
 
 void add_compare(CLI::App& app) {
   auto* tool = app.add_subcommand("compare", "Measure the two-sided distance between mesh A and mesh B, the truth");
@@ -75,12 +83,7 @@ void add_compare(CLI::App& app) {
   tool->add_option("B", o->b, "The truth: mesh (or points); relative figures divide by its box's diagonal")
       ->required()
       ->type_name("");
-  tool->add_option("--count", o->settings.count, "Samples per side, spread by area")
-      ->type_name("N")
-      ->capture_default_str();
-  tool->add_flag("--vertices", o->settings.vertices,
-                 "Measure at the vertices instead of at samples: the part of the error that is their own");
-  tool->add_option("--seed", o->settings.seed, "Another seed, other samples")->type_name("N")->capture_default_str();
+  add_compare_options(*tool, o->settings);
   tool->add_option("--threads", o->run.threads, "Number of threads; 0 is every core")
       ->type_name("N")
       ->capture_default_str()

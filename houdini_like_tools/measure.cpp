@@ -10,6 +10,7 @@
 #include "common/help.h"
 #include "common/inputs.h"
 #include "lamina/error.h"
+#include "tables.h"
 #include "tool.h"
 
 namespace lamina::tools {
@@ -22,37 +23,6 @@ struct MeasureOptions {
   bool json = false;
   RunOptions run;
 };
-
-nlohmann::ordered_json as_json(const std::string& path, const MeshMeasures& m) {
-  nlohmann::ordered_json j{{"mesh", path},
-                           {"vertices", m.vertices},
-                           {"triangles", m.triangles},
-                           {"edges", m.edges},
-                           {"boundary_edges", m.boundary_edges},
-                           {"low", m.low},
-                           {"high", m.high},
-                           {"centroid", m.centroid},
-                           {"area", m.area},
-                           {"boundary_length", m.boundary_length}};
-  if (m.volume) {
-    j["volume"] = *m.volume;
-  } else {
-    j["volume"] = nullptr;
-  }
-  j["edge_length"] = {{"shortest", m.shortest_edge}, {"mean", m.mean_edge}, {"longest", m.longest_edge}};
-  j["total_gaussian_curvature"] = m.total_gaussian_curvature;
-  j["mean_absolute_mean_curvature"] = m.mean_absolute_mean_curvature;
-  j["parts"] = nlohmann::ordered_json::array();
-  for (const MeshPart& p : m.parts) {
-    j["parts"].push_back({{"triangles", p.triangles},
-                          {"area", p.area},
-                          {"closed", p.closed},
-                          {"volume", p.volume},
-                          {"low", p.low},
-                          {"high", p.high}});
-  }
-  return j;
-}
 
 void print_table(const MeshMeasures& m) {
   const auto row = [](const char* label, const std::string& value) { fmt::print("{:<24} {}\n", label, value); };
@@ -96,13 +66,45 @@ void run_measure(const MeasureOptions& o) {
     throw Error(e.code(), shown_name(o.mesh) + ": " + e.what());  // the library knows the mesh, not its name
   }
   if (o.json) {
-    fmt::print("{}\n", as_json(o.mesh, measures).dump(2));
+    nlohmann::ordered_json j{{"mesh", o.mesh}};
+    j.update(measure_json(measures));
+    fmt::print("{}\n", j.dump(2));
   } else {
     print_table(measures);
   }
 }
 
 }  // namespace
+
+nlohmann::ordered_json measure_json(const MeshMeasures& m) {
+  nlohmann::ordered_json j{{"vertices", m.vertices},
+                           {"triangles", m.triangles},
+                           {"edges", m.edges},
+                           {"boundary_edges", m.boundary_edges},
+                           {"low", m.low},
+                           {"high", m.high},
+                           {"centroid", m.centroid},
+                           {"area", m.area},
+                           {"boundary_length", m.boundary_length}};
+  if (m.volume) {
+    j["volume"] = *m.volume;
+  } else {
+    j["volume"] = nullptr;
+  }
+  j["edge_length"] = {{"shortest", m.shortest_edge}, {"mean", m.mean_edge}, {"longest", m.longest_edge}};
+  j["total_gaussian_curvature"] = m.total_gaussian_curvature;
+  j["mean_absolute_mean_curvature"] = m.mean_absolute_mean_curvature;
+  j["parts"] = nlohmann::ordered_json::array();
+  for (const MeshPart& p : m.parts) {
+    j["parts"].push_back({{"triangles", p.triangles},
+                          {"area", p.area},
+                          {"closed", p.closed},
+                          {"volume", p.volume},
+                          {"low", p.low},
+                          {"high", p.high}});
+  }
+  return j;
+}
 
 void add_measure(CLI::App& app) {
   auto* tool = app.add_subcommand("measure", "Measure a mesh: area, volume, edges, curvature, parts");

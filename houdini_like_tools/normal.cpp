@@ -16,6 +16,7 @@
 #include "common/stats.h"
 #include "lamina/edit_points.h"
 #include "lamina/error.h"
+#include "tables.h"
 #include "tool.h"
 
 namespace lamina::tools {
@@ -25,15 +26,13 @@ struct NormalOptions {
   std::vector<std::string> inputs;
   std::string output, stats;
   PointSettings reading;
-  NormalsSettings settings;
-  bool reorient = false, check = false, missing = false;
+  NormalFinding finding;
   Precision precision = Precision::automatic;
-  std::optional<Trade> preset;
   CLI::App* tool = nullptr;  ///< knows which options were given
   RunOptions run;
 };
 
-NormalsMode mode_of(const NormalOptions& o) {
+NormalsMode mode_of(const NormalFinding& o) {
   if (int{o.reorient} + int{o.check} + int{o.missing} > 1)
     throw Error(ExitCode::usage, "--reorient, --missing and --check exclude each other");
   if (o.check) return NormalsMode::check;
@@ -42,14 +41,10 @@ NormalsMode mode_of(const NormalOptions& o) {
 }
 
 void run_normal(NormalOptions& o) {
-  if (o.preset) {
-    const auto points_only = [](PresetPart part) { return part == PresetPart::points; };
-    apply_preset(*o.tool, *o.preset, points_only, make_context(o.run, o.output));
-  }
-  NormalsSettings settings = o.settings;
-  settings.mode = mode_of(o);
-  if (!o.check && o.output.empty()) throw CLI::RequiredError("--output");
-  if (o.check && !o.output.empty()) throw Error(ExitCode::usage, "--check writes no points; leave --output out");
+  NormalsSettings settings = normals_settings(*o.tool, o.finding, make_context(o.run, o.output));
+  if (!o.finding.check && o.output.empty()) throw CLI::RequiredError("--output");
+  if (o.finding.check && !o.output.empty())
+    throw Error(ExitCode::usage, "--check writes no points; leave --output out");
   if (o.stats == "-" && o.output == "-")
     throw Error(ExitCode::usage, "--stats and --output both name standard output; give one of them a file");
   const RunContext context = make_context(o.run, o.output);
@@ -62,11 +57,7 @@ void run_normal(NormalOptions& o) {
   for (const std::string& remark : source->info().remarks) context.info(remark);
   const std::string path = shown_name(source->info().path);
   require_no_degrees(source->info());
-  if (!o.preset && !o.check) {
-    const TradeGuess guess = guess_trade(source->info());
-    context.info(describe(guess));
-    face_by_trade(guess.trade, settings);
-  }
+  if (!o.finding.preset && !o.finding.check) guess_facing(source->info(), settings, context);
   PointColumns columns = with_precision(columns_of(source->info()), o.precision);
   columns.normals = true;
   // An output that cannot be written is better known before the work.
@@ -91,6 +82,31 @@ void run_normal(NormalOptions& o) {
 
 }  // namespace
 
+NormalsSettings normals_settings(CLI::App& tool, const NormalFinding& finding, const RunContext& context) {
+  if (finding.preset) {
+    const auto points_only = [](PresetPart part) { return part == PresetPart::points; };
+    apply_preset(tool, *finding.preset, points_only, context);
+  }
+  NormalsSettings settings = finding.settings;
+  settings.mode = mode_of(finding);
+  return settings;
+}
+
+void guess_facing(const PointSourceInfo& info, NormalsSettings& settings, const RunContext& context) {
+  const TradeGuess guess = guess_trade(info);
+  context.info(describe(guess));
+  face_by_trade(guess.trade, settings);
+}
+
+void add_normal_finding(CLI::App& tool, NormalFinding& finding) {
+  const std::string group = "Normals";
+  tool.add_flag("--reorient", finding.reorient, "Keep the directions the input has, change signs only")->group(group);
+  tool.add_flag("--missing", finding.missing, "Keep the normals the input has, find those it lacks")->group(group);
+  tool.add_flag("--check", finding.check, "Change and write nothing: tell the share of sign conflicts")->group(group);
+  add_preset(tool, finding.preset, group);
+  add_normals_options(tool, finding.settings, group);
+}
+
 void add_normal(CLI::App& app) {
   auto* tool = app.add_subcommand("normal", "Find normals of points, or turn those they have to one side");
   auto o = std::make_shared<NormalOptions>();
@@ -109,14 +125,9 @@ void add_normal(CLI::App& app) {
           "normal 0 0 0")
       ->type_name("FILE")
       ->group("Output");
-  const std::string group = "Normals";
-  tool->add_flag("--reorient", o->reorient, "Keep the directions the input has, change signs only")->group(group);
-  tool->add_flag("--missing", o->missing, "Keep the normals the input has, find those it lacks")->group(group);
-  tool->add_flag("--check", o->check, "Change and write nothing: tell the share of sign conflicts")->group(group);
-  add_preset(*tool, o->preset, group);
-  add_normals_options(*tool, o->settings, group);
+  add_normal_finding(*tool, o->finding);
   add_point_options(*tool, o->reading);
-  add_bad_samples(*tool, o->settings.bad_samples);
+  add_bad_samples(*tool, o->finding.settings.bad_samples);
   add_precision(*tool, o->precision);
   tool->add_option("--stats", o->stats, "Write counts and conflicts by slab to this JSON file; - for standard output")
       ->type_name("FILE.json")

@@ -10,6 +10,7 @@
 #include "common/text.h"
 #include "lamina/error.h"
 #include "lamina/point_radii.h"
+#include "tables.h"
 #include "tool.h"
 
 namespace lamina::tools {
@@ -49,36 +50,39 @@ void run_radius(const RadiusOptions& o) {
 
 }  // namespace
 
+void add_radius_options(CLI::App& tool, PointRadiiSettings& s) {
+  const std::string group = "Radius";
+  tool.add_option("--density", s.density, "Samples a counting cell needs to give a radius, 2 to 4096")
+      ->type_name("N")
+      ->capture_default_str()
+      ->group(group);
+  tool.add_option("--particlescale", s.particlescale, "Multiply every radius by K, up to 1000")
+      ->type_name("K")
+      ->capture_default_str()
+      ->group(group);
+  tool.add_option("--minradius", s.minradius, "Raise smaller radii to this; 0: none")
+      ->type_name("LENGTH")
+      ->capture_default_str()
+      ->group(group);
+  tool.add_option("--maxradius", s.maxradius, "Lower larger radii to this; 0: no limit")
+      ->type_name("LENGTH")
+      ->capture_default_str()
+      ->group(group);
+}
+
 void add_radius(CLI::App& app) {
   auto* tool = app.add_subcommand("radius", "Give every point a radius from the sampling density around it");
   auto o = std::make_shared<RadiusOptions>();
   add_files(*tool, o->input, "Points; a radius they have is replaced", o->output, "Points with a radius");
-  const std::string group = "Radius";
-  PointRadiiSettings& s = o->settings;
-  tool->add_option("--density", s.density, "Samples a counting cell needs to give a radius, 2 to 4096")
-      ->type_name("N")
-      ->capture_default_str()
-      ->group(group);
-  tool->add_option("--particlescale", s.particlescale, "Multiply every radius by K, up to 1000")
-      ->type_name("K")
-      ->capture_default_str()
-      ->group(group);
-  tool->add_option("--minradius", s.minradius, "Raise smaller radii to this; 0: none")
-      ->type_name("LENGTH")
-      ->capture_default_str()
-      ->group(group);
-  tool->add_option("--maxradius", s.maxradius, "Lower larger radii to this; 0: no limit")
-      ->type_name("LENGTH")
-      ->capture_default_str()
-      ->group(group);
+  add_radius_options(*tool, o->settings);
   tool->add_option_function<std::string>(
           "--name", [o](const std::string& name) { o->name = name; },
           "Name of the column; Houdini says pscale [radius]")
       ->check(CLI::IsMember({"radius", "pscale"}).description(""))
       ->type_name("radius|pscale")
-      ->group(group);
+      ->group("Radius");
   add_point_options(*tool, o->reading);
-  add_bad_samples(*tool, s.bad_samples);
+  add_bad_samples(*tool, o->settings.bad_samples);
   add_precision(*tool, o->precision);
   add_run_options(*tool, o->run);
   add_notes(

@@ -12,6 +12,7 @@
 #include "common/model.h"
 #include "common/option_values.h"
 #include "common/outputs.h"
+#include "tables.h"
 #include "tool.h"
 
 namespace lamina::tools {
@@ -19,8 +20,7 @@ namespace {
 
 struct RenderOptions {
   std::string input, output;
-  RenderSettings settings;
-  ModelOptions model;
+  PictureOptions picture;
   RunOptions run;
 };
 
@@ -34,8 +34,8 @@ std::string frame_name(const std::string& output, int frame, int frames) {
 
 void run_render(const RenderOptions& o) {
   const RunContext context = make_context(o.run);
-  const RenderSettings& s = o.settings;
-  ModelOptions options = o.model;
+  const RenderSettings& s = o.picture.settings;
+  ModelOptions options = o.picture.model;
   options.as_triangles = s.flat || s.wire || s.mark_boundary;
   Renderer renderer(s, context);
   const std::unique_ptr<Model> model = open_model(o.input, options, context);
@@ -127,6 +127,15 @@ void add_paint_options(CLI::App& tool, PaintOptions& paint) {
 }
 
 void check_together(const RenderOptions& o) {
+  require_together(o.picture);
+  if (o.picture.settings.frames > 1 && o.output == "-")
+    throw CLI::ValidationError("--frames", "several pictures do not go to standard output; name a file");
+  require_picture_name(o.output);
+}
+
+}  // namespace
+
+void require_together(const PictureOptions& o) {
   const PaintOptions& paint = o.model.paint;
   if (paint.what == "distance" && paint.reference.empty())
     throw CLI::ValidationError("--paint", "distance wants --reference, the mesh to measure from");
@@ -135,12 +144,33 @@ void check_together(const RenderOptions& o) {
   if (paint.what.empty() && paint.range) throw CLI::ValidationError("--paint-range", "goes with --paint");
   if (!paint.what.empty() && o.settings.colour != ColourMode::automatic)
     throw CLI::ValidationError("--paint", "and --colour exclude each other");
-  if (o.settings.frames > 1 && o.output == "-")
-    throw CLI::ValidationError("--frames", "several pictures do not go to standard output; name a file");
-  require_picture_name(o.output);
 }
 
-}  // namespace
+void add_picture_options(CLI::App& tool, PictureOptions& o) {
+  add_numbers(tool, "--size", {"WxH", 2, 'x'}, "Pixels of the whole picture, sides of 1 to 16384 [1024x1024]",
+              [&o](const std::vector<double>& v) {
+                for (const double side : v) {
+                  if (side != std::floor(side) || side < 1 || side > 16384) {
+                    throw CLI::ValidationError("--size", "sides are whole numbers, 1 to 16384");
+                  }
+                }
+                o.settings.width = static_cast<int>(v[0]);
+                o.settings.height = static_cast<int>(v[1]);
+              })
+      ->group("Picture");
+  tool.add_option("--supersample", o.settings.supersample, "Samples per pixel in each direction")
+      ->check(CLI::Range(1, 8))
+      ->type_name("N")
+      ->capture_default_str()
+      ->group("Picture");
+  add_camera_options(tool, o.settings);
+  add_look_options(tool, o.settings);
+  add_paint_options(tool, o.model.paint);
+  tool.add_option("--grid", o.model.grid,
+                  "Name of the grid to draw, of a .vdb [its level set, else its fog, else its points]")
+      ->type_name("NAME")
+      ->group("Look");
+}
 
 void add_render(CLI::App& app) {
   CLI::App* tool = app.add_subcommand("render", "Draw a picture of a mesh, a point cloud or a volume");
@@ -155,29 +185,7 @@ void add_render(CLI::App& app) {
       ->required()
       ->type_name("FILE")
       ->group("Picture");
-  add_numbers(*tool, "--size", {"WxH", 2, 'x'}, "Pixels of the whole picture, sides of 1 to 16384 [1024x1024]",
-              [o](const std::vector<double>& v) {
-                for (const double side : v) {
-                  if (side != std::floor(side) || side < 1 || side > 16384) {
-                    throw CLI::ValidationError("--size", "sides are whole numbers, 1 to 16384");
-                  }
-                }
-                o->settings.width = static_cast<int>(v[0]);
-                o->settings.height = static_cast<int>(v[1]);
-              })
-      ->group("Picture");
-  tool->add_option("--supersample", o->settings.supersample, "Samples per pixel in each direction")
-      ->check(CLI::Range(1, 8))
-      ->type_name("N")
-      ->capture_default_str()
-      ->group("Picture");
-  add_camera_options(*tool, o->settings);
-  add_look_options(*tool, o->settings);
-  add_paint_options(*tool, o->model.paint);
-  tool->add_option("--grid", o->model.grid,
-                   "Name of the grid to draw, of a .vdb [its level set, else its fog, else its points]")
-      ->type_name("NAME")
-      ->group("Look");
+  add_picture_options(*tool, o->picture);
   add_run_options(*tool, o->run);
   add_notes(
       *tool,

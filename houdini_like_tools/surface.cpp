@@ -1,5 +1,5 @@
 // lamina surface: oriented points in, streamed triangle mesh out.
-#include "lamina/surface.h"
+#include "surface.h"
 
 #include <fmt/format.h>
 
@@ -28,17 +28,6 @@
 
 namespace lamina::tools {
 namespace {
-
-struct SurfaceOptions {
-  std::vector<std::string> inputs, outputs;
-  SurfaceSettings settings;
-  RunOptions run;
-  PartsOptions parts;
-  std::string stats, preview;
-  bool raw = false;
-  std::optional<Trade> preset;
-  CLI::App* tool = nullptr;  ///< knows which options were given
-};
 
 /// A picture of the mesh file: of its triangles where they can be held, of its vertices where they cannot.
 void draw_preview(const SurfaceOptions& o, const std::string& mesh, const RunContext& context) {
@@ -74,6 +63,10 @@ std::optional<std::uint64_t> triangles_of(const std::optional<double>& number) {
   return static_cast<std::uint64_t>(*number);
 }
 
+bool reads_store(const SurfaceOptions& o) {
+  return !o.inputs.empty() && is_store(o.inputs.front());
+}
+
 /// What is chosen where the user says nothing, and nothing is chosen with --raw. A store has been cleaned, and given
 /// normals, when it was made; ranks that share out an input's rows cannot look around.
 void choose_what_is_not_given(const SurfaceOptions& o, SurfaceSettings& settings) {
@@ -85,7 +78,7 @@ void choose_what_is_not_given(const SurfaceOptions& o, SurfaceSettings& settings
     if (!given("--close-holes")) settings.close_holes = SurfaceSettings{}.close_holes;
     return;
   }
-  if (is_store(o.inputs.front())) return;
+  if (reads_store(o)) return;
   if (!given("--strays")) settings.clean.strays = launch().size == 1;
 }
 
@@ -118,7 +111,7 @@ void require_outputs(const SurfaceOptions& o, const std::vector<std::string>& ou
 
 /// A store's points are what they are. Ranks do not clean; meshes made in parts are not pruned.
 void take_preset(const SurfaceOptions& o, const RunContext& context) {
-  const bool stored = is_store(o.inputs.front());
+  const bool stored = reads_store(o);
   const bool ranked = launch().size > 1;
   const bool in_parts = ranked || o.parts.chunked || !o.parts.checkpoint.directory.empty();
   const auto takes = [&](PresetPart part) {
@@ -130,10 +123,7 @@ void take_preset(const SurfaceOptions& o, const RunContext& context) {
 }
 
 void run_surface(SurfaceOptions& o) {
-  if (o.preset) take_preset(o, make_context(o.run));
-  SurfaceSettings settings = o.settings;
-  settings.guess_trade = !o.preset && !o.raw;
-  choose_what_is_not_given(o, settings);
+  SurfaceSettings settings = surface_settings(o, make_context(o.run));
   settings.input = pipe_name(o.inputs.front());
   for (auto name = o.inputs.begin() + 1; name != o.inputs.end(); ++name)
     settings.more_inputs.push_back(pipe_name(*name));
@@ -199,13 +189,141 @@ void run_surface(SurfaceOptions& o) {
 
 }  // namespace
 
+SurfaceSettings surface_settings(SurfaceOptions& o, const RunContext& context) {
+  if (o.preset) take_preset(o, context);
+  SurfaceSettings settings = o.settings;
+  settings.guess_trade = !o.preset && !o.raw;
+  choose_what_is_not_given(o, settings);
+  return settings;
+}
+
+void add_surface_options(CLI::App& tool, SurfaceOptions& o) {
+  SurfaceSettings& s = o.settings;
+  o.tool = &tool;
+  s.blend.reset();
+  s.prune_triangles.reset();
+  add_preset(tool, o.preset, "Trade");
+
+  const std::string samples = "Samples";
+  add_point_options(tool, s.reading, samples);
+  tool.add_option("--frame", s.frame,
+                  "pca: sweep along the cloud's dominant axis, for the least memory; axis: along the longest input "
+                  "axis, so that "
+                  "voxels lie along the input's axes")
+      ->transform(words<FrameMode>({{"pca", FrameMode::pca}, {"axis", FrameMode::axis}}))
+      ->option_text("pca|axis [pca; axis with --vdb]")
+      ->group(samples);
+  tool.add_option("--bad-samples", s.bad_samples,
+                  "Samples that are not finite, have no normal or a radius of 0 or less: leave out, or refuse the file")
+      ->transform(words<BadSamples>({{"drop", BadSamples::drop}, {"refuse", BadSamples::refuse}}))
+      ->option_text("drop|refuse [drop]")
+      ->group(samples);
+  tool.add_option("--particlescale", s.radius_scale,
+                  "Multiply every sample's radius, given or estimated, by K; up to 1000")
+      ->type_name("K")
+      ->capture_default_str()
+      ->group(samples);
+  tool.add_option("--density", s.density, "Samples a counting cell needs to give a radius, 2 to 4096")
+      ->type_name("N")
+      ->capture_default_str()
+      ->group(samples);
+  add_length(tool, "--max-radius", s.max_radius,
+             "Discard samples with a larger radius as undersampled; r is the median radius here; 0: none")
+      ->group(samples);
+
+  add_clean_options(tool, s.clean, "Cleaning");
+  add_normals_choice(tool, s.normals, "Normals");
+  add_normals_options(tool, s.normal_search, "Normals");
+
+  tool.add_flag("--raw", o.raw,
+                "Choose nothing: the file's normals, all samples, --blend 1.2, --prune 0, where these are not given")
+      ->excludes(tool.get_option("--preset"))
+      ->group("Fit");
+  add_fit_options(tool, s);
+
+  const std::string mesh = "Mesh";
+  tool.add_option("--boundary", s.boundary,
+                  "Reject the surface where the projection lies farther than K influence radii R from the average of "
+                  "its samples; "
+                  "0: never")
+      ->type_name("K")
+      ->capture_default_str()
+      ->group(mesh);
+  tool.add_option_function<double>(
+          "--trim", [&s](double level) { s.trim = level; },
+          "Cut the mesh where it reaches K influence radii R beyond its samples; 0.235 is the edge of evenly spread "
+          "ones; 0: keep or leave out whole triangles [chosen where --blend is, else 0]")
+      ->type_name("K")
+      ->group(mesh);
+  tool.add_option("--cluster", s.cluster,
+                  "Vertex clustering: none, preserving the topology, or free, which may change it")
+      ->transform(words<ClusterMode>(
+          {{"none", ClusterMode::none}, {"free", ClusterMode::free}, {"preserving", ClusterMode::preserving}}))
+      ->option_text("none|free|preserving [preserving]")
+      ->group(mesh);
+  tool.add_option("--chord", s.chord,
+                  "Outward shift of clustered vertices: K times the curvature times the cell squared; 0 to 1")
+      ->type_name("K")
+      ->capture_default_str()
+      ->group(mesh);
+  tool.add_flag(
+          "--level", s.vertex_levels,
+          "Give vertices their octree level, 0 the finest, as property level: 'lamina render mesh.ply --paint level'")
+      ->group(mesh);
+
+  tool.add_flag("--curvature", s.vertex_curvature,
+                "Give vertices the mean curvature (1 / length, positive where convex) as property curvature; needs "
+                "the sphere fit")
+      ->group(mesh);
+
+  add_hole_options(tool, s, mesh);
+  add_number_or_auto(tool, "--prune", "auto",
+                     "Leave out connected parts of fewer than N triangles; 0: none; auto: than a two-thousandth of the "
+                     "samples, at most 500, and none where the mesh is made in parts",
+                     [&s](const std::optional<double>& number) { s.prune_triangles = triangles_of(number); })
+      ->option_text("N|auto [auto]")
+      ->group(mesh);
+  add_length(tool, "--prune-size", s.prune_size,
+             "Leave out connected parts whose box has a shorter diagonal; r is the median radius here; 0: none")
+      ->group(mesh);
+  tool.add_flag("--local", s.local,
+                "Subtract a round shift from the coordinates, for programs that read floats; the statistics, the "
+                "PLY's comment "
+                "shift and the .vdb's metadata shift name it")
+      ->group(mesh);
+
+  add_volume_options(tool, s.volume);
+  const std::string tiles = "Tiles";
+  tool.add_option("--tiles", s.tiles.folder,
+                  "Also write 3D Tiles, levels of detail for viewers, into this folder, which is made or empty")
+      ->type_name("DIR")
+      ->group(tiles);
+  tool.add_flag("!--tiles-plain", s.tiles.compress, "Their contents without compression (EXT_meshopt_compression)")
+      ->group(tiles);
+  add_parts_options(tool, o.parts);
+
+  tool.add_option("--window", s.window,
+                  "Slabs each stage advances at once, 1 to 1024; more keeps many cores busier and takes memory")
+      ->type_name("N")
+      ->capture_default_str()
+      ->group("Run");
+  tool.add_flag("--dry-run", s.dry_run, "Print levels, slabs, expected memory, disk and time; write nothing")
+      ->group("Run");
+  tool.add_option(
+          "--preview", o.preview,
+          "Draw the finished mesh; as its vertices where it is too large to be held: four times its file within "
+          "--max-memory, or 1 GB")
+      ->type_name("OUT.png")
+      ->group("Run");
+  tool.add_option("--stats", o.stats, "Write counts, times and memory to this JSON file; - for standard output")
+      ->type_name("FILE.json")
+      ->group("Run");
+  add_run_options(tool, o.run);
+}
+
 void add_surface(CLI::App& app) {
   auto* tool = app.add_subcommand("surface", "Reconstruct a triangle mesh from oriented points, streaming");
   auto o = std::make_shared<SurfaceOptions>();
-  SurfaceSettings& s = o->settings;
-  o->tool = tool;
-  s.blend.reset();
-  s.prune_triangles.reset();
   tool->add_option(
           "INPUT", o->inputs,
           "Points with normals: PLY, OBJ, XYZ and other text, PTX, PCD, LAS, LAZ, E57, points of a .vdb, also gzipped; "
@@ -221,125 +339,7 @@ void add_surface(CLI::App& app) {
       "on standard output. Several -o write it in several formats. Not needed with --dry-run and --print-tasks");
   output->type_name("FILE")->allow_extra_args(false);
 
-  add_preset(*tool, o->preset, "Trade");
-
-  const std::string samples = "Samples";
-  add_point_options(*tool, s.reading, samples);
-  tool->add_option("--frame", s.frame,
-                   "pca: sweep along the cloud's dominant axis, for the least memory; axis: along the longest input "
-                   "axis, so that "
-                   "voxels lie along the input's axes")
-      ->transform(words<FrameMode>({{"pca", FrameMode::pca}, {"axis", FrameMode::axis}}))
-      ->option_text("pca|axis [pca; axis with --vdb]")
-      ->group(samples);
-  tool->add_option(
-          "--bad-samples", s.bad_samples,
-          "Samples that are not finite, have no normal or a radius of 0 or less: leave out, or refuse the file")
-      ->transform(words<BadSamples>({{"drop", BadSamples::drop}, {"refuse", BadSamples::refuse}}))
-      ->option_text("drop|refuse [drop]")
-      ->group(samples);
-  tool->add_option("--particlescale", s.radius_scale,
-                   "Multiply every sample's radius, given or estimated, by K; up to 1000")
-      ->type_name("K")
-      ->capture_default_str()
-      ->group(samples);
-  tool->add_option("--density", s.density, "Samples a counting cell needs to give a radius, 2 to 4096")
-      ->type_name("N")
-      ->capture_default_str()
-      ->group(samples);
-  add_length(*tool, "--max-radius", s.max_radius,
-             "Discard samples with a larger radius as undersampled; r is the median radius here; 0: none")
-      ->group(samples);
-
-  add_clean_options(*tool, s.clean, "Cleaning");
-  add_normals_choice(*tool, s.normals, "Normals");
-  add_normals_options(*tool, s.normal_search, "Normals");
-
-  tool->add_flag("--raw", o->raw,
-                 "Choose nothing: the file's normals, all samples, --blend 1.2, --prune 0, where these are not given")
-      ->excludes(tool->get_option("--preset"))
-      ->group("Fit");
-  add_fit_options(*tool, s);
-
-  const std::string mesh = "Mesh";
-  tool->add_option("--boundary", s.boundary,
-                   "Reject the surface where the projection lies farther than K influence radii R from the average of "
-                   "its samples; "
-                   "0: never")
-      ->type_name("K")
-      ->capture_default_str()
-      ->group(mesh);
-  tool->add_option_function<double>(
-          "--trim", [&s](double level) { s.trim = level; },
-          "Cut the mesh where it reaches K influence radii R beyond its samples; 0.235 is the edge of evenly spread "
-          "ones; 0: keep or leave out whole triangles [chosen where --blend is, else 0]")
-      ->type_name("K")
-      ->group(mesh);
-  tool->add_option("--cluster", s.cluster,
-                   "Vertex clustering: none, preserving the topology, or free, which may change it")
-      ->transform(words<ClusterMode>(
-          {{"none", ClusterMode::none}, {"free", ClusterMode::free}, {"preserving", ClusterMode::preserving}}))
-      ->option_text("none|free|preserving [preserving]")
-      ->group(mesh);
-  tool->add_option("--chord", s.chord,
-                   "Outward shift of clustered vertices: K times the curvature times the cell squared; 0 to 1")
-      ->type_name("K")
-      ->capture_default_str()
-      ->group(mesh);
-  tool->add_flag(
-          "--level", s.vertex_levels,
-          "Give vertices their octree level, 0 the finest, as property level: 'lamina render mesh.ply --paint level'")
-      ->group(mesh);
-
-  tool->add_flag("--curvature", s.vertex_curvature,
-                 "Give vertices the mean curvature (1 / length, positive where convex) as property curvature; needs "
-                 "the sphere fit")
-      ->group(mesh);
-
-  add_hole_options(*tool, s, mesh);
-  add_number_or_auto(*tool, "--prune", "auto",
-                     "Leave out connected parts of fewer than N triangles; 0: none; auto: than a two-thousandth of the "
-                     "samples, at most 500, and none where the mesh is made in parts",
-                     [&s](const std::optional<double>& number) { s.prune_triangles = triangles_of(number); })
-      ->option_text("N|auto [auto]")
-      ->group(mesh);
-  add_length(*tool, "--prune-size", s.prune_size,
-             "Leave out connected parts whose box has a shorter diagonal; r is the median radius here; 0: none")
-      ->group(mesh);
-  tool->add_flag("--local", s.local,
-                 "Subtract a round shift from the coordinates, for programs that read floats; the statistics, the "
-                 "PLY's comment "
-                 "shift and the .vdb's metadata shift name it")
-      ->group(mesh);
-
-  add_volume_options(*tool, s.volume);
-  const std::string tiles = "Tiles";
-  tool->add_option("--tiles", s.tiles.folder,
-                   "Also write 3D Tiles, levels of detail for viewers, into this folder, which is made or empty")
-      ->type_name("DIR")
-      ->group(tiles);
-  tool->add_flag("!--tiles-plain", s.tiles.compress, "Their contents without compression (EXT_meshopt_compression)")
-      ->group(tiles);
-  add_parts_options(*tool, o->parts);
-
-  tool->add_option("--window", s.window,
-                   "Slabs each stage advances at once, 1 to 1024; more keeps many cores busier and takes memory")
-      ->type_name("N")
-      ->capture_default_str()
-      ->group("Run");
-  auto* dry =
-      tool->add_flag("--dry-run", s.dry_run, "Print levels, slabs, expected memory, disk and time; write nothing")
-          ->group("Run");
-  tool->add_option(
-          "--preview", o->preview,
-          "Draw the finished mesh; as its vertices where it is too large to be held: four times its file within "
-          "--max-memory, or 1 GB")
-      ->type_name("OUT.png")
-      ->group("Run");
-  tool->add_option("--stats", o->stats, "Write counts, times and memory to this JSON file; - for standard output")
-      ->type_name("FILE.json")
-      ->group("Run");
-  add_run_options(*tool, o->run);
+  add_surface_options(*tool, *o);
   add_notes(
       *tool,
       "Of a point it takes x y z nx ny nz, radius or pscale, quality or confidence; every other property arrives at "
@@ -362,7 +362,7 @@ void add_surface(CLI::App& app) {
                "  lamina surface scan.ply --dry-run\n"
                "  lamina surface scan.ply --preset photogrammetry --prune 50 -o mesh_of_photos.ply\n"
                "  lamina surface scan.ply -o smooth.ply --blend 2 --vdb smooth.vdb --stats smooth.json");
-  tool->parse_complete_callback([o, output, dry] {
+  tool->parse_complete_callback([o, output, dry = tool->get_option("--dry-run")] {
     if (output->count() == 0 && dry->count() == 0 && o->parts.tasks == 0) throw CLI::RequiredError("--output");
   });
   tool->callback([o, tool] {

@@ -12,6 +12,7 @@
 #include "common/outputs.h"
 #include "common/text.h"
 #include "lamina/error.h"
+#include "tables.h"
 #include "tool.h"
 
 namespace lamina::tools {
@@ -42,44 +43,47 @@ void run_volume(const VolumeOptions& o) {
 
 }  // namespace
 
-void add_volume(CLI::App& app) {
-  auto* tool = app.add_subcommand("volume", "Convert a mesh to an OpenVDB narrow-band level set");
-  auto o = std::make_shared<VolumeOptions>();
-  VolumeSettings& s = o->settings;
-  tool->add_option("MESH", o->mesh, "Mesh to convert: .ply .obj .off .stl .glb, each also as .gz")
-      ->required()
-      ->type_name("");
-  tool->add_option("-o,--output", o->output, "Volume to write: .vdb, - for standard output")
-      ->required()
-      ->type_name("FILE");
+void add_grid_options(CLI::App& tool, VolumeSettings& s) {
   const std::string grid = "Grid";
-  tool->add_option("--voxelsize,--voxel", s.voxel,
-                   "Edge of a voxel in the mesh's units; 0: the mean length of its edges")
+  tool.add_option("--voxelsize,--voxel", s.voxel,
+                  "Edge of a voxel in the mesh's units; 0: the mean length of its edges")
       ->type_name("LENGTH")
       ->capture_default_str()
       ->group(grid);
-  tool->add_option("--halfbandvoxels,--band", s.band,
-                   "Half width of the band that holds distances, in voxels, 1 to 1000")
+  tool.add_option("--halfbandvoxels,--band", s.band,
+                  "Half width of the band that holds distances, in voxels, 1 to 1000")
       ->type_name("N")
       ->capture_default_str()
       ->group(grid);
   const std::map<std::string, VolumeSign> signs{
       {"auto", VolumeSign::automatic}, {"inside", VolumeSign::inside}, {"none", VolumeSign::none}};
-  tool->add_option_function<std::string>(
+  tool.add_option_function<std::string>(
           "--sign", [&s, signs](const std::string& word) { s.sign = signs.at(word); },
           "inside: negative inside, a level set; none: distances without a sign; auto: by whether the mesh is closed "
           "[auto]")
       ->check(CLI::IsMember({"auto", "inside", "none"}).description(""))
       ->type_name("auto|inside|none")
       ->group(grid);
-  tool->add_option("--name", s.name, "Name of the distance grid, other than Cd")
+  tool.add_option("--name", s.name, "Name of the distance grid, other than Cd")
       ->type_name("NAME")
       ->capture_default_str()
       ->group(grid);
-  tool->add_flag_callback(
+  tool.add_flag_callback(
           "--no-colour,--no-color", [&s] { s.colours = false; }, "Leave out the colours (Cd)")
       ->group(grid);
-  tool->add_flag("--half", s.half, "Store 16-bit floats: half the file")->group(grid);
+  tool.add_flag("--half", s.half, "Store 16-bit floats: half the file")->group(grid);
+}
+
+void add_volume(CLI::App& app) {
+  auto* tool = app.add_subcommand("volume", "Convert a mesh to an OpenVDB narrow-band level set");
+  auto o = std::make_shared<VolumeOptions>();
+  tool->add_option("MESH", o->mesh, "Mesh to convert: .ply .obj .off .stl .glb, each also as .gz")
+      ->required()
+      ->type_name("");
+  tool->add_option("-o,--output", o->output, "Volume to write: .vdb, - for standard output")
+      ->required()
+      ->type_name("FILE");
+  add_grid_options(*tool, o->settings);
   add_run_options(*tool, o->run);
   add_notes(
       *tool,

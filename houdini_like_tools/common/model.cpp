@@ -147,6 +147,11 @@ std::unique_ptr<Model> open_model(const std::string& path, const ModelOptions& o
   return streamed_points(path, options.paint, context);
 }
 
+std::unique_ptr<Model> hold_mesh(TriangleMesh mesh, const std::string& name, const PaintOptions& paint,
+                                 const RunContext& context) {
+  return model_of(std::move(mesh), name, paint, context);
+}
+
 std::unique_ptr<Model> open_vertices(const std::string& path, const RunContext& context) {
   return streamed_points(path, {}, context);
 }

@@ -41,6 +41,10 @@ struct ModelOptions {
 /// (something to paint that is not there), empty (nothing to draw).
 std::unique_ptr<Model> open_model(const std::string& path, const ModelOptions& options, const RunContext& context);
 
+/// A mesh in memory, or points where it has no triangles. `name` stands for its file in messages. Throws likewise.
+std::unique_ptr<Model> hold_mesh(TriangleMesh mesh, const std::string& name, const PaintOptions& paint,
+                                 const RunContext& context);
+
 /// A mesh file too large to be held: its vertices, streamed as points.
 std::unique_ptr<Model> open_vertices(const std::string& path, const RunContext& context);
 

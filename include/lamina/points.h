@@ -171,4 +171,7 @@ std::unique_ptr<PointSource> join_points(std::vector<std::unique_ptr<PointSource
 /// Throws as these do.
 std::unique_ptr<PointSource> open_points(const std::vector<std::string>& names, const PointSettings& settings);
 
+/// Of a source that is open already, what the settings select of it, projected where they say so.
+std::unique_ptr<PointSource> open_points(std::unique_ptr<PointSource> source, const PointSettings& settings);
+
 }  // namespace lamina

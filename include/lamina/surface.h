@@ -2,6 +2,8 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,7 +13,9 @@
 #include "lamina/frame.h"
 #include "lamina/holes.h"
 #include "lamina/length.h"
+#include "lamina/mesh_receiver.h"
 #include "lamina/normals.h"
+#include "lamina/points.h"
 #include "lamina/run.h"
 #include "lamina/sample.h"
 #include "lamina/tiles.h"
@@ -32,10 +36,14 @@ enum class NormalsChoice {
 /// The job. Lengths are in the input's units; a Length may be in multiples of the radius instead (length.h).
 struct SurfaceSettings {
   std::string input;  ///< point file, folder, pattern or scan list (expand_inputs()); "-" is standard input
-  std::vector<std::string> more_inputs;   ///< taken together with `input`, as one cloud
-  PointSettings reading;                  ///< how the files are read; temporary files are the run's affair
-  std::string output;                     ///< mesh file: .obj, .off, .stl, .glb, else PLY; "-": standard output
-  std::vector<std::string> more_outputs;  ///< the same mesh in further files, each in its own format
+  std::vector<std::string> more_inputs;  ///< taken together with `input`, as one cloud
+  /// Opens the cloud where it is no file, as view_points() does; `input` then only names it in messages. Not for jobs
+  /// of several runs.
+  std::function<std::unique_ptr<PointSource>()> open;
+  PointSettings reading;                   ///< how the files are read; temporary files are the run's affair
+  std::string output;                      ///< mesh file: .obj, .off, .stl, .glb, else PLY; "-": standard output
+  std::vector<std::string> more_outputs;   ///< the same mesh in further files, each in its own format
+  std::shared_ptr<MeshReceiver> receiver;  ///< takes the mesh instead of these files; of reconstruct_surface() alone
 
   std::optional<FrameMode> frame;  ///< unset: pca, or axis where grids are asked for (they have the input's axes then)
   BadSamples bad_samples = BadSamples::drop;  ///< non-finite, without a normal, with a radius <= 0

@@ -12,12 +12,13 @@ namespace lamina {
 std::string mesh_settings(const SurfaceSettings& settings) {
   // Every setting by name: one that is added must be dealt with here, or this does not compile. What follows `chord`
   // does not change the mesh; names of files are not settings of it.
-  const auto& [input, more_inputs, reading, output, more_outputs, frame, bad_samples, normals, normal_search,
-               guess_trade, radius_scale, density, clean, max_radius, blend, refit, steps, step_tolerance, fit, diffuse,
-               cell, levels, boundary, cluster, chord, vertex_levels, vertex_curvature, vertex_filled, close_holes,
-               watertight, trim, prune_triangles, prune_size, local, window, dry_run, volume, tiles] = settings;
+  const auto& [input, more_inputs, open, reading, output, more_outputs, receiver, frame, bad_samples, normals,
+               normal_search, guess_trade, radius_scale, density, clean, max_radius, blend, refit, steps,
+               step_tolerance, fit, diffuse, cell, levels, boundary, cluster, chord, vertex_levels, vertex_curvature,
+               vertex_filled, close_holes, watertight, trim, prune_triangles, prune_size, local, window, dry_run,
+               volume, tiles] = settings;
   // Jobs of several runs refuse these: require_mesh_alone().
-  (void)prune_triangles, (void)prune_size, (void)local, (void)tiles;
+  (void)prune_triangles, (void)prune_size, (void)local, (void)tiles, (void)open, (void)receiver;
   (void)input, (void)more_inputs, (void)output, (void)more_outputs, (void)normals, (void)normal_search,
       (void)guess_trade, (void)window, (void)dry_run;
   const auto number = [](const std::optional<double>& v) { return v ? fmt::format("{}", *v) : "auto"; };
@@ -59,6 +60,8 @@ void require_mesh_alone(const SurfaceSettings& settings, const std::string& opti
   if (settings.prune_triangles.value_or(0) > 0 || settings.prune_size.value > 0 || settings.local)
     throw Error(ExitCode::usage,
                 fmt::format("{}: --prune, --prune-size and --local want the mesh from one run", option));
+  if (settings.open || settings.receiver)
+    throw Error(ExitCode::usage, fmt::format("{} wants files: what is in memory is gone with the run", option));
   if (settings.dry_run) throw Error(ExitCode::usage, fmt::format("{} and --dry-run contradict each other", option));
 }
 

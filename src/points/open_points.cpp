@@ -96,6 +96,11 @@ std::unique_ptr<PointSource> open_points(const std::vector<std::string>& names, 
   return settings.project_degrees ? project_degrees(std::move(joined)) : std::move(joined);
 }
 
+std::unique_ptr<PointSource> open_points(std::unique_ptr<PointSource> source, const PointSettings& settings) {
+  std::unique_ptr<PointSource> selected = select_points(std::move(source), settings.select);
+  return settings.project_degrees ? project_degrees(std::move(selected)) : std::move(selected);
+}
+
 PointColumns columns_of(const PointSourceInfo& info) {
   return {info.double_precision, info.has_normals, info.radius_name, info.quality_name, info.attributes};
 }

@@ -106,10 +106,9 @@ boundary::Addition ClosingSlabs::finish() {
   return closer_.finish(vertices_);
 }
 
-HoleStats close_holes(ClosingSlabs& slabs, MeshSink& sink) {
-  const boundary::Addition addition = slabs.finish();
-  sink.append_vertices(addition.vertices);
-  sink.append_triangles(addition.triangles);
+HoleStats close_holes(ClosingSlabs& slabs, SlabSink& mesh) {
+  boundary::Addition addition = slabs.finish();
+  mesh.write({0, std::move(addition.vertices), std::move(addition.triangles)});
   return slabs.stats();
 }
 

@@ -16,6 +16,7 @@
 #include "clustering/clusterer.h"
 #include "isosurface/iso_mesh.h"
 #include "lamina/frame.h"
+#include "lamina/mesh_receiver.h"
 #include "lamina/surface.h"
 #include "meshes/distinct_positions.h"
 #include "meshes/mesh_sink.h"
@@ -34,18 +35,19 @@ class SlabSink {
   virtual void write(const MeshSlab& slab) = 0;
 };
 
-/// One mesh file.
-class MeshFileSlabs : public SlabSink {
+/// Where a whole mesh goes.
+class WholeMesh : public SlabSink {
  public:
-  explicit MeshFileSlabs(MeshSink& sink) : sink_(sink) {}
-  void write(const MeshSlab& slab) override {
-    sink_.append_vertices(slab.vertices);
-    sink_.append_triangles(slab.triangles);
-  }
-
- private:
-  MeshSink& sink_;
+  /// Its files, to be read back before commit(); null where it goes elsewhere.
+  virtual MeshSink* files() { return nullptr; }
+  /// All slabs have come. Throws as MeshSink::commit() does.
+  virtual void commit(const RunContext& run) = 0;
+  [[nodiscard]] virtual std::uint64_t vertices() const = 0;
+  [[nodiscard]] virtual std::uint64_t triangles() const = 0;
 };
+
+/// Its files, or where there is a receiver, that.
+std::unique_ptr<WholeMesh> open_whole_mesh(const MeshSinkSettings& settings, MeshReceiver* receiver);
 
 /// Slabs go in by ascending number; what comes out does not depend on when. With one thread everything happens inside
 /// start().
@@ -114,6 +116,6 @@ class ClosingSlabs final : public SlabSink {
 };
 
 /// Adds to the mesh, which has all slabs, what closes its holes.
-HoleStats close_holes(ClosingSlabs& slabs, MeshSink& sink);
+HoleStats close_holes(ClosingSlabs& slabs, SlabSink& mesh);
 
 }  // namespace lamina

@@ -235,7 +235,8 @@ void check_settings(const SurfaceSettings& s) {
   require_sane(s.clean);
   check_volume_export(s.volume);
   require(!s.input.empty(), "the input", "a point file");
-  require(s.dry_run || !s.output.empty(), "--output", "given");
+  require(!s.receiver || s.tiles.folder.empty(), "--tiles", "left out where the mesh goes to no file");
+  require(s.dry_run || s.receiver || !s.output.empty(), "--output", "given");
 }
 
 ReconstructionPlan make_plan(const SurfaceSettings& s, const StoredCloud& cloud, const RadiusSurvey& survey) {

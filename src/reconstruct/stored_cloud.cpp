@@ -133,13 +133,13 @@ std::string input_name(const SurfaceSettings& settings) {
 }
 
 bool names_kept_input(const SurfaceSettings& settings) {
-  return settings.more_inputs.empty() && is_kept_input(settings.input);
+  return !settings.open && settings.more_inputs.empty() && is_kept_input(settings.input);
 }
 
 void require_two_files(const SurfaceSettings& settings) {
   std::error_code ignored;
-  const bool kept = names_kept_input(settings);
-  const std::vector<PointInput> inputs = kept ? std::vector<PointInput>{} : expand_inputs(input_names(settings));
+  const bool no_files = settings.open || names_kept_input(settings);
+  const std::vector<PointInput> inputs = no_files ? std::vector<PointInput>{} : expand_inputs(input_names(settings));
   const auto is_input = [&](const std::string& name) {
     return std::filesystem::is_regular_file(name, ignored) &&
            std::any_of(inputs.begin(), inputs.end(),
@@ -175,7 +175,8 @@ std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const 
   reading.tmp_dir = tmp_dir;
   const RowPick& pick = settings.clean.pick;
   if (pick.clip && pick.every <= 1) reading.select.box = {pick.clip->low, pick.clip->high};
-  std::unique_ptr<PointSource> source = open_points(input_names(settings), reading);
+  std::unique_ptr<PointSource> source =
+      settings.open ? open_points(settings.open(), reading) : open_points(input_names(settings), reading);
   const PointSourceInfo& info = source->info();
   for (const std::string& remark : info.remarks) run.info(remark);
   require_no_degrees(info);

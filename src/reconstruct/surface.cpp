@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -43,13 +44,13 @@ class PrunedSlabs final : public SlabSink {
 };
 
 /// Tiles that cannot be written do not keep the mesh from being: what was wrong with them.
-std::optional<Error> write_tiles_beside(const ReconstructionPlan& plan, MeshSink& sink, Job& job) {
-  if (plan.tiles.folder.empty()) return std::nullopt;
+std::optional<Error> write_tiles_beside(const ReconstructionPlan& plan, MeshSink* sink, Job& job) {
+  if (plan.tiles.folder.empty() || sink == nullptr) return std::nullopt;
   try {
     const auto write = [&](meshes::MeshBlocks& mesh) {
       job.stats.tiles = tiles::write_blocks_as_tiles(mesh, plan.tiles, job.run);
     };
-    job.watch.time("tiles", [&] { sink.read_back(write, job.run); });
+    job.watch.time("tiles", [&] { sink->read_back(write, job.run); });
   } catch (const Error& error) {
     if (job.run.cancelled()) throw;
     return error;
@@ -57,15 +58,15 @@ std::optional<Error> write_tiles_beside(const ReconstructionPlan& plan, MeshSink
   return std::nullopt;
 }
 
-/// The mesh of a plan into its files, whose names and folder `layout` has.
-void write_surface(const ReconstructionPlan& plan, StoredCloud& cloud, const MeshSinkSettings& layout, Job& job) {
-  meshes::warn_of_losses(layout, job.run);
-  MeshSink sink(layout);
+/// The mesh of a plan into its files, whose names and folder `layout` has, or to the receiver.
+void write_surface(const ReconstructionPlan& plan, StoredCloud& cloud, const MeshSinkSettings& layout,
+                   MeshReceiver* receiver, Job& job) {
+  if (receiver == nullptr) meshes::warn_of_losses(layout, job.run);
+  const std::unique_ptr<WholeMesh> whole = open_whole_mesh(layout, receiver);
   std::optional<SurfaceVolume> volume;
   if (plan.volume.wanted())
     volume.emplace(plan.volume, plan.frame, plan.lattice, plan.main_level, plan.attributes, layout.tmp_dir);
-  MeshFileSlabs whole(sink);
-  ClosingSlabs closing(plan.holes, layout, whole);
+  ClosingSlabs closing(plan.holes, layout, *whole);
   Pruner pruner(plan.pruning, layout.tmp_dir, closing);
   PrunedSlabs pruned(pruner);
   const bool prunes = plan.pruning.triangles > 0 || plan.pruning.size > 0;
@@ -75,17 +76,17 @@ void write_surface(const ReconstructionPlan& plan, StoredCloud& cloud, const Mes
     job.watch.time("cluster and write", [&] { pruner.finish(); });
     report_pruning(pruner.counts(), plan.input, job);
   }
-  job.watch.time("holes", [&] { job.stats.holes = close_holes(closing, sink); });
-  if (sink.triangles() == 0) no_surface(plan);
+  job.watch.time("holes", [&] { job.stats.holes = close_holes(closing, *whole); });
+  if (whole->triangles() == 0) no_surface(plan);
   if (volume) {
     job.watch.time("volume", [&] { volume->finish(/*open=*/job.stats.rejected_loops > 0); });
     volume->commit();
     job.stats.volume = volume->stats();
   }
-  const std::optional<Error> no_tiles = write_tiles_beside(plan, sink, job);
-  job.watch.time("commit", [&] { sink.commit(job.run); });
-  job.stats.vertices = sink.vertices();
-  job.stats.triangles = sink.triangles();
+  const std::optional<Error> no_tiles = write_tiles_beside(plan, whole->files(), job);
+  job.watch.time("commit", [&] { whole->commit(job.run); });
+  job.stats.vertices = whole->vertices();
+  job.stats.triangles = whole->triangles();
   if (no_tiles) throw Error(*no_tiles);
 }
 
@@ -95,7 +96,7 @@ void reconstruct(const SurfaceSettings& settings, Job& job) {
   out.more_paths = settings.more_outputs;
   out.tmp_dir = temporary_directory(settings, job.run);
   // An output that cannot be written is better known now than after the input has been read.
-  if (!settings.dry_run) {
+  if (!settings.dry_run && !settings.receiver) {
     const MeshSink trial(out);
     if (!settings.tiles.folder.empty()) const StagedFolder folder(settings.tiles.folder);
   }
@@ -111,7 +112,7 @@ void reconstruct(const SurfaceSettings& settings, Job& job) {
     layout.path = out.path;
     layout.more_paths = out.more_paths;
     layout.tmp_dir = out.tmp_dir;
-    write_surface(plan, cloud, layout, job);
+    write_surface(plan, cloud, layout, settings.receiver.get(), job);
   }
   job.finish();
 }

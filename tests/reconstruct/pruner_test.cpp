@@ -122,14 +122,13 @@ std::string prune_streamed(const std::vector<SlabMesh>& slabs, const PruneRule& 
   settings.path = folder + "/mesh.ply";
   settings.attributes = {{"value", ScalarType::float32}};
   settings.double_positions = true;
-  MeshSink sink(settings);
-  MeshFileSlabs next(sink);
-  Pruner pruner(rule, folder, next, memory);
+  const auto next = open_whole_mesh(settings, nullptr);
+  Pruner pruner(rule, folder, *next, memory);
   for (const SlabMesh& s : slabs) pruner.add(s.vertices, s.triangles);
   pruner.finish();
   EXPECT_EQ(pruner.disk_bytes(), 0U);
   counts = pruner.counts();
-  sink.commit();
+  next->commit({});
   return settings.path;
 }
 
@@ -201,9 +200,8 @@ TEST(Pruner, AFullDiskIsSaid) {
   MeshSinkSettings settings;
   settings.path = folder / "mesh.ply";
   settings.attributes = {{"value", ScalarType::float32}};
-  MeshSink sink(settings);
-  MeshFileSlabs next(sink);
-  Pruner pruner({5, 0}, folder / "none", next, 0);
+  const auto next = open_whole_mesh(settings, nullptr);
+  Pruner pruner({5, 0}, folder / "none", *next, 0);
   try {
     const auto slabs = random_slabs(random, 2, 9, 0.5);
     for (const SlabMesh& s : slabs) pruner.add(s.vertices, s.triangles);

@@ -5,8 +5,11 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <memory>
 #include <thread>
 
+#include "lamina/mesh_receiver.h"
+#include "lamina/points.h"
 #include "mls/kernel.h"
 #include "reconstruct/clouds.h"
 
@@ -128,6 +131,47 @@ TEST_F(SurfaceBytes, SameFromAPipe) {
     EXPECT_TRUE(once == bytes(s));
   }
   feeder.join();
+}
+
+/// Puts a mesh together that is handed over.
+class Collector final : public MeshReceiver {
+ public:
+  void begin(const StreamedMeshLayout& layout) override {
+    layout_ = layout;
+    mesh_.layout = layout.attributes;
+    mesh_.attributes.resize(layout.attributes.size());
+  }
+  void take(TriangleMesh piece) override {
+    ++pieces_;
+    const auto join = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+    join(mesh_.positions, piece.positions);
+    join(mesh_.normals, piece.normals);
+    join(mesh_.triangles, piece.triangles);
+    for (std::size_t a = 0; a < mesh_.attributes.size(); ++a) join(mesh_.attributes[a], piece.attributes[a]);
+  }
+  [[nodiscard]] const TriangleMesh& mesh() const { return mesh_; }
+  [[nodiscard]] const StreamedMeshLayout& layout() const { return layout_; }
+  [[nodiscard]] int pieces() const { return pieces_; }
+
+ private:
+  TriangleMesh mesh_;
+  StreamedMeshLayout layout_;
+  int pieces_ = 0;
+};
+
+TEST_F(SurfaceBytes, SameFromASourceToAReceiver) {
+  const std::string once = bytes({});
+  const auto collector = std::make_shared<Collector>();
+  SurfaceSettings s;
+  s.input = "no file";
+  s.open = [this] { return open_points(input_); };
+  s.receiver = collector;
+  const SurfaceStats stats = reconstruct_surface(s, {});
+  EXPECT_GT(collector->pieces(), 3);
+  EXPECT_EQ(stats.triangles, collector->mesh().triangles.size());
+  const std::string again = folder_ / "again.ply";
+  write_mesh(collector->mesh(), collector->layout(), again);
+  EXPECT_TRUE(once == test::read_file(again));
 }
 
 }  // namespace
