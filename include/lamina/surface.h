@@ -103,14 +103,22 @@ struct SurfaceSettings {
 /// What the settings mean for this cloud. Lengths in the input's units.
 struct SurfacePlan {
   std::uint64_t samples = 0;       ///< usable
+  std::uint64_t scans = 1;         ///< that the input tells apart
+  double overlap = 0;              ///< share of the places that several of them saw; 0 in jobs of several runs
   std::array<double, 3> extent{};  ///< of the bounding box along the axes of the frame, sweep axis last
   double radius_low = 0, radius_median = 0, radius_high = 0;  ///< 1 %, 50 %, 99 % of r
-  double noise = 0;             ///< median distance of samples from the surface their neighbours suggest, in radii
-  double normal_noise = 0;      ///< median angle of their normals to that surface's, degrees
-  double blend = 0, refit = 0;  ///< as given or chosen
+  double noise = 0;                  ///< median distance of samples from the surface their neighbours suggest, in radii
+  double high_noise = 0;             ///< a tenth of them lies farther from it, in radii
+  double worst_noise = 0;            ///< median in the noisiest of a few stretches of the cloud, in radii
+  std::array<double, 3> noisiest{};  ///< the middle of that stretch
+  double normal_noise = 0;           ///< median angle of their normals to that surface's, degrees
+  double blend = 0, refit = 0;       ///< as given or chosen
   Length cell;
-  bool refine_sheets = false;  ///< half of it where things are thin
-  bool watertight = false;     ///< as given or chosen
+  bool refine_sheets = false;         ///< half of it where things are thin
+  bool watertight = false;            ///< as given or chosen
+  double trim = 0;                    ///< R, as given or chosen
+  double close_holes = 0;             ///< R, as given or chosen
+  std::uint64_t prune_triangles = 0;  ///< as given or chosen
   double finest_cell = 0;
   int levels = 0;
   double slab_height = 0;

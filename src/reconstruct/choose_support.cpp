@@ -1,7 +1,5 @@
 #include "reconstruct/choose_support.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <numbers>
 
@@ -66,14 +64,6 @@ StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& surve
   if (s.steps == 0) out.projection.tolerance = static_cast<float>(s.step_tolerance / out.feed.blend);
   out.projection.centres = s.diffuse;
   return out;
-}
-
-std::string describe_choice(const SurfaceSettings& settings, const SurfacePlan& plan) {
-  if (settings.blend) return "";
-  return fmt::format("noise {:.2g} r, of normals {:.2g} degrees: chosen --blend {:g} --cell {}{} --refit {:g}{}",
-                     plan.noise, plan.normal_noise, plan.blend, to_string(plan.cell),
-                     plan.refine_sheets ? " (half of it where things are thin)" : "", plan.refit,
-                     plan.watertight ? " --watertight yes" : "");
 }
 
 }  // namespace lamina

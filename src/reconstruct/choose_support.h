@@ -1,7 +1,5 @@
 // How far samples act and how fine the cells are: as the user says, else by what the survey saw of the cloud.
 #pragma once
-#include <string>
-
 #include "isosurface/number_edges.h"
 #include "lamina/holes.h"
 #include "lamina/surface.h"
@@ -25,8 +23,5 @@ struct StageSettings {
 
 /// A function of settings and survey alone, so that all parts of a job choose the same.
 StageSettings choose_support(const SurfaceSettings& settings, const RadiusSurvey& survey);
-
-/// What was chosen and why, in a line for a reader; empty where the settings gave all of it.
-std::string describe_choice(const SurfaceSettings& settings, const SurfacePlan& plan);
 
 }  // namespace lamina

@@ -16,8 +16,8 @@
 #include "meshes/mesh_format.h"
 #include "meshes/writers.h"
 #include "mls/refit_normals.h"
-#include "reconstruct/choose_support.h"
 #include "reconstruct/cost.h"
+#include "reconstruct/findings.h"
 #include "reconstruct/pipeline.h"
 
 namespace lamina {
@@ -180,11 +180,13 @@ ReconstructionPlan plan_surface(const SurfaceSettings& settings, const StoredClo
   const ReconstructionPlan& plan = *made;
   SurfacePlan& told = job.stats.plan;
   told = summary_of(plan);
+  told.scans = std::max<std::size_t>(cloud.info.scans.size(), 1);
+  told.overlap = cloud.ingested.overlap;
   told.threads = tbb::this_task_arena::max_concurrency();
   told.seconds = expected_seconds(plan, cloud.info, told.threads, job);
   note_input(cloud, job.stats);
   job.run.info(describe(told));
-  if (const std::string choice = describe_choice(settings, told); !choice.empty()) job.run.info(choice);
+  job.run.info(describe_findings(settings, job.stats));
   constexpr std::uint64_t kLargestTables = std::uint64_t{1} << 30;  // a scan of 380 million samples needs a few MB
   if (is_out_of_reach(told) || table_bytes(plan, cloud.ingested.store) > kLargestTables) {
     throw Error(ExitCode::empty,

@@ -254,12 +254,29 @@ class SeedNeighbourhoods {
   std::unordered_map<NoiseCell, std::vector<std::uint32_t>, CellHash> cells_;
 };
 
-/// 0 where there are too few to tell.
-float median_of(std::vector<float>& values) {
+/// The value that the share of all lies below; 0 where there are too few to tell.
+float quantile_of(std::vector<float>& values, double share) {
   if (values.size() < kEnough) return 0;
-  const auto median = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), median, values.end());
-  return *median;
+  const auto place = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size()));
+  const auto value = values.begin() + std::min(place, static_cast<std::ptrdiff_t>(values.size()) - 1);
+  std::nth_element(values.begin(), value, values.end());
+  return *value;
+}
+
+float median_of(std::vector<float>& values) {
+  return quantile_of(values, 0.5);
+}
+
+std::array<float, 3> middle_of(const LocalSamples& samples, const std::vector<std::size_t>& seeds) {
+  std::array<double, 3> sum{};
+  for (const std::size_t seed : seeds) {
+    sum[0] += samples.x[seed];
+    sum[1] += samples.y[seed];
+    sum[2] += samples.z[seed];
+  }
+  std::array<float, 3> middle{};
+  for (std::size_t k = 0; k < 3; ++k) middle[k] = static_cast<float>(sum[k] / static_cast<double>(seeds.size()));
+  return middle;
 }
 
 }  // namespace
@@ -269,6 +286,7 @@ Noise survey_noise(const SlabStore& store, const ReadBucket& read, float radius)
   std::vector<float> distances;
   std::vector<float> angles;
   std::vector<Eigen::Vector3d> neighbours;
+  Noise noise;
   const bool small = store.total() <= kRuns * kRunSamples;
   for (int run = 0; run < (small ? 1 : kRuns); ++run) {
     const std::uint64_t rank =
@@ -277,15 +295,25 @@ Noise survey_noise(const SlabStore& store, const ReadBucket& read, float radius)
     const double height = small ? std::numeric_limits<double>::infinity() : kRunHeight * static_cast<double>(radius);
     const LocalSamples samples = read_oriented(store, read, noise_run(store, rank, height));
     const SeedNeighbourhoods around(samples, static_cast<double>(radius));
+    std::vector<float> here;
     for (const std::size_t seed : around.seeds()) {
       around.gather(seed, neighbours);
       if (neighbours.size() < kLeast) continue;
       const Deviation d = deviation(neighbours, around.normal(seed));
-      if (d.distance >= 0) distances.push_back(static_cast<float>(d.distance * kNeighbourhood));
+      if (d.distance >= 0) here.push_back(static_cast<float>(d.distance * kNeighbourhood));
       if (d.angle >= 0) angles.push_back(static_cast<float>(d.angle));
     }
+    distances.insert(distances.end(), here.begin(), here.end());
+    if (const float median = median_of(here); median > noise.worst) {
+      noise.worst = median;
+      noise.worst_at = middle_of(samples, around.seeds());
+    }
   }
-  return {median_of(distances), median_of(angles)};
+  constexpr double kAllButATenth = 0.9;
+  noise.distance = median_of(distances);
+  noise.high = quantile_of(distances, kAllButATenth);
+  noise.angle = median_of(angles);
+  return noise;
 }
 
 RadiusSurvey survey_radii(const SlabStore& store, std::uint64_t sample_limit, std::uint32_t min_samples) {
@@ -315,6 +343,9 @@ RadiusSurvey survey_radii(const SlabStore& store, const ReadBucket& read, std::u
   const Noise noise = survey_noise(store, read, survey.median);
   survey.noise = noise.distance;
   survey.normal_noise = noise.angle;
+  survey.high_noise = noise.high;
+  survey.worst_noise = noise.worst;
+  survey.noisiest = noise.worst_at;
   return survey;
 }
 

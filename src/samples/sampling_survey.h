@@ -1,5 +1,6 @@
 // What a few runs of buckets tell of a cloud before it is streamed: how densely it is sampled, and how noisy it is.
 #pragma once
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -15,6 +16,10 @@ struct RadiusSurvey {
   float low = 0, median = 0, high = 0;  ///< 1 %, 50 %, 99 % quantiles, steps
   float noise = 0;  ///< median distance of samples from the surface their neighbours suggest, in units of `median`
   float normal_noise = 0;  ///< median angle of samples' normals to that surface's, radians
+  float high_noise = 0;    ///< a tenth of samples lies farther from that surface, in units of `median`
+  /// The noisiest of a few stretches of the cloud: the median there, and its middle, steps.
+  float worst_noise = 0;
+  std::array<float, 3> noisiest{};
 };
 /// Looks at runs of buckets about evenly spaced samples, each run at least 16 radii tall, about `sample_limit` samples
 /// in all (more when one run of that height holds more; a store of no more than the limit is read whole, as one
@@ -31,8 +36,11 @@ RadiusSurvey survey_radii(const SlabStore& store, const ReadBucket& read, std::u
                           std::uint32_t min_samples = 16);
 
 struct Noise {
-  float distance = 0;  ///< in units of the median radius
-  float angle = 0;     ///< of normals, radians, 0 to pi / 2
+  float distance = 0;               ///< in units of the median radius
+  float angle = 0;                  ///< of normals, radians, 0 to pi / 2
+  float high = 0;                   ///< a tenth of the samples has a larger distance
+  float worst = 0;                  ///< median distance in the stretch where it is largest
+  std::array<float, 3> worst_at{};  ///< the middle of that stretch, steps
 };
 /// Medians over some hundred samples: of the distance to the plane, or sphere, that their neighbours within two radii
 /// suggest, in units of `radius` (the cloud's median radius, steps). Exact samples of a surface that the radius

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "lamina/error.h"
+#include "store/scan_overlap.h"
 
 namespace lamina {
 namespace {
@@ -181,6 +182,7 @@ Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, c
   bool complete = true;
   const double quality = quality_scale(survey);
   const std::int64_t top = buckets.z_min + static_cast<std::int64_t>(buckets.buckets) * buckets.bucket_height;
+  ScanOverlap overlap(info.scans, survey.low, survey.high);
   PiecePool pool;
   const std::uint64_t end = std::min(settings.rows.end, info.count);
   std::uint64_t next = std::min(settings.rows.first, end);
@@ -214,6 +216,7 @@ Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, c
         complete && piece->within && (census.usable == 0 || (extent.z_min >= buckets.z_min && extent.z_max < top));
     stopped = !complete;
     if (complete) writer.append(piece->local);
+    overlap.add(piece->rows);
     done += piece->rows.size();
     if (run.progress) run.progress({"read", done, count, 0, 0});
     pool.give_back(piece);
@@ -224,7 +227,7 @@ Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, c
                              tbb::make_filter<IngestPiece*, IngestPiece*>(tbb::filter_mode::parallel, convert) &
                              tbb::make_filter<IngestPiece*, void>(tbb::filter_mode::serial_in_order, append));
   if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
-  return {writer.finish(), extent, census, complete};
+  return {writer.finish(), extent, census, complete, overlap.share()};
 }
 
 }  // namespace lamina

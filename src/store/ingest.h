@@ -20,6 +20,7 @@ struct Ingested {
   Extent extent;
   Census census;         ///< of the rows read
   bool complete = true;  ///< false: a sample lies too far outside the box surveyed, and reading stopped there
+  double overlap = 0;    ///< ScanOverlap::share()
 };
 
 /// Where a store's files go, and whether they have names and stay (StoreSettings::keep).

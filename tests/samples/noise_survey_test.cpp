@@ -97,6 +97,25 @@ TEST(SurveyNoise, LargeCloudsAreSeenInParts) {
     EXPECT_NEAR(noise_of(noisy_plane(160'000, 0.5), buckets), expected(0.5), 0.15 * expected(0.5)) << buckets;
 }
 
+TEST(SurveyNoise, TellsWhereThereIsMost) {
+  Scene scene = noisy_plane(160'000, 0.1);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<> u(-0.5, 0.5);
+  LocalSamples& s = scene.samples;
+  // The upper quarter is ten times as noisy.
+  for (std::size_t i = 0; i < s.size(); ++i) {
+    if (s.z[i] < 0.25 * kSide) continue;
+    const double off = scene.radius * u(random);
+    s.x[i] -= static_cast<std::int32_t>(0.6 * off);
+    s.y[i] += static_cast<std::int32_t>(0.8 * off);
+  }
+  const Noise noise = survey(scene, 300);
+  EXPECT_NEAR(static_cast<double>(noise.distance), expected(0.1), 0.5 * expected(0.1));
+  EXPECT_NEAR(static_cast<double>(noise.worst), expected(1), 0.2 * expected(1));
+  EXPECT_GT(noise.high, 0.8F * noise.worst);
+  EXPECT_NEAR(static_cast<double>(noise.worst_at[2]), 0.375 * kSide, 0.1 * kSide);
+}
+
 // Every normal is turned by as much, whichever way it then faces.
 TEST(SurveyNoise, OfNormalsIsTheirAngle) {
   for (const double tilt : {0.02, 0.2, 1.0}) {
