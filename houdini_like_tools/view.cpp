@@ -65,6 +65,13 @@ void view_points(const ViewOptions& o, const RunContext& context) {
                                : ""));
 }
 
+void refuse_points_option(const ViewOptions& o) {
+  if (o.settings.points == 0) return;
+  throw Error(ExitCode::usage, fmt::format("{}: --points thins out points, which this is not; 'lamina simplify' leaves "
+                                           "a mesh fewer triangles",
+                                           shown_name(o.input)));
+}
+
 void run_view(ViewOptions o) {
   const RunContext context = make_context(o.run, o.output);
   if (o.serve == !o.output.empty())
@@ -72,6 +79,7 @@ void run_view(ViewOptions o) {
   o.settings.bundle = find_viewer();
   o.settings.title = title_of(o.input);
   if (is_folder(o.input)) {
+    refuse_points_option(o);
     if (o.serve) return serve(o, context);
     const ViewStats stats = write_tiles_page(o.input, o.settings, o.output);
     context.info(fmt::format("{}: {} files of tiles, {}", o.output, count_text(stats.tiles), bytes_text(stats.bytes)));
@@ -79,7 +87,9 @@ void run_view(ViewOptions o) {
   }
   if (o.serve)
     throw Error(ExitCode::usage, shown_name(o.input) + ": --serve is for a folder of tiles; write a page with -o");
-  switch (content_of(o.input, o.run.tmp_dir)) {
+  const FileContent content = content_of(o.input, o.run.tmp_dir);
+  if (content != FileContent::points) refuse_points_option(o);
+  switch (content) {
     case FileContent::points:
       return view_points(o, context);
     case FileContent::mesh:

@@ -331,6 +331,10 @@ TEST_F(View, ToolSaysWhatItNeeds) {
             3);
   EXPECT_EQ(run_shell(view + test::quoted(mesh)).code, 2);
   EXPECT_EQ(run_shell(view + test::quoted(mesh) + " --serve 0").code, 2);
+  const Outcome thinned =
+      run_shell(view + test::quoted(mesh) + " --points 9 -o " + test::quoted(folder_ / "thin.html"));
+  EXPECT_EQ(thinned.code, 2);
+  EXPECT_THAT(thinned.err, HasSubstr("--points thins out points"));
 }
 
 }  // namespace
