@@ -109,8 +109,7 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
   j["sheet_refinement"] = s.plan.refine_sheets;
   j["watertight"] = s.plan.watertight;
   j["trim"] = s.plan.trim;
-  j["close_holes"] = s.plan.close_holes;
-  j["prune"] = s.plan.prune_triangles;
+  j["close_holes"] = s.plan.longest_rim;
   j["finest_cell"] = s.plan.finest_cell;
   j["slab_height"] = s.plan.slab_height;
   j["slabs"] = s.plan.slabs;

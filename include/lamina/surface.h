@@ -114,11 +114,10 @@ struct SurfacePlan {
   double normal_noise = 0;           ///< median angle of their normals to that surface's, degrees
   double blend = 0, refit = 0;       ///< as given or chosen
   Length cell;
-  bool refine_sheets = false;         ///< half of it where things are thin
-  bool watertight = false;            ///< as given or chosen
-  double trim = 0;                    ///< R, as given or chosen
-  double close_holes = 0;             ///< R, as given or chosen
-  std::uint64_t prune_triangles = 0;  ///< as given or chosen
+  bool refine_sheets = false;  ///< half of it where things are thin
+  bool watertight = false;     ///< as given or chosen
+  double trim = 0;             ///< R, as given or chosen
+  double longest_rim = 0;      ///< R, of boundary loops to be closed: close_holes as given or chosen
   double finest_cell = 0;
   int levels = 0;
   double slab_height = 0;

@@ -53,9 +53,8 @@ std::string chosen(const SurfaceSettings& s, const SurfacePlan& plan) {
                                        plan.refine_sheets ? " (half of it where things are thin)" : ""));
   add(!s.refit && !s.blend, fmt::format("--refit {:g}", plan.refit));
   add(!s.trim && !s.blend, fmt::format("--trim {:g}", plan.trim));
-  add(!s.close_holes, fmt::format("--close-holes {:g}", plan.close_holes));
+  add(!s.close_holes, fmt::format("--close-holes {:g}", plan.longest_rim));
   add(!s.watertight && !s.blend, fmt::format("--watertight {}", plan.watertight ? "yes" : "no"));
-  add(!s.prune_triangles, fmt::format("--prune {}", plan.prune_triangles));
   return text.empty() ? text : "\nchosen:" + text;
 }
 

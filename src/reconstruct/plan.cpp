@@ -321,8 +321,7 @@ SurfacePlan summary_of(const ReconstructionPlan& p) {
   out.refine_sheets = p.feed.refine_sheets;
   out.watertight = p.holes.watertight;
   out.trim = p.vertices.trim;
-  out.close_holes = p.holes.longest;
-  out.prune_triangles = p.pruning.triangles;
+  out.longest_rim = p.holes.longest;
   out.finest_cell = p.lattice.cell * step;
   out.levels = p.lattice.levels;
   out.slab_height = p.lattice.slab_height() * step;

@@ -13,7 +13,6 @@ TEST(Findings, WhatWasSeenAndChosen) {
   SurfaceSettings settings;
   settings.blend.reset();
   settings.close_holes.reset();
-  settings.prune_triangles = 7;
   SurfaceStats stats;
   stats.plan.samples = 900;
   stats.plan.scans = 3;
@@ -27,7 +26,7 @@ TEST(Findings, WhatWasSeenAndChosen) {
   stats.plan.noisiest = {1, 2, 3};
   stats.plan.blend = 1.5;
   stats.plan.trim = 0.18;
-  stats.plan.close_holes = 300;
+  stats.plan.longest_rim = 300;
   stats.cleaned.lonely = 60;
   stats.cleaned.off_surface = 40;
   const std::string said = describe_findings(settings, stats);
@@ -35,7 +34,6 @@ TEST(Findings, WhatWasSeenAndChosen) {
   EXPECT_THAT(said, HasSubstr("noise 0.1 r, a tenth above 0.25 r, 0.2 r around 1,2,3; normals of the file"));
   EXPECT_THAT(said, HasSubstr("; 100 strays (10 %) left out\nchosen: --blend 1.5 "));
   EXPECT_THAT(said, HasSubstr(" --trim 0.18 --close-holes 300 --watertight no"));
-  EXPECT_THAT(said, Not(HasSubstr("--prune")));
 }
 
 TEST(Findings, WhereEverythingWasGivenNothingWasChosen) {
