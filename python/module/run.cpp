@@ -56,7 +56,7 @@ void Job::start() {
   thread_ = std::thread([this] { run(); });
 }
 
-Job::~Job() {
+void Job::stop() {
   cancel();
   if (!thread_.joinable()) return;
   const py::gil_scoped_release unlocked;

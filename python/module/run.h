@@ -29,8 +29,7 @@ class Job {
 
   /// `progress`: None, or called as progress(stage, done, left); False from it cancels the run.
   Job(const tools::RunOptions& options, py::object progress, Work work);
-  /// Cancels and waits.
-  ~Job();
+  ~Job() { stop(); }
   Job(const Job&) = delete;
   Job& operator=(const Job&) = delete;
 
@@ -42,6 +41,8 @@ class Job {
   /// Waits for the end. Throws likewise.
   void finish();
   void cancel();
+  /// Cancels and waits; says nothing of how the run ended.
+  void stop();
 
   /// For what the run and the caller share.
   [[nodiscard]] std::mutex& mutex() { return mutex_; }

@@ -29,6 +29,9 @@ class Pieces final : public MeshReceiver, public std::enable_shared_from_this<Pi
  public:
   Pieces(std::shared_ptr<SurfaceCall> call, std::unique_ptr<PointSource> source)
       : call_(std::move(call)), source_(std::move(source)) {}
+  Pieces(const Pieces&) = delete;
+  Pieces& operator=(const Pieces&) = delete;
+  ~Pieces() override { stop(); }
 
   void start(const py::object& progress) {
     job_ = std::make_unique<Job>(call_->run_options(), progress, [this](const RunContext& context) { run(context); });
@@ -48,7 +51,11 @@ class Pieces final : public MeshReceiver, public std::enable_shared_from_this<Pi
     if (job_) job_->notify();
     return piece;
   }
-  void stop() { job_.reset(); }
+  /// The run uses its job to its end.
+  void stop() {
+    if (job_) job_->stop();
+    job_.reset();
+  }
   [[nodiscard]] const std::string& statistics() const { return statistics_; }
   [[nodiscard]] const StreamedMeshLayout& layout() const { return layout_; }
 

@@ -52,7 +52,8 @@ def test_keywords_are_the_programs_options(source, program):
         for keyword, _ in keywords:
             assert "--" + keyword.replace("_", "-") in page, (function, keyword)
     mine = {keyword.replace("_", "-") for keyword, _ in lamina._lamina._keywords["surface"]}
-    other = {"help", "output", "quiet", "stats", "preview", "chunk", "print-tasks", "json", "checkpoint", "resume", "dry-run"}
+    other = {"help", "output", "quiet", "stats", "preview", "chunk", "print-tasks", "json", "checkpoint", "resume", "dry-run",
+             "tiles", "tiles-plain"}
     assert mine <= options
     assert {name for name in options if name in page} - mine - other <= _mentioned_only(options, mine)
 
