@@ -22,9 +22,9 @@ std::unique_ptr<PointSource> open_pcd(InputFile file, const std::string& path, c
 
 /// LAS, and LAZ of point formats 0 to 3 and 6 to 8, whose chunks are decoded as they are wanted. Attributes: intensity,
 /// red green blue and nir where any point has them other than 0, and extra bytes of one value. Colours that never
-/// exceed 255 are 8-bit ones in 16 bits, which some programs write, and come as such. With PointSettings::all_fields also
-/// what else a record has (las_fields()), where any point has it other than 0. Of the selection it sees to the octree's
-/// nodes of a COPC file.
+/// exceed 255 are 8-bit ones in 16 bits, which some programs write, and come as such. With PointSettings::all_fields
+/// also what else a record has (las_fields()), where any point has it other than 0. Of the selection it sees to the
+/// octree's nodes of a COPC file.
 std::unique_ptr<PointSource> open_las(InputFile file, const std::string& path, const PointSettings& settings = {});
 
 /// PTX (Leica Cyclone's text format), organised scans with their poses. Points of all scans in the common frame; places
