@@ -67,8 +67,8 @@ struct PictureOptions {
   ModelOptions model;
 };
 /// All but input and output.
-void add_picture_options(CLI::App& tool, PictureOptions& picture);
+void add_picture_options(CLI::App& tool, PictureOptions& o);
 /// Throws CLI::ValidationError where options do not go together.
-void require_together(const PictureOptions& picture);
+void require_together(const PictureOptions& o);
 
 }  // namespace lamina::tools

@@ -240,7 +240,7 @@ void MeshData::append(const MeshData& piece) {
 
 std::shared_ptr<MeshData> mesh_argument(const py::object& object) {
   if (py::isinstance<Mesh>(object)) {
-    const std::shared_ptr<MeshData> data = object.cast<const Mesh&>().data;
+    std::shared_ptr<MeshData> data = object.cast<const Mesh&>().data;
     data->require_whole();
     return data;
   }
