@@ -4,21 +4,11 @@
 #include <cmath>
 #include <utility>
 
+#include "simplify/contraction.h"
+
 namespace lamina::simplify {
-namespace {
 
 using namespace meshes;
-
-constexpr double kLeastCosine = 0.2;  ///< a triangle turns no farther at one contraction
-constexpr double kSliver = 0.05;      ///< no contraction makes triangles worse than this (1: equilateral)
-
-/// Squared: 1 for equilateral triangles, 0 for those without area.
-double shape2(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& twice_area) {
-  const double sides = dot(b - a, b - a) + dot(c - b, c - b) + dot(a - c, a - c);
-  return 12 * dot(twice_area, twice_area) / (sides * sides);
-}
-
-}  // namespace
 
 Contractor::Contractor(Piece piece)
     : piece_(std::move(piece)),
@@ -36,25 +26,15 @@ Contractor::Contractor(Piece piece)
   }
 }
 
-Contractor::Placed Contractor::place(std::uint32_t u, std::uint32_t v) const {
+Placed Contractor::place(std::uint32_t u, std::uint32_t v) const {
   Quadric sum = piece_.quadrics[u];
   sum += piece_.quadrics[v];
-  const Vec3 a = piece_.positions[u] - piece_.centre, b = piece_.positions[v] - piece_.centre;
-  const Vec3 middle = 0.5 * (a + b), edge = b - a;
-  const auto there = [&](const Vec3& x, double cost) {
-    Vec3 at = x + piece_.centre;
-    if (piece_.floats) {
-      for (double& c : at) c = static_cast<double>(static_cast<float>(c));
-    }
-    return Placed{at, std::max(0.0, cost)};
-  };
-  if (const auto least = sum.least()) {
-    const Vec3 off = *least - middle;
-    if (dot(off, off) < 4 * dot(edge, edge)) return there(*least, sum.at(*least));
+  Placed placed = place_edge(sum, piece_.positions[u] - piece_.centre, piece_.positions[v] - piece_.centre);
+  placed.at = placed.at + piece_.centre;
+  if (piece_.floats) {
+    for (double& c : placed.at) c = static_cast<double>(static_cast<float>(c));
   }
-  const double at_a = sum.at(a), at_b = sum.at(b), at_middle = sum.at(middle);
-  if (at_middle <= at_a && at_middle <= at_b) return there(middle, at_middle);
-  return at_a <= at_b ? there(a, at_a) : there(b, at_b);
+  return placed;
 }
 
 void Contractor::offer(std::uint32_t u, std::uint32_t v) {
@@ -111,33 +91,13 @@ std::uint64_t Contractor::run(float dearest, std::uint64_t keep) {
     heap_.pop_back();
     if (!stars_.contractible(e.u, e.v)) continue;
     const Placed to = place(e.u, e.v);
-    if (!keeps_shape(e.u, e.v, to.at) || (tracker_ && !stays_near(e.u, e.v, to))) continue;
+    if (!keeps_shape(stars_, piece_.positions, e.u, e.v, to.at) || (tracker_ && !stays_near(e.u, e.v, to))) continue;
     const double weight = piece_.quadrics[e.u].weight() + piece_.quadrics[e.v].weight();
     if (weight > 0) deviation2_ = std::max(deviation2_, to.cost / weight);
     size_ -= static_cast<std::uint64_t>(contract(e.u, e.v, to.at));
     if (tracker_) tracker_->accept();
   }
   return before - size_;
-}
-
-/// Do the triangles that stay keep their side and an area?
-bool Contractor::keeps_shape(std::uint32_t u, std::uint32_t v, const Vec3& to) const {
-  for (const auto& [vertex, other] : {std::pair{u, v}, std::pair{v, u}}) {
-    const Vec3& from = piece_.positions[vertex];
-    for (const std::uint32_t triangle : stars_.around(vertex)) {
-      const Triangle& t = stars_.triangles()[triangle];
-      if (names(t, other)) continue;
-      const std::size_t k = corner_of(t, vertex);
-      const Vec3 &p = piece_.positions[t[(k + 1) % 3]], &q = piece_.positions[t[(k + 2) % 3]];
-      const Vec3 before = cross(p - from, q - from), after = cross(p - to, q - to);
-      const double along = dot(before, after);
-      if (!(along > 0 && along * along > kLeastCosine * kLeastCosine * dot(before, before) * dot(after, after)))
-        return false;
-      const double shape = shape2(to, p, q, after);
-      if (!(shape >= kSliver * kSliver) && shape < shape2(from, p, q, before)) return false;
-    }
-  }
-  return true;
 }
 
 /// Within the bound? Where the root mean square of the planes' distances is far beyond it, nothing is proved any more.
@@ -150,9 +110,7 @@ bool Contractor::stays_near(std::uint32_t u, std::uint32_t v, const Placed& to) 
 }
 
 int Contractor::contract(std::uint32_t u, std::uint32_t v, const Vec3& to) {
-  const Vec3 edge = piece_.positions[v] - piece_.positions[u];
-  const double length2 = dot(edge, edge);
-  const double share = length2 > 0 ? std::clamp(dot(to - piece_.positions[u], edge) / length2, 0.0, 1.0) : 0.5;
+  const double share = share_along(piece_.positions[u], piece_.positions[v], to);
   merges_.push_back({u, v, static_cast<float>(share)});
   piece_.positions[u] = to;
   piece_.quadrics[u] += piece_.quadrics[v];

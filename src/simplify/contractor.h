@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "meshes/vec3.h"
+#include "simplify/contraction.h"
 #include "simplify/quadric.h"
 #include "simplify/stars.h"
 #include "simplify/tracker.h"
@@ -65,10 +66,6 @@ class Contractor {
       return u != o.u ? u > o.u : v > o.v;
     }
   };
-  struct Placed {
-    meshes::Vec3 at;
-    double cost;
-  };
 
   [[nodiscard]] bool stale(const Entry& e) const {
     return e.version != version_[e.u] + version_[e.v] || stars_.around(e.u).empty() || stars_.around(e.v).empty();
@@ -78,7 +75,6 @@ class Contractor {
   [[nodiscard]] Placed place(std::uint32_t u, std::uint32_t v) const;
   void offer(std::uint32_t u, std::uint32_t v);
   [[nodiscard]] bool stays_near(std::uint32_t u, std::uint32_t v, const Placed& to);
-  [[nodiscard]] bool keeps_shape(std::uint32_t u, std::uint32_t v, const meshes::Vec3& to) const;
   int contract(std::uint32_t u, std::uint32_t v, const meshes::Vec3& to);
 
   Piece piece_;

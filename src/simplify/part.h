@@ -1,10 +1,14 @@
 // A part of a larger mesh simplified by itself, such that it still fits the others.
 #pragma once
+#include <tbb/enumerable_thread_specific.h>
+
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "lamina/mesh.h"
 #include "lamina/run.h"
+#include "simplify/matching.h"
 
 namespace lamina::simplify {
 
@@ -17,11 +21,17 @@ struct PartResult {
   std::vector<std::uint32_t> numbers;  ///< drop_unused()
 };
 
-/// Contracts edges (simplify_mesh()) until `triangles` are left, or no edge can go, or only a few can. Vertices whose
-/// `locked` is not 0 keep place, normal, attributes and the edges between them, so that borders with other parts stay
-/// as they are. The mesh need not be manifold: vertices of edges with more than two triangles, or with two that face
-/// opposite sides, stay as well. The same for any number of threads. Throws Error(internal) when cancelled.
-PartResult simplify_part(TriangleMesh& mesh, std::vector<std::uint8_t> locked, std::uint64_t triangles,
-                         const RunContext& run);
+/// Simplifies one part after the other, side by side in several threads, each of which keeps its memory.
+class PartSimplifier {
+ public:
+  /// Contracts edges until `triangles` are left, or only a few can go (Matching). Vertices whose `locked` is not 0 keep
+  /// place, normal, attributes and the edges between them, so that borders with other parts stay as they are. The mesh
+  /// need not be manifold. Depends on the mesh alone. Throws Error(internal) when cancelled.
+  PartResult simplify(TriangleMesh& mesh, std::span<const std::uint8_t> locked, std::uint64_t triangles,
+                      const RunContext& run);
+
+ private:
+  tbb::enumerable_thread_specific<Matching> matchings_;
+};
 
 }  // namespace lamina::simplify

@@ -5,8 +5,22 @@
 
 namespace lamina::simplify {
 
-Stars::Stars(std::vector<Triangle> triangles, std::size_t vertices)
-    : triangles_(std::move(triangles)), star_(vertices), boundary_(vertices), mark_(vertices) {
+void Stars::reset(std::vector<Triangle> triangles, std::size_t vertices) {
+  triangles_ = std::move(triangles);
+  star_.assign(vertices, {});
+  boundary_.assign(vertices, 0);
+  mark_.assign(vertices, 0);
+  question_ = 0;
+  list_triangles();
+  // An inner vertex of a manifold has as many neighbours as triangles.
+  std::vector<std::uint32_t> near;
+  for (std::uint32_t v = 0; v < vertices; ++v) {
+    neighbours(v, near);
+    boundary_[v] = near.size() > star_[v].size ? 1 : 0;
+  }
+}
+
+void Stars::list_triangles() {
   for (const Triangle& t : triangles_) {
     for (const std::uint32_t v : t) ++star_[v].size;
   }
@@ -21,12 +35,12 @@ Stars::Stars(std::vector<Triangle> triangles, std::size_t vertices)
   for (std::uint32_t t = 0; t < triangles_.size(); ++t) {
     for (const std::uint32_t v : triangles_[t]) runs_[star_[v].begin + star_[v].size++] = t;
   }
-  // An inner vertex of a manifold has as many neighbours as triangles.
-  std::vector<std::uint32_t> near;
-  for (std::uint32_t v = 0; v < vertices; ++v) {
-    neighbours(v, near);
-    boundary_[v] = near.size() > star_[v].size ? 1 : 0;
-  }
+}
+
+void Stars::tidy() {
+  std::erase_if(triangles_, [](const Triangle& t) { return t[0] == kNone; });
+  std::fill(star_.begin(), star_.end(), Run{});
+  list_triangles();
 }
 
 void Stars::neighbours(std::uint32_t vertex, std::vector<std::uint32_t>& out) {

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace lamina::simplify {
@@ -24,7 +25,12 @@ inline bool names(const Triangle& t, std::uint32_t vertex) {
 /// written anew behind the others.
 class Stars {
  public:
-  Stars(std::vector<Triangle> triangles, std::size_t vertices);
+  Stars() = default;
+  Stars(std::vector<Triangle> triangles, std::size_t vertices) { reset(std::move(triangles), vertices); }
+  /// As if made anew, in the memory that is there.
+  void reset(std::vector<Triangle> triangles, std::size_t vertices);
+  /// The triangles, with those that have gone; what is left is for reset().
+  std::vector<Triangle> release() { return std::move(triangles_); }
 
   [[nodiscard]] const std::vector<Triangle>& triangles() const { return triangles_; }
   [[nodiscard]] bool alive(std::uint32_t triangle) const { return triangles_[triangle][0] != kNone; }
@@ -40,11 +46,14 @@ class Stars {
   [[nodiscard]] bool contractible(std::uint32_t u, std::uint32_t v);
   /// v becomes u. Returns how many triangles go.
   int contract(std::uint32_t u, std::uint32_t v);
+  /// Triangles that have gone leave the arrays, and the others get other numbers in the same order.
+  void tidy();
 
  private:
   struct Run {
     std::uint32_t begin = 0, size = 0;
   };
+  void list_triangles();
   void drop(std::uint32_t vertex, std::uint32_t triangle);
   [[nodiscard]] bool spans(std::uint32_t vertex, std::uint32_t c, std::uint32_t d) const;
 

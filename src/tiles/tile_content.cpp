@@ -3,8 +3,10 @@
 #include <meshoptimizer.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -126,12 +128,11 @@ struct TileOrder {
 TileOrder order_of(const TriangleMesh& mesh) {
   const std::size_t vertices = mesh.positions.size();
   TileOrder order;
-  std::vector<unsigned int> given;
-  given.reserve(3 * mesh.triangles.size());
-  for (const auto& t : mesh.triangles) given.insert(given.end(), t.begin(), t.end());
-  order.indices.resize(given.size());
+  order.indices.resize(3 * mesh.triangles.size());
   constexpr unsigned int kCache = 16;
-  meshopt_optimizeVertexCacheFifo(order.indices.data(), given.data(), given.size(), vertices, kCache);
+  static_assert(sizeof(mesh.triangles[0]) == 3 * sizeof(unsigned int));
+  meshopt_optimizeVertexCacheFifo(order.indices.data(), mesh.triangles[0].data(), order.indices.size(), vertices,
+                                  kCache);
   constexpr std::uint32_t kUnplaced = 0xFFFFFFFF;
   std::vector<std::uint32_t> place(vertices, kUnplaced);
   for (unsigned int& v : order.indices) {
@@ -210,6 +211,21 @@ void add_normals(ContentWriter& writer, ContentJson& primitive, const TriangleMe
            order.vertices.size());
 }
 
+std::uint8_t byte_of(float channel) {
+  return static_cast<std::uint8_t>(std::clamp(std::round(channel), 0.0F, 255.0F));
+}
+
+/// Linear, of 16 bits, of encoded colours of 8.
+const std::array<std::uint16_t, 256>& linear_words() {
+  static const std::array<std::uint16_t, 256> words = [] {
+    std::array<std::uint16_t, 256> all{};
+    for (std::size_t c = 0; c < all.size(); ++c)
+      all[c] = static_cast<std::uint16_t>(std::lround(65535 * meshes::linear_of(static_cast<double>(c) / 255)));
+    return all;
+  }();
+  return words;
+}
+
 void add_colours(ContentWriter& writer, ContentJson& primitive, const TriangleMesh& mesh, const TileOrder& order) {
   const auto colours = meshes::find_colours(mesh);
   if (!colours) return;
@@ -217,23 +233,17 @@ void add_colours(ContentWriter& writer, ContentJson& primitive, const TriangleMe
   const bool words = colours->scale == 1;
   const std::size_t channels = alpha ? 4 : 3;
   std::string rows;
-  const auto put = [&](double linear) {
-    if (words) {
-      append_little(rows, static_cast<std::uint16_t>(std::lround(65535 * linear)));
-    } else {
-      append_little(rows, static_cast<float>(linear));
-    }
-  };
-  const auto share = [&](double channel) {
-    return std::clamp((words ? std::round(channel) : channel) / 255, 0.0, 1.0);
-  };
   for (const std::uint32_t v : order.vertices) {
-    for (const float c : colours->at(mesh, v)) put(meshes::linear_of(share(static_cast<double>(c))));
-    if (alpha) {
-      put(share(static_cast<double>(colours->scale * mesh.attributes[*alpha][v])));
-    } else if (words) {
-      append_little(rows, std::uint16_t{0});
+    const std::array<float, 3> colour = colours->at(mesh, v);
+    const float opacity = alpha ? colours->scale * mesh.attributes[*alpha][v] : 0;
+    if (words) {
+      for (const float c : colour) append_little(rows, linear_words()[byte_of(c)]);
+      append_little(rows, static_cast<std::uint16_t>(257 * byte_of(opacity)));
+      continue;
     }
+    const auto share = [](float channel) { return std::clamp(static_cast<double>(channel) / 255, 0.0, 1.0); };
+    for (const float c : colour) append_little(rows, static_cast<float>(meshes::linear_of(share(c))));
+    if (alpha) append_little(rows, static_cast<float>(share(opacity)));
   }
   ContentJson accessor{{"componentType", words ? glb::kUshort : glb::kFloat},
                        {"type", channels == 4 ? "VEC4" : "VEC3"}};

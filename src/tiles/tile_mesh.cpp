@@ -1,13 +1,10 @@
 #include "tiles/tile_mesh.h"
 
-#include <tbb/task_arena.h>
-
 #include <algorithm>
 #include <cstddef>
 #include <tuple>
 #include <utility>
 
-#include "simplify/part.h"
 #include "simplify/stars.h"
 
 namespace lamina::tiles {
@@ -68,12 +65,11 @@ TileMesh merge_tiles(std::vector<TileMesh> parts, int depth) {
   return all;
 }
 
-void coarsen_tile(TileMesh& tile, std::uint64_t triangles, const RunContext& run) {
+void coarsen_tile(TileMesh& tile, std::uint64_t triangles, simplify::PartSimplifier& simplifier,
+                  const RunContext& run) {
   std::vector<std::uint8_t> locked(tile.mesh.positions.size(), 0);
   for (const SharedVertex& v : tile.shared) locked[v.at] = 1;
-  // A thread that waits for others here shall not begin with another tile meanwhile, which takes memory.
-  const simplify::PartResult result = tbb::this_task_arena::isolate(
-      [&] { return simplify::simplify_part(tile.mesh, std::move(locked), triangles, run); });
+  const simplify::PartResult result = simplifier.simplify(tile.mesh, locked, triangles, run);
   for (auto& position : tile.mesh.positions) {
     for (double& c : position) c = std::nearbyint(c);
   }

@@ -8,6 +8,7 @@
 #include "lamina/mesh.h"
 #include "lamina/run.h"
 #include "meshes/vec3.h"
+#include "simplify/part.h"
 
 namespace lamina::tiles {
 
@@ -39,6 +40,6 @@ struct TileMesh {
 TileMesh merge_tiles(std::vector<TileMesh> parts, int depth);
 
 /// Contracts edges until `triangles` are left, but for the shared vertices. Adds the error.
-void coarsen_tile(TileMesh& tile, std::uint64_t triangles, const RunContext& run);
+void coarsen_tile(TileMesh& tile, std::uint64_t triangles, simplify::PartSimplifier& simplifier, const RunContext& run);
 
 }  // namespace lamina::tiles

@@ -19,6 +19,7 @@
 #include "meshes/held_mesh.h"
 #include "meshes/stored_mesh.h"
 #include "meshes/stored_ply.h"
+#include "simplify/part.h"
 #include "tiles/georeference.h"
 #include "tiles/tile_content.h"
 #include "tiles/tile_mesh.h"
@@ -95,7 +96,7 @@ class TileBuilder {
     TileMesh tile = merge_tiles(std::move(parts), place.depth);
     const auto there = static_cast<double>(tile.mesh.triangles.size());
     const double wanted = std::clamp(kShrinks * there, sizes_.least, sizes_.most);
-    if (there > wanted) coarsen_tile(tile, static_cast<std::uint64_t>(wanted), run);
+    if (there > wanted) coarsen_tile(tile, static_cast<std::uint64_t>(wanted), simplifier_, run);
     write(node, tile);
     return tile;
   }
@@ -122,6 +123,7 @@ class TileBuilder {
   bool compress_;
   StagedFolder& folder_;
   std::vector<TileEntry> entries_;
+  simplify::PartSimplifier simplifier_;
 };
 
 /// Normals of vertices by the areas of the triangles around them.

@@ -2,11 +2,14 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "lamina/mesh.h"
+#include "lamina/simplify.h"
 #include "simplify/stars.h"
 
 namespace lamina::simplify {
@@ -38,7 +41,7 @@ TEST(SimplifyPart, LockedVerticesStay) {
     const std::uint32_t i = v / (kSide + 1), j = v % (kSide + 1);
     if (i == 0 || j == 0 || i == kSide) locked[v] = 1;  // one side is free
   }
-  const PartResult result = simplify_part(mesh, locked, 10'000, {});
+  const PartResult result = PartSimplifier().simplify(mesh, locked, 10'000, {});
   EXPECT_LE(mesh.triangles.size(), 10'100U);
   EXPECT_GT(result.deviation, 0);
   EXPECT_LT(result.deviation, 1e-3);
@@ -57,9 +60,48 @@ TEST(SimplifyPart, LockedVerticesStay) {
 TEST(SimplifyPart, EndsWhereEverythingIsLocked) {
   TriangleMesh mesh = wave(60);
   const std::size_t there = mesh.triangles.size();
-  const PartResult result = simplify_part(mesh, std::vector<std::uint8_t>(mesh.positions.size(), 1), 10, {});
+  const std::vector<std::uint8_t> locked(mesh.positions.size(), 1);
+  const PartResult result = PartSimplifier().simplify(mesh, locked, 10, {});
   EXPECT_EQ(mesh.triangles.size(), there);
   EXPECT_EQ(result.deviation, 0);
+}
+
+// A simplifier keeps its memory, nothing of the meshes that it had before.
+TEST(SimplifyPart, OneAfterTheOtherAsEachAlone) {
+  PartSimplifier simplifier;
+  for (const std::uint32_t side : {90U, 40U, 70U}) {
+    TriangleMesh first = wave(side), second = first;
+    std::vector<std::uint8_t> locked(first.positions.size(), 0);
+    locked[side] = 1;
+    const PartResult a = simplifier.simplify(first, locked, 900, {}),
+                     b = PartSimplifier().simplify(second, locked, 900, {});
+    EXPECT_EQ(a.deviation, b.deviation);
+    EXPECT_EQ(a.numbers, b.numbers);
+    EXPECT_EQ(first.positions, second.positions);
+    EXPECT_EQ(first.triangles, second.triangles);
+  }
+}
+
+// No queue over all edges, and yet hardly farther from the mesh than with one.
+TEST(SimplifyPart, NearlyAsCloseAsContractionsInOrder) {
+  const auto root_mean_square = [](const TriangleMesh& mesh) {
+    double sum = 0;
+    for (const auto& t : mesh.triangles) {
+      std::array<double, 3> middle{};
+      for (const std::uint32_t v : t)
+        for (std::size_t k = 0; k < 3; ++k) middle[k] += mesh.positions[v][k] / 3;
+      const double off = middle[2] - 0.1 * std::sin(6 * middle[0]) * std::cos(5 * middle[1]);
+      sum += off * off;
+    }
+    return std::sqrt(sum / static_cast<double>(mesh.triangles.size()));
+  };
+  TriangleMesh passes = wave(200), in_order = passes;
+  PartSimplifier().simplify(passes, std::vector<std::uint8_t>(passes.positions.size(), 0), 10'000, {});
+  SimplifySettings settings;
+  settings.triangles = 10'000;
+  simplify_mesh(in_order, settings);
+  EXPECT_LE(passes.triangles.size(), 10'000U);
+  EXPECT_LT(root_mean_square(passes), 1.15 * root_mean_square(in_order));
 }
 
 }  // namespace

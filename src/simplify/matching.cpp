@@ -1,0 +1,209 @@
+#include "simplify/matching.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "lamina/error.h"
+#include "simplify/contraction.h"
+
+namespace lamina::simplify {
+namespace {
+
+using namespace meshes;
+
+constexpr double kMostOfPass = 0.33;       ///< of the vertices that a pass may take
+constexpr double kMoreEdges = 1.4;         ///< than chance asks for: cheap edges lie side by side
+constexpr double kIdlePass = 0.01;         ///< of the triangles: a pass over all edges that takes fewer is the last
+constexpr std::size_t kPassBlock = 1'024;  ///< triangles whose edges are sorted together: they fit a core's cache
+constexpr std::size_t kSampleStep = 32;    ///< one of so many triangles says what edges cost
+constexpr double kEdgesOfVertex = 3;
+constexpr unsigned kCostShift = 32;  ///< in the queue
+
+/// The middle of the box of a mesh.
+Vec3 middle_of(const std::vector<Vec3>& positions) {
+  if (positions.empty()) return {};
+  Vec3 low = positions[0], high = low;
+  for (const Vec3& at : positions) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], at[k]);
+      high[k] = std::max(high[k], at[k]);
+    }
+  }
+  return 0.5 * (low + high);
+}
+
+/// Floats that are not negative stand in the order of their bits.
+std::uint64_t queue_key(double cost, std::size_t edge) {
+  return std::uint64_t{std::bit_cast<std::uint32_t>(static_cast<float>(cost))} << kCostShift | edge;
+}
+float cost_of(std::uint64_t key) {
+  return std::bit_cast<float>(static_cast<std::uint32_t>(key >> kCostShift));
+}
+
+}  // namespace
+
+Matching::Result Matching::reduce(TriangleMesh& mesh, std::span<const std::uint8_t> locked, std::uint64_t wanted,
+                                  const RunContext& run) {
+  begin(mesh, locked);
+  double more = kMoreEdges;
+  while (size_ > wanted) {
+    if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+    held_ = locked_;
+    // Of n vertices that have d such edges each, some n d / 2 (d + 1) pairs are found one after the other.
+    const auto free = static_cast<double>(std::max<std::uint64_t>(free_, 1));
+    const double pairs = std::min(kMostOfPass, 0.5 * static_cast<double>(size_ - wanted) / free);
+    const double share = more * (2 * pairs / (1 - 2 * pairs)) / (2 * kEdgesOfVertex);
+    const std::uint64_t there = size_;
+    pass(limit(share), wanted);
+    stars_.tidy();
+    const auto gone = static_cast<double>(there - size_);
+    if (share >= 1 && gone < kIdlePass * static_cast<double>(there)) break;
+    if (gone < pairs * free) more *= 2;  // half of the pairs wanted
+  }
+  mesh.triangles = stars_.release();
+  return {size_, std::sqrt(deviation2_)};
+}
+
+void Matching::begin(TriangleMesh& mesh, std::span<const std::uint8_t> locked) {
+  mesh_ = &mesh;
+  centre_ = middle_of(mesh.positions);
+  positions_.clear();
+  for (const Vec3& at : mesh.positions) positions_.push_back(at - centre_);
+  size_ = mesh.triangles.size();
+  deviation2_ = 0;
+  stars_.reset(std::move(mesh.triangles), positions_.size());
+  locked_.assign(locked.begin(), locked.end());
+  quadrics_.assign(positions_.size(), {});
+  add_planes();
+  ways_.assign(positions_.size(), {});
+  for (std::uint32_t v = 0; v < positions_.size(); ++v) survey_ring(v);
+  free_ = static_cast<std::uint64_t>(std::count(locked_.begin(), locked_.end(), 0));
+}
+
+void Matching::add_planes() {
+  for (const Triangle& t : stars_.triangles()) {
+    const Vec3 n = cross(positions_[t[1]] - positions_[t[0]], positions_[t[2]] - positions_[t[0]]);
+    const double twice = norm(n);
+    if (!(twice > 0)) continue;
+    const Quadric plane = plane_quadric(positions_[t[0]], (1 / twice) * n, 0.5 * twice, kNormalNoise);
+    for (const std::uint32_t v : t) quadrics_[v] += plane;
+  }
+}
+
+/// Finds rims, and locks a vertex that is not that of a manifold.
+void Matching::survey_ring(std::uint32_t vertex) {
+  const auto visit = [&](auto&& edge) {
+    for (const std::uint32_t triangle : stars_.around(vertex)) {
+      const Triangle& t = stars_.triangles()[triangle];
+      const std::size_t k = corner_of(t, vertex);
+      edge(t[(k + 1) % 3], t[(k + 2) % 3]);
+    }
+  };
+  bool manifold = true;
+  visit([&](std::uint32_t next, std::uint32_t last) {
+    manifold = manifold && ways_[next].out == 0 && ways_[last].in == 0;
+    ways_[next].out = ways_[last].in = 1;
+  });
+  int rims = 0;
+  visit([&](std::uint32_t next, std::uint32_t last) {
+    if (ways_[next].in == 0) {
+      ++rims;
+      add_wall(vertex, next, last);
+    }
+    if (ways_[last].out == 0) ++rims;
+  });
+  visit([&](std::uint32_t next, std::uint32_t last) { ways_[next] = ways_[last] = {}; });
+  if (!manifold || rims > 2) locked_[vertex] = 1;
+}
+
+/// A plane through the rim between two vertices, upright on its triangle.
+void Matching::add_wall(std::uint32_t from, std::uint32_t to, std::uint32_t beside) {
+  const Vec3 edge = positions_[to] - positions_[from], n = cross(edge, positions_[beside] - positions_[from]);
+  if (!(norm(n) > 0)) return;
+  const Quadric wall = plane_quadric(positions_[from], unit(cross(edge, unit(n))), dot(edge, edge), kNormalNoise);
+  quadrics_[from] += wall;
+  quadrics_[to] += wall;
+}
+
+/// Into edges_ those of triangles that are theirs to offer: an inner edge is its triangle's that runs along it upwards.
+void Matching::gather(std::size_t begin, std::size_t end, std::size_t step) {
+  edges_.resize(3 * ((end - begin + step - 1) / step));
+  Edge* out = edges_.data();
+  for (std::size_t triangle = begin; triangle < end; triangle += step) {
+    if (!stars_.alive(static_cast<std::uint32_t>(triangle))) continue;
+    const Triangle& t = stars_.triangles()[triangle];
+    for (std::size_t k = 0; k < 3; ++k) {  // without branches: chance decides
+      const std::uint32_t u = t[k], v = t[(k + 1) % 3];
+      const bool rim = stars_.boundary(u) & stars_.boundary(v);
+      const bool free = (held_[u] | held_[v]) == 0;
+      *out = {u, v};
+      out += static_cast<int>(free & ((u < v) | rim));
+    }
+  }
+  edges_.resize(static_cast<std::size_t>(out - edges_.data()));
+}
+
+/// What is in edges_ into the queue, where it costs no more than that.
+void Matching::price(float dearest) {
+  queue_.clear();
+  for (std::size_t e = 0; e < edges_.size(); ++e) {
+    const auto [u, v] = edges_[e];
+    Quadric sum = quadrics_[u];
+    sum += quadrics_[v];
+    const std::uint64_t key = queue_key(place_edge(sum, positions_[u], positions_[v]).cost, e);
+    if (cost_of(key) <= dearest) queue_.push_back(key);
+  }
+}
+
+/// What an edge may cost for a pass to be offered that share of them.
+float Matching::limit(double share) {
+  constexpr float kAny = std::numeric_limits<float>::max();
+  if (share >= 1) return kAny;
+  gather(0, stars_.triangles().size(), kSampleStep);
+  price(kAny);
+  if (queue_.empty()) return kAny;
+  const auto place = queue_.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(queue_.size()));
+  std::nth_element(queue_.begin(), place, queue_.end());
+  return cost_of(*place);
+}
+
+void Matching::pass(float dearest, std::uint64_t wanted) {
+  const std::size_t count = stars_.triangles().size();
+  for (std::size_t begin = 0; begin < count && size_ > wanted; begin += kPassBlock) {
+    gather(begin, std::min(begin + kPassBlock, count), 1);
+    price(dearest);
+    std::sort(queue_.begin(), queue_.end());
+    for (const std::uint64_t key : queue_) {
+      if (size_ <= wanted) break;
+      const auto [u, v] = edges_[static_cast<std::uint32_t>(key)];
+      if (held_[u] == 0 && held_[v] == 0) contract(std::min(u, v), std::max(u, v));
+    }
+  }
+}
+
+void Matching::contract(std::uint32_t u, std::uint32_t v) {
+  if (!stars_.contractible(u, v)) return;
+  Quadric sum = quadrics_[u];
+  sum += quadrics_[v];
+  const Placed to = place_edge(sum, positions_[u], positions_[v]);
+  if (!keeps_shape(stars_, positions_, u, v, to.at)) return;
+  const double weight = sum.weight();
+  if (weight > 0) deviation2_ = std::max(deviation2_, to.cost / weight);
+  const double share = share_along(positions_[u], positions_[v], to.at);
+  if (!mesh_->normals.empty()) {
+    const Vec3 mixed = (1 - share) * to_double(mesh_->normals[u]) + share * to_double(mesh_->normals[v]);
+    if (norm(mixed) > 0) mesh_->normals[u] = to_float(unit(mixed));
+  }
+  for (auto& values : mesh_->attributes) values[u] += static_cast<float>(share) * (values[v] - values[u]);
+  positions_[u] = to.at;
+  mesh_->positions[u] = to.at + centre_;
+  quadrics_[u] = sum;
+  held_[u] = held_[v] = 1;
+  --free_;
+  size_ -= static_cast<std::uint64_t>(stars_.contract(u, v));
+}
+
+}  // namespace lamina::simplify

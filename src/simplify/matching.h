@@ -1,0 +1,66 @@
+// Edges of a mesh contracted in passes: in each the cheapest edges that have no vertex in common. A queue of all edges
+// (Contractor) orders them better and takes several times as long; the error is larger by a few percent.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "lamina/mesh.h"
+#include "lamina/run.h"
+#include "meshes/vec3.h"
+#include "simplify/quadric.h"
+#include "simplify/stars.h"
+
+namespace lamina::simplify {
+
+/// Works on a whole mesh in one thread, block by block of its triangles, which lie near each other in a mesh that was
+/// streamed or merged of such. Keeps its memory for the next mesh.
+class Matching {
+ public:
+  struct Result {
+    std::uint64_t triangles = 0;  ///< left
+    double deviation =
+        0;  ///< of all contractions the largest root mean square distance of a new vertex from the planes
+  };
+  /// Contracts until `wanted` triangles are left, or only few edges can go. Vertices whose `locked` is not 0 stay as
+  /// they are, and so do those of edges with more than two triangles, or with two that face opposite sides. Vertices
+  /// that have gone stay in the arrays. Throws Error(internal) when cancelled.
+  Result reduce(TriangleMesh& mesh, std::span<const std::uint8_t> locked, std::uint64_t wanted, const RunContext& run);
+
+ private:
+  struct Edge {
+    std::uint32_t u, v;
+  };
+  /// How many triangles run along an edge, either way.
+  struct Ways {
+    std::uint8_t out = 0, in = 0;
+  };
+
+  void begin(TriangleMesh& mesh, std::span<const std::uint8_t> locked);
+  void add_planes();
+  void survey_ring(std::uint32_t vertex);
+  void add_wall(std::uint32_t from, std::uint32_t to, std::uint32_t beside);
+  void gather(std::size_t begin, std::size_t end, std::size_t step);
+  void price(float dearest);
+  [[nodiscard]] float limit(double share);
+  void pass(float dearest, std::uint64_t wanted);
+  void contract(std::uint32_t u, std::uint32_t v);
+
+  TriangleMesh* mesh_ = nullptr;
+  meshes::Vec3 centre_{};                ///< far from it quadrics lose their digits
+  std::vector<meshes::Vec3> positions_;  ///< from there
+  std::vector<Quadric> quadrics_;
+  std::vector<std::uint8_t> locked_;
+  std::vector<std::uint8_t> held_;  ///< in this pass: locked, or contracted already
+  Stars stars_;
+  std::uint64_t size_ = 0;  ///< triangles
+  std::uint64_t free_ = 0;  ///< vertices that are there and not locked
+  double deviation2_ = 0;
+
+  std::vector<Ways> ways_;            ///< by the other vertex; zero but for the vertex that is looked at
+  std::vector<Edge> edges_;           ///< of a block
+  std::vector<std::uint64_t> queue_;  ///< the bits of an edge's cost above its place in edges_: sorted by cost
+};
+
+}  // namespace lamina::simplify
