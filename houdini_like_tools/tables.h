@@ -22,15 +22,18 @@
 
 namespace lamina::tools {
 
-/// How far `lamina simplify` is to go: one of these.
+/// How far a mesh is to be simplified: one of these.
 struct SimplifyGoal {
   std::optional<std::uint64_t> triangles;
   std::optional<double> ratio, error;
+  [[nodiscard]] bool given() const { return triangles || ratio || error; }
 };
 /// --error, --triangles, --ratio.
-void add_simplify_goal(CLI::App& tool, SimplifyGoal& goal);
-/// For a mesh of `there` triangles. Throws Error(usage) where none is given, or out of range.
-SimplifySettings simplify_settings(const SimplifyGoal& goal, std::size_t there);
+void add_simplify_goal(CLI::App& tool, SimplifyGoal& goal, const std::string& group);
+/// Throws Error(usage) where none is given, or out of range.
+SimplifySettings simplify_settings(const SimplifyGoal& goal);
+/// How many triangles are left, and whether more than were wanted.
+void report_simplified(const SimplifyStats& stats, const std::string& name, const RunContext& context);
 
 /// --voxelsize, --halfbandvoxels, --sign, --name, --no-colour, --half.
 void add_grid_options(CLI::App& tool, VolumeSettings& settings);

@@ -1,15 +1,21 @@
 // Fewer triangles for the same surface: quadric edge contraction.
 #pragma once
 #include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "lamina/mesh.h"
 #include "lamina/run.h"
 
 namespace lamina {
 
+/// One of these.
 struct SimplifySettings {
-  std::uint64_t triangles = 0;  ///< how many are wanted, >= 1; without `error`
-  double error = 0;             ///< how far it may get from what it was, > 0, in mesh units; without `triangles`
+  std::uint64_t triangles = 0;  ///< how many are wanted, >= 1
+  double error = 0;             ///< how far it may get from what it was, > 0, in mesh units
+  double ratio = 0;             ///< of the triangles that stay, > 0 and up to 1
+  [[nodiscard]] bool wanted() const { return triangles > 0 || error != 0 || ratio != 0; }
 };
 
 struct SimplifyStats {
@@ -17,6 +23,7 @@ struct SimplifyStats {
   std::uint64_t contractions = 0;
   bool reached = false;  ///< no more triangles than wanted; else no contraction was left that keeps shape and topology.
                          ///< With `error`: true
+  double deviation = 0;  ///< largest root mean square distance of a new vertex from the planes it stands for
 };
 
 /// Contracts edges in order of their quadric error (Garland and Heckbert 1997), each to the point of least error, found
@@ -26,10 +33,17 @@ struct SimplifyStats {
 /// than 78 degrees at a step. Attributes and normals are interpolated along the contracted edges. Vertices and
 /// triangles keep their order, and positions stay floats where all of them are; vertices in no triangle are dropped.
 /// Works on pieces that fit the processor's cache, side by side, and cuts the mesh elsewhere round by round; the last
-/// edges go in one order. Some 300 bytes of work space a triangle; the same mesh gives the same bytes, for any number
-/// of threads. The error is not bounded. Throws Error(usage) for a number of triangles that is 0 or larger than the
-/// mesh's, Error(unreadable) for a mesh that is not manifold or has no triangles, Error(internal) when cancelled; the
-/// mesh is then not changed or of no use.
+/// edges go in one order. A mesh of more than a million triangles is cut into regions of no more, which wait in
+/// temporary files (docs/simplify.md). Some 300 bytes of work space a triangle, of a million at the most; the same mesh
+/// gives the same bytes, for any number of threads. Throws Error(usage) for settings out of range, or more triangles
+/// than there are, Error(unreadable) for a mesh that is not manifold or has no triangles, Error(internal) when
+/// cancelled; the mesh is then not changed or of no use.
 SimplifyStats simplify_mesh(TriangleMesh& mesh, const SimplifySettings& settings, const RunContext& run = {});
+
+/// The same of a mesh file that need not fit in memory, into files that need not either, at least one (their endings
+/// say the format): a binary PLY of triangles, as this program writes them, with normals. Nothing for any other file,
+/// which is to be read whole. Throws as above, Error(unreadable) for a damaged file, Error(budget) for a full disk.
+std::optional<SimplifyStats> simplify_file(const std::string& path, const std::vector<std::string>& outputs,
+                                           const SimplifySettings& settings, const RunContext& run = {});
 
 }  // namespace lamina

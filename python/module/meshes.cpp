@@ -71,7 +71,7 @@ Mesh simplify(const py::object& mesh, const py::object& progress, const py::kwar
   Keywords words("simplify");
   tools::SimplifyGoal goal;
   tools::RunOptions run;
-  tools::add_simplify_goal(words.app(), goal);
+  tools::add_simplify_goal(words.app(), goal, "Goal");
   tools::add_run_options(words.app(), run);
   words.parse(keywords);
   const std::shared_ptr<MeshData> data = mesh_argument(mesh);
@@ -79,7 +79,7 @@ Mesh simplify(const py::object& mesh, const py::object& progress, const py::kwar
   run_job(run, progress, [&](const RunContext& context) {
     require_faces(*data);
     TriangleMesh copy = WithAttributes(data).mesh();
-    const SimplifyStats stats = simplify_mesh(copy, tools::simplify_settings(goal, copy.triangles.size()), context);
+    const SimplifyStats stats = simplify_mesh(copy, tools::simplify_settings(goal), context);
     if (!stats.reached)
       context.warn("more triangles stay than were wanted: no other edge can go without a fold or a change of topology");
     simpler = std::make_shared<MeshData>(std::move(copy));
@@ -97,7 +97,7 @@ void add_mesh_functions(py::module_& module) {
   tools::add_compare_options(comparing.app(), settings);
   tools::add_run_options(comparing.app(), run);
   comparing.list_in(module);
-  tools::add_simplify_goal(simplifying.app(), goal);
+  tools::add_simplify_goal(simplifying.app(), goal, "Goal");
   tools::add_run_options(simplifying.app(), run);
   simplifying.list_in(module);
   module.def("check", &check, py::arg("mesh"), py::kw_only(), py::arg("expect") = "", py::arg("threads") = 0,

@@ -157,6 +157,9 @@ std::uint64_t MeshSink::vertices() const {
 std::uint64_t MeshSink::triangles() const {
   return impl_->triangles;
 }
+const std::string& MeshSink::tmp_dir() const {
+  return impl_->face_directory;
+}
 void MeshSink::read_back(const std::function<void(meshes::MeshBlocks&)>& use, const RunContext& run) {
   impl_->require_open();
   impl_->require_indices();

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "lamina/attributes.h"
+#include "lamina/mesh.h"
 #include "lamina/run.h"
 
 namespace lamina::meshes {
@@ -66,6 +67,7 @@ class MeshSink {
   void append_triangles(const std::vector<std::array<std::uint32_t, 3>>& triangles);
   [[nodiscard]] std::uint64_t vertices() const;
   [[nodiscard]] std::uint64_t triangles() const;
+  [[nodiscard]] const std::string& tmp_dir() const;  ///< where its temporary files lie
   /// Gives what has been appended to `use`, to be read back. Throws what that throws, and as commit().
   void read_back(const std::function<void(meshes::MeshBlocks&)>& use, const RunContext& run = {});
   /// Fills in the header (`uint` indices where more than 2^31 - 1 vertices need them; up to 2^32 - 1), appends the
@@ -78,6 +80,11 @@ class MeshSink {
   struct Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// Vertices [first, first + count) of a mesh that has normals.
+void take_vertices(const TriangleMesh& mesh, std::size_t first, std::size_t count, VertexBatch& out);
+/// A mesh, or a piece whose triangles count vertices from the sink's first. It has normals and the sink's attributes.
+void append_mesh(const TriangleMesh& mesh, MeshSink& sink);
 
 /// The comment every sink writes first: "made by lamina VERSION".
 std::string sink_signature();

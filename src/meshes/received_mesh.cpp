@@ -14,6 +14,8 @@ namespace {
 
 constexpr std::size_t kVerticesAtOnce = 1U << 14;
 
+}  // namespace
+
 void take_vertices(const TriangleMesh& mesh, std::size_t first, std::size_t count, VertexBatch& out) {
   out.x.resize(count), out.y.resize(count), out.z.resize(count);
   out.nx.resize(count), out.ny.resize(count), out.nz.resize(count);
@@ -30,7 +32,14 @@ void take_vertices(const TriangleMesh& mesh, std::size_t first, std::size_t coun
   }
 }
 
-}  // namespace
+void append_mesh(const TriangleMesh& mesh, MeshSink& sink) {
+  VertexBatch batch;
+  for (std::size_t first = 0; first < mesh.positions.size(); first += kVerticesAtOnce) {
+    take_vertices(mesh, first, std::min(kVerticesAtOnce, mesh.positions.size() - first), batch);
+    sink.append_vertices(batch);
+  }
+  sink.append_triangles(mesh.triangles);
+}
 
 void write_mesh(const TriangleMesh& mesh, const StreamedMeshLayout& layout, const std::string& path,
                 const RunContext& run) {
@@ -43,12 +52,7 @@ void write_mesh(const TriangleMesh& mesh, const StreamedMeshLayout& layout, cons
                                   .comments = layout.comments};
   meshes::warn_of_losses(settings, run);
   MeshSink sink(settings);
-  VertexBatch batch;
-  for (std::size_t first = 0; first < mesh.positions.size(); first += kVerticesAtOnce) {
-    take_vertices(mesh, first, std::min(kVerticesAtOnce, mesh.positions.size() - first), batch);
-    sink.append_vertices(batch);
-  }
-  sink.append_triangles(mesh.triangles);
+  append_mesh(mesh, sink);
   sink.commit(run);
 }
 

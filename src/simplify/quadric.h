@@ -29,6 +29,16 @@ struct Quadric {
     return x[0] * (xx * x[0] + 2 * (xy * x[1] + xz * x[2])) + x[1] * (yy * x[1] + 2 * yz * x[2]) + zz * x[2] * x[2] -
            2 * meshes::dot(b, x) + c;
   }
+  /// The same function of points that are counted from elsewhere, d of which is 0 here.
+  [[nodiscard]] Quadric moved(const meshes::Vec3& d) const {
+    const auto& [xx, xy, xz, yy, yz, zz] = a;
+    const meshes::Vec3 ad{xx * d[0] + xy * d[1] + xz * d[2], xy * d[0] + yy * d[1] + yz * d[2],
+                          xz * d[0] + yz * d[1] + zz * d[2]};
+    Quadric q = *this;
+    q.b = meshes::operator+(b, ad);
+    q.c = c + 2 * meshes::dot(b, d) + meshes::dot(d, ad);
+    return q;
+  }
   /// Of all planes.
   [[nodiscard]] double weight() const { return a[0] + a[3] + a[5]; }
   /// Where it is least, by the adjugate of A; nothing where A is too near to singular for that.

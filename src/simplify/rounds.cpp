@@ -32,6 +32,8 @@ constexpr double kInTurn = 1.01;  ///< from this many of the wanted ones on, pie
 constexpr double kHardlyAny =
     0.01;  ///< of the triangles: where vertices are locked, a round that takes fewer is the last
 
+constexpr std::uint64_t kPieceKeeps = 8;  ///< one in so many triangles, where a limit of the cost says how far to go
+
 constexpr int kBoundRounds = 3;  ///< with a bound: a round goes as far as it can, the others clear what it held fast
 
 /// Where a round cuts: different from the two before it.
@@ -42,7 +44,8 @@ double share_of_round(int round) {
 
 class Round {
  public:
-  Round(WorkMesh& work, double share) : work_(work), size_(work.mesh.triangles.size()) {
+  /// `stride`: only every so manieth piece is made, for costs() alone.
+  Round(WorkMesh& work, double share, std::size_t stride = 1) : work_(work), size_(work.mesh.triangles.size()) {
     std::vector<Centre> centres(size_);
     tbb::parallel_for(std::size_t{0}, size_, [&](std::size_t t) {
       const Triangle& c = work.mesh.triangles[t];
@@ -52,7 +55,7 @@ class Round {
     starts_ = cut_into_boxes(centres, kPieceTriangles, share);
     order_.resize(size_);
     for (std::size_t i = 0; i < size_; ++i) order_[i] = centres[i].triangle;
-    build();
+    build(stride);
   }
 
   [[nodiscard]] std::uint64_t size() const { return size_; }
@@ -81,6 +84,38 @@ class Round {
       dearest = std::max(next, dearest * (size_ > goal + goal / 2 ? 2.F : 1.25F));
     }
     return !exactly || in_turn(goal);
+  }
+
+  /// What costs no more than `limit`; of a piece at least a small share stays.
+  void reduce_below(float limit, const RunContext& run) {
+    tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
+      Contractor& c = *pieces_[p];
+      const std::uint64_t keep = c.size() / kPieceKeeps;
+      for (float dearest = 0; !run.cancelled() && c.size() > keep && c.next_cost() <= limit;) {
+        dearest = std::min(limit, std::max(c.next_cost(), 2 * dearest));
+        c.run(dearest, keep);
+      }
+    });
+    if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+  }
+
+  /// Of the pieces that were made.
+  CostCurve costs() {
+    std::vector<CostCurve> curves(pieces_.size());
+    tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
+      if (!pieces_[p]) return;
+      Contractor& c = *pieces_[p];
+      const auto& fixed = c.piece().fixed;
+      curves[p].expect(2 * static_cast<std::uint64_t>(std::count(fixed.begin(), fixed.end(), 0)));
+      const std::uint64_t keep = c.size() / kPieceKeeps;
+      for (float step = 0; c.size() > keep && !std::isinf(c.next_cost());) {
+        step = CostCurve::step_above(std::max(c.next_cost(), 1.01F * step));
+        curves[p].add(step, c.run(step, keep));
+      }
+    });
+    CostCurve all;
+    for (const CostCurve& curve : curves) all.add(curve);
+    return all;
   }
 
   /// As far as pieces go.
@@ -120,7 +155,7 @@ class Round {
     return {order_.data() + starts_[piece], starts_[piece + 1] - starts_[piece]};
   }
 
-  void build() {
+  void build(std::size_t stride) {
     const auto& triangles = work_.mesh.triangles;
     constexpr std::uint32_t kSeveral = kNone - 1;
     std::vector<std::uint32_t> owner(work_.mesh.positions.size(), kNone);
@@ -134,6 +169,7 @@ class Round {
     tbb::enumerable_thread_specific<std::vector<std::uint32_t>> numbers(
         [&] { return std::vector<std::uint32_t>(owner.size(), kNone); });
     tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
+      if (p % stride != stride / 2 && pieces_.size() > stride / 2) return;
       std::vector<std::uint32_t>& number = numbers.local();
       std::vector<std::uint32_t>& vertices = vertices_[p];
       Piece piece;
@@ -225,7 +261,7 @@ class Round {
 
 }  // namespace
 
-WorkMesh make_work_mesh(TriangleMesh& mesh, const measure::EdgeTable& edges) {
+WorkMesh begin_work_mesh(TriangleMesh& mesh) {
   WorkMesh work{mesh, std::vector<Quadric>(mesh.positions.size())};
   Vec3 low = mesh.positions[mesh.triangles[0][0]], high = low;
   work.floats = true;
@@ -240,6 +276,11 @@ WorkMesh make_work_mesh(TriangleMesh& mesh, const measure::EdgeTable& edges) {
     }
   }
   work.centre = 0.5 * (low + high);
+  return work;
+}
+
+void add_planes(WorkMesh& work, const measure::EdgeTable& edges) {
+  const TriangleMesh& mesh = work.mesh;
   const auto at = [&](std::uint32_t v) { return mesh.positions[v] - work.centre; };
   const auto normal_of = [&](const Triangle& t) { return cross(at(t[1]) - at(t[0]), at(t[2]) - at(t[0])); };
   for (const Triangle& t : mesh.triangles) {
@@ -254,6 +295,7 @@ WorkMesh make_work_mesh(TriangleMesh& mesh, const measure::EdgeTable& edges) {
     const std::uint32_t corner = sides[0].corner;
     const Triangle& t = mesh.triangles[corner / 3];
     const std::uint32_t u = t[corner % 3], v = t[sides[0].next_corner() % 3];
+    if (!work.locked.empty() && work.locked[u] != 0 && work.locked[v] != 0) return;
     const Vec3 edge = at(v) - at(u), n = normal_of(t);
     if (!(norm(n) > 0)) return;
     const Quadric wall =
@@ -261,6 +303,11 @@ WorkMesh make_work_mesh(TriangleMesh& mesh, const measure::EdgeTable& edges) {
     work.quadrics[u] += wall;
     work.quadrics[v] += wall;
   });
+}
+
+WorkMesh make_work_mesh(TriangleMesh& mesh, const measure::EdgeTable& edges) {
+  WorkMesh work = begin_work_mesh(mesh);
+  add_planes(work, edges);
   return work;
 }
 
@@ -289,8 +336,22 @@ std::uint64_t contract_to(WorkMesh& work, std::uint64_t wanted, const RunContext
   return contractions;
 }
 
+std::uint64_t contract_below(WorkMesh& work, float limit, const RunContext& run) {
+  Round round(work, share_of_round(0));
+  round.reduce_below(limit, run);
+  return round.finish();
+}
+
+std::size_t pieces_of(const WorkMesh& work) {
+  return work.mesh.triangles.size() / kPieceTriangles + 1;
+}
+
+CostCurve sample_costs(WorkMesh& work, std::size_t stride) {
+  return Round(work, share_of_round(0), stride).costs();
+}
+
 std::uint64_t contract_within(WorkMesh& work, const RunContext& run) {
-  work.errors.assign(work.mesh.triangles.size(), {});
+  if (work.errors.empty()) work.errors.assign(work.mesh.triangles.size(), {});
   std::uint64_t contractions = 0;
   for (int number = 0; number < kBoundRounds; ++number) {
     const std::size_t there = work.mesh.triangles.size();

@@ -10,6 +10,7 @@
 #include "lamina/run.h"
 #include "measure/edge_table.h"
 #include "simplify/contractor.h"
+#include "simplify/cost_curve.h"
 
 namespace lamina::simplify {
 
@@ -25,14 +26,29 @@ struct WorkMesh {
   double deviation = 0;                ///< largest of all contractions (Contractor::deviation())
 };
 
-/// Sums up planes of triangles and boundary edges. `edges`: of the mesh.
+/// Quadrics are 0, about the middle of the mesh's box.
+WorkMesh begin_work_mesh(TriangleMesh& mesh);
+/// Sums up planes of triangles and boundary edges; those between locked vertices are taken for borders with other
+/// meshes. `edges`: of the mesh.
+void add_planes(WorkMesh& work, const measure::EdgeTable& edges);
+/// Both.
 WorkMesh make_work_mesh(TriangleMesh& mesh, const measure::EdgeTable& edges);
 
 /// Contracts edges until `wanted` triangles are left, or no edge can go. Returns the number of contractions. Vertices
 /// that have gone stay in the arrays. Throws Error(internal) when cancelled.
 std::uint64_t contract_to(WorkMesh& work, std::uint64_t wanted, const RunContext& run);
 
-/// The same as far as the bound allows.
+/// Contracts the edges inside of pieces that cost no more than `limit`, in one round; an eighth of a piece stays. As
+/// contract_to().
+std::uint64_t contract_below(WorkMesh& work, float limit, const RunContext& run);
+
+/// The same as far as the bound allows; errors that are there add up.
 std::uint64_t contract_within(WorkMesh& work, const RunContext& run);
+
+/// How contractions would thin out the mesh, down to an eighth: found in every `stride`th piece, whose contractions are
+/// forgotten.
+CostCurve sample_costs(WorkMesh& work, std::size_t stride);
+/// About how many pieces there are.
+std::size_t pieces_of(const WorkMesh& work);
 
 }  // namespace lamina::simplify

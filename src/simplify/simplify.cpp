@@ -2,14 +2,23 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
 
+#include "base/descriptor.h"
 #include "base/run.h"
 #include "lamina/error.h"
 #include "lamina/measure.h"
 #include "measure/edge_table.h"
+#include "meshes/held_mesh.h"
+#include "meshes/mesh_format.h"
+#include "meshes/mesh_sink.h"
+#include "meshes/stored_mesh.h"
+#include "meshes/stored_ply.h"
 #include "simplify/part.h"
 #include "simplify/rounds.h"
+#include "simplify/streamed.h"
 
 namespace lamina {
 namespace {
@@ -25,33 +34,73 @@ void require_manifold(const TriangleMesh& mesh, const RunContext& run) {
                           r.repeated_index_triangles));
 }
 
+void append(TriangleMesh& all, const TriangleMesh& piece) {
+  const auto add = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+  add(all.positions, piece.positions);
+  add(all.normals, piece.normals);
+  for (std::size_t a = 0; a < all.attributes.size(); ++a) add(all.attributes[a], piece.attributes[a]);
+  add(all.triangles, piece.triangles);
+}
+
+SimplifyStats simplify_in_regions(TriangleMesh& mesh, const SimplifySettings& settings, const RunContext& run) {
+  meshes::HeldMesh blocks(mesh);
+  TriangleMesh fewer;
+  fewer.layout = mesh.layout;
+  fewer.attributes.resize(mesh.attributes.size());
+  const SimplifyStats stats = simplify::simplify_blocks(
+      blocks, settings, run.tmp_dir.empty() ? system_tmp_dir() : run.tmp_dir,
+      [&](const TriangleMesh& piece) { append(fewer, piece); }, run);
+  mesh = std::move(fewer);
+  return stats;
+}
+
 }  // namespace
 
 SimplifyStats simplify_mesh(TriangleMesh& mesh, const SimplifySettings& settings, const RunContext& run) {
-  if (settings.error != 0) {
-    if (!(settings.error > 0 && std::isfinite(settings.error)))
-      throw Error(ExitCode::usage,
-                  fmt::format("simplify: an error of {:g}: a length above 0 is meant", settings.error));
-    if (settings.triangles > 0) throw Error(ExitCode::usage, "simplify: a number of triangles or an error, not both");
-  } else if (settings.triangles == 0) {
-    throw Error(ExitCode::usage, "simplify: at least one triangle has to stay");
+  simplify::require_goal(settings);
+  SimplifyStats stats;
+  if (mesh.triangles.size() > simplify::kRegionTriangles) {
+    with_threads(run.threads, [&] { stats = simplify_in_regions(mesh, settings, run); });
+    return stats;
   }
   require_manifold(mesh, run);
-  if (settings.triangles > mesh.triangles.size()) {
-    throw Error(ExitCode::usage, fmt::format("simplify: {} triangles are wanted, the mesh has {}", settings.triangles,
-                                             mesh.triangles.size()));
-  }
-  SimplifyStats stats;
+  const std::uint64_t wanted = simplify::wanted_triangles(settings, mesh.triangles.size());
   stats.triangles_before = mesh.triangles.size();
   with_threads(run.threads, [&] {
     simplify::WorkMesh work = simplify::make_work_mesh(mesh, measure::EdgeTable(mesh));
     work.bound = settings.error;
-    stats.contractions = settings.error > 0 ? simplify::contract_within(work, run)
-                                            : simplify::contract_to(work, settings.triangles, run);
+    stats.contractions =
+        settings.error > 0 ? simplify::contract_within(work, run) : simplify::contract_to(work, wanted, run);
+    stats.deviation = work.deviation;
   });
   simplify::drop_unused(mesh);
   stats.triangles_after = mesh.triangles.size();
-  stats.reached = settings.error > 0 || stats.triangles_after <= settings.triangles;
+  stats.reached = settings.error > 0 || stats.triangles_after <= wanted;
+  return stats;
+}
+
+std::optional<SimplifyStats> simplify_file(const std::string& path, const std::vector<std::string>& outputs,
+                                           const SimplifySettings& settings, const RunContext& run) {
+  const std::optional<meshes::StoredPly> ply = meshes::open_stored_ply(path);
+  if (!ply) return std::nullopt;
+  simplify::require_goal(settings);
+  if (const std::uint64_t bytes = simplify::memory_for(settings, ply->mesh.triangles);
+      run.max_memory > 0 && bytes > run.max_memory) {
+    throw Error(ExitCode::budget, fmt::format("{}: simplifying {} triangles needs about {} MB of memory, the limit is "
+                                              "{} MB; give it more",
+                                              path, ply->mesh.triangles, bytes >> 20U, run.max_memory >> 20U));
+  }
+  MeshSinkSettings layout = ply->layout;
+  layout.path = outputs.at(0);
+  layout.more_paths.assign(outputs.begin() + 1, outputs.end());
+  layout.tmp_dir = run.tmp_dir;
+  if (const std::string crs = meshes::crs_of_ply(path); !crs.empty()) layout.comments.push_back("crs " + crs);
+  meshes::warn_of_losses(layout, run);
+  SimplifyStats stats;
+  with_threads(run.threads, [&] {
+    const auto blocks = stored_blocks(ply->mesh, ply->layout, run);
+    stats = simplify::write_simplified(*blocks, settings, layout, run);
+  });
   return stats;
 }
 

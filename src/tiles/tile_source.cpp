@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <bit>
 #include <deque>
 #include <memory>
 #include <span>
@@ -11,6 +10,7 @@
 #include "lamina/error.h"
 #include "measure/edge_table.h"
 #include "meshes/block_passes.h"
+#include "meshes/vertex_rows.h"
 
 namespace lamina::tiles {
 namespace {
@@ -57,64 +57,6 @@ std::uint32_t leaf_of_triangle(const std::array<std::uint32_t, 3>& homes) {
   if (homes[1] == homes[2]) return homes[1];
   return *std::min_element(homes.begin(), homes.end());
 }
-
-/// The vertices of some triangles, numbered in ascending order: a bit for each in the pages that have any. Those of a
-/// leaf lie in few pages of a streamed mesh; but what closes its holes comes at the very end.
-class VertexNumbers {
- public:
-  explicit VertexNumbers(std::span<const std::array<std::uint32_t, 3>> triangles) {
-    for (const auto& t : triangles) {
-      for (const std::uint32_t v : t) {
-        if (pages_.empty() || pages_.back() != v / kPage) pages_.push_back(v / kPage);
-      }
-    }
-    std::sort(pages_.begin(), pages_.end());
-    pages_.erase(std::unique(pages_.begin(), pages_.end()), pages_.end());
-    words_.resize(pages_.size() * kWords);
-    for (const auto& t : triangles) {
-      for (const std::uint32_t v : t) word_of(v).bits |= std::uint64_t{1} << v % 64;
-    }
-    std::uint32_t before = 0;
-    for (Word& word : words_) {
-      word.before = before;
-      before += static_cast<std::uint32_t>(std::popcount(word.bits));
-    }
-  }
-
-  /// Of one that is in a triangle.
-  [[nodiscard]] std::uint32_t of(std::uint32_t vertex) {
-    const Word& word = word_of(vertex);
-    const std::uint64_t below = (std::uint64_t{1} << vertex % 64) - 1;
-    return word.before + static_cast<std::uint32_t>(std::popcount(word.bits & below));
-  }
-  [[nodiscard]] std::vector<std::uint32_t> vertices() const {
-    std::vector<std::uint32_t> all;
-    for (std::size_t w = 0; w < words_.size(); ++w) {
-      const auto first = pages_[w / kWords] * kPage + static_cast<std::uint32_t>(w % kWords) * 64;
-      for (std::uint64_t bits = words_[w].bits; bits != 0; bits &= bits - 1)
-        all.push_back(first + static_cast<std::uint32_t>(std::countr_zero(bits)));
-    }
-    return all;
-  }
-
- private:
-  static constexpr std::uint32_t kPage = 4096;  ///< vertices
-  static constexpr std::size_t kWords = kPage / 64;
-  struct Word {
-    std::uint64_t bits = 0;
-    std::uint32_t before = 0;  ///< vertices in the words before it
-  };
-  Word& word_of(std::uint32_t vertex) {
-    const std::uint32_t page = vertex / kPage;
-    if (pages_[last_] != page)
-      last_ = static_cast<std::size_t>(std::lower_bound(pages_.begin(), pages_.end(), page) - pages_.begin());
-    return words_[last_ * kWords + vertex % kPage / 64];
-  }
-
-  std::vector<std::uint32_t> pages_;  ///< ascending
-  std::vector<Word> words_;           ///< of all pages
-  std::size_t last_ = 0;              ///< page that was asked for
-};
 
 std::vector<std::size_t> colour_attributes(const AttributeLayout& layout) {
   std::vector<std::size_t> found;
@@ -210,7 +152,7 @@ std::vector<TileSource::Corners> TileSource::corners_of(const Leaf& leaf) const 
 TileMesh TileSource::leaf(std::uint32_t node, const TileLattice& lattice) {
   TileMesh tile;
   tile.mesh.triangles = corners_of(leaves_[node]);
-  VertexNumbers numbers(tile.mesh.triangles);
+  meshes::VertexNumbers numbers(tile.mesh.triangles);
   for (Corners& t : tile.mesh.triangles) {
     for (std::uint32_t& v : t) v = numbers.of(v);
   }
@@ -227,29 +169,20 @@ TileMesh TileSource::leaf(std::uint32_t node, const TileLattice& lattice) {
 }
 
 void TileSource::read_vertices(const std::vector<std::uint32_t>& ids, const TileLattice& lattice, TriangleMesh& out) {
-  constexpr std::uint32_t kWorthReading = 64;  // rows between two that are wanted
   for (const std::size_t a : colours_) out.layout.push_back(mesh_.layout()[a]);
   out.attributes.resize(colours_.size());
   out.positions.reserve(ids.size());
   out.normals.reserve(ids.size());
   for (auto& values : out.attributes) values.reserve(ids.size());
-  TriangleMesh rows;
-  for (std::size_t begin = 0; begin < ids.size();) {
-    std::size_t end = begin + 1;
-    while (end < ids.size() && ids[end] - ids[end - 1] <= kWorthReading && ids[end] - ids[begin] < meshes::kBlockRows)
-      ++end;
-    {
-      const std::lock_guard lock(reading_);
-      mesh_.read_vertices(ids[begin], ids[end - 1] - ids[begin] + 1, rows);
-    }
-    for (std::size_t i = begin; i < end; ++i) {
-      const std::size_t row = ids[i] - ids[begin];
-      out.positions.push_back(lattice.steps(rows.positions[row]));
-      out.normals.push_back(rows.normals[row]);
-      for (std::size_t a = 0; a < colours_.size(); ++a) out.attributes[a].push_back(rows.attributes[colours_[a]][row]);
-    }
-    begin = end;
-  }
+  const auto read = [&](std::uint64_t first, std::size_t count, TriangleMesh& rows) {
+    const std::lock_guard lock(reading_);
+    mesh_.read_vertices(first, count, rows);
+  };
+  meshes::for_vertex_rows(ids, read, [&](const TriangleMesh& rows, std::size_t row) {
+    out.positions.push_back(lattice.steps(rows.positions[row]));
+    out.normals.push_back(rows.normals[row]);
+    for (std::size_t a = 0; a < colours_.size(); ++a) out.attributes[a].push_back(rows.attributes[colours_[a]][row]);
+  });
 }
 
 }  // namespace lamina::tiles

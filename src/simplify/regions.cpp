@@ -1,0 +1,341 @@
+#include "simplify/regions.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <deque>
+#include <numeric>
+#include <span>
+#include <utility>
+
+#include "base/spill_file.h"
+#include "lamina/error.h"
+#include "measure/edge_table.h"
+#include "meshes/block_passes.h"
+#include "meshes/vertex_rows.h"
+#include "simplify/stars.h"
+
+namespace lamina::simplify {
+namespace {
+
+void require_running(const RunContext& run) {
+  if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+}
+
+/// Vertices of triangles that belong to other regions than the vertices: neither may move them.
+class Visitors {
+ public:
+  void add(std::uint32_t id) {
+    ids_.push_back(id);
+    if (ids_.size() >= most_) forget_repeated();
+  }
+  void forget_repeated() {
+    std::sort(ids_.begin(), ids_.end());
+    ids_.erase(std::unique(ids_.begin(), ids_.end()), ids_.end());
+    most_ = std::max(most_, 2 * ids_.size());
+  }
+  /// Locks those, and what belongs to other regions. After forget_repeated().
+  void lock(std::uint32_t region, const RegionTree& tree, RegionMesh& part) const {
+    part.locked.resize(part.ids.size());
+    auto from = ids_.begin();
+    for (std::size_t v = 0; v < part.ids.size(); ++v) {
+      from = std::lower_bound(from, ids_.end(), part.ids[v]);
+      const bool visits = from != ids_.end() && *from == part.ids[v];
+      part.locked[v] = visits || tree.at(part.mesh.positions[v]) != region ? 1 : 0;
+    }
+  }
+
+ private:
+  std::vector<std::uint32_t> ids_;  ///< ascending
+  std::size_t most_ = 1U << 20;
+};
+
+/// The regions of vertices as they are asked for.
+class VertexHomes {
+ public:
+  VertexHomes(meshes::MeshBlocks& mesh, const RegionTree& tree)
+      : mesh_(mesh), tree_(tree), blocks_((mesh.vertices() + meshes::kBlockRows - 1) / meshes::kBlockRows) {}
+
+  std::uint32_t of(std::uint32_t vertex) {
+    const Block& block = blocks_[vertex / meshes::kBlockRows];
+    return (block ? block : load(vertex / meshes::kBlockRows))[vertex % meshes::kBlockRows];
+  }
+
+ private:
+  using Block = std::unique_ptr<std::uint32_t[]>;
+
+  const Block& load(std::size_t number) {
+    constexpr std::size_t kMostBlocks = 4096;  // 64 MB
+    if (loaded_.size() == kMostBlocks) {
+      blocks_[loaded_.front()].reset();
+      loaded_.pop_front();
+    }
+    const std::uint64_t first = std::uint64_t{number} * meshes::kBlockRows;
+    const std::size_t count = std::min<std::uint64_t>(meshes::kBlockRows, mesh_.vertices() - first);
+    mesh_.read_vertices(first, count, rows_);
+    blocks_[number] = std::make_unique<std::uint32_t[]>(meshes::kBlockRows);
+    for (std::size_t v = 0; v < count; ++v) blocks_[number][v] = tree_.at(rows_.positions[v]);
+    loaded_.push_back(number);
+    return blocks_[number];
+  }
+
+  meshes::MeshBlocks& mesh_;
+  const RegionTree& tree_;
+  std::vector<Block> blocks_;
+  std::deque<std::size_t> loaded_;
+  TriangleMesh rows_;
+};
+
+class MeshRegions final : public Regions {
+ public:
+  MeshRegions(meshes::MeshBlocks& mesh, RegionTree tree, const std::string& tmp_dir, const RunContext& run)
+      : mesh_(mesh),
+        tree_(std::move(tree)),
+        file_(tmp_dir),
+        regions_(tree_.regions()),
+        most_held_(std::clamp<std::size_t>((std::size_t{48} << 20) / (sizeof(Triangle) * regions_.size()), 32, 4096)) {
+    sort_triangles(run);
+  }
+
+  [[nodiscard]] std::uint32_t count() const override { return tree_.regions(); }
+
+  [[nodiscard]] RegionMesh load(std::uint32_t region) override {
+    RegionMesh part;
+    part.mesh.triangles = triangles_of(regions_[region]);
+    meshes::VertexNumbers numbers(part.mesh.triangles);
+    for (Triangle& t : part.mesh.triangles) {
+      for (std::uint32_t& v : t) v = numbers.of(v);
+    }
+    part.ids = numbers.vertices();
+    part.mesh.layout = mesh_.layout();
+    part.mesh.attributes.resize(part.mesh.layout.size());
+    part.mesh.positions.reserve(part.ids.size());
+    if (mesh_.has_normals()) part.mesh.normals.reserve(part.ids.size());
+    for (auto& values : part.mesh.attributes) values.reserve(part.ids.size());
+    const auto read = [&](std::uint64_t first, std::size_t n, TriangleMesh& rows) {
+      mesh_.read_vertices(first, n, rows);
+    };
+    meshes::for_vertex_rows(part.ids, read, [&](const TriangleMesh& rows, std::size_t row) {
+      part.mesh.positions.push_back(rows.positions[row]);
+      if (mesh_.has_normals()) part.mesh.normals.push_back(rows.normals[row]);
+      for (std::size_t a = 0; a < rows.attributes.size(); ++a)
+        part.mesh.attributes[a].push_back(rows.attributes[a][row]);
+    });
+    visitors_.lock(region, tree_, part);
+    return part;
+  }
+
+ private:
+  struct Chunk {
+    std::uint64_t offset;
+    std::size_t count;
+  };
+  struct Waiting {
+    std::vector<Triangle> held;
+    std::vector<Chunk> chunks;
+  };
+
+  void sort_triangles(const RunContext& run) {
+    VertexHomes homes(mesh_, tree_);
+    std::uint64_t seen = 0;
+    meshes::for_triangles(mesh_, [&](const Triangle& t) {
+      if (++seen % (1U << 20) == 0) require_running(run);
+      if (const std::uint32_t last = std::max({t[0], t[1], t[2]}); last >= mesh_.vertices()) {
+        throw Error(ExitCode::unreadable, fmt::format("simplify: triangle {} names vertex {}, the mesh has {}",
+                                                      seen - 1, last, mesh_.vertices()));
+      }
+      if (measure::repeats_index(t)) {
+        throw Error(ExitCode::unreadable, fmt::format("simplify: the mesh is not manifold: triangle {} names vertex {} "
+                                                      "twice; 'lamina check' tells more",
+                                                      seen - 1, t[0] == t[1] ? t[0] : t[2]));
+      }
+      const Triangle at{homes.of(t[0]), homes.of(t[1]), homes.of(t[2])};
+      const std::uint32_t region = region_of(at);
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (at[k] != region) visitors_.add(t[k]);
+      }
+      regions_[region].held.push_back(t);
+      if (regions_[region].held.size() >= most_held_) spill(regions_[region]);
+    });
+    for (Waiting& region : regions_) spill(region);
+    file_.flush();
+    visitors_.forget_repeated();
+  }
+
+  void spill(Waiting& region) {
+    if (region.held.empty()) return;
+    region.chunks.push_back({file_.append(std::as_bytes(std::span(region.held))), region.held.size()});
+    region.held.clear();
+  }
+
+  [[nodiscard]] std::vector<Triangle> triangles_of(const Waiting& region) const {
+    std::size_t all = 0, done = 0;
+    for (const Chunk& chunk : region.chunks) all += chunk.count;
+    std::vector<Triangle> triangles(all);
+    for (const Chunk& chunk : region.chunks) {
+      file_.read(chunk.offset, std::as_writable_bytes(std::span(triangles).subspan(done, chunk.count)));
+      done += chunk.count;
+    }
+    return triangles;
+  }
+
+  meshes::MeshBlocks& mesh_;
+  RegionTree tree_;
+  SpillFile file_;
+  std::vector<Waiting> regions_;
+  std::size_t most_held_;
+  Visitors visitors_;
+};
+
+/// Vertices of one part taken over into another, those that are named for the first time.
+class Extract {
+ public:
+  explicit Extract(const RegionMesh& from) : from_(from), number_(from.ids.size(), kNone), given_(from.ids.size()) {}
+
+  RegionMesh take(std::span<const std::uint32_t> triangles) {
+    RegionMesh part;
+    part.mesh.layout = from_.mesh.layout;
+    part.mesh.attributes.resize(from_.mesh.attributes.size());
+    std::vector<std::uint32_t> vertices;
+    for (const std::uint32_t triangle : triangles) {
+      Triangle t = from_.mesh.triangles[triangle];
+      for (std::uint32_t& v : t) {
+        if (number_[v] == kNone) {
+          number_[v] = static_cast<std::uint32_t>(vertices.size());
+          vertices.push_back(v);
+        }
+        v = number_[v];
+      }
+      part.mesh.triangles.push_back(t);
+      if (!from_.errors.empty()) part.errors.push_back(from_.errors[triangle]);
+    }
+    for (const std::uint32_t v : vertices) {
+      number_[v] = kNone;
+      part.ids.push_back(from_.ids[v]);
+      part.mesh.positions.push_back(from_.mesh.positions[v]);
+      if (!from_.mesh.normals.empty()) part.mesh.normals.push_back(from_.mesh.normals[v]);
+      for (std::size_t a = 0; a < part.mesh.attributes.size(); ++a)
+        part.mesh.attributes[a].push_back(from_.mesh.attributes[a][v]);
+      // A vertex that may move has all its triangles in one region, which gets all of its quadrics.
+      part.quadrics.push_back(given_[v] ? Quadric{} : from_.quadrics[v]);
+      given_[v] = true;
+    }
+    return part;
+  }
+
+ private:
+  const RegionMesh& from_;
+  std::vector<std::uint32_t> number_;
+  std::vector<bool> given_;  ///< quadrics of vertices, to the first part that has them
+};
+
+class PartRegions final : public Regions {
+ public:
+  PartRegions(const RegionFile& from, const std::vector<RegionFile::Place>& parts, RegionTree tree,
+              std::unique_ptr<RegionFile> to, const RunContext& run)
+      : tree_(std::move(tree)), file_(std::move(to)), regions_(tree_.regions()) {
+    for (const RegionFile::Place& place : parts) {
+      require_running(run);
+      share_out(from.read(place));
+    }
+    file_->flush();
+    visitors_.forget_repeated();
+  }
+
+  [[nodiscard]] std::uint32_t count() const override { return tree_.regions(); }
+
+  [[nodiscard]] RegionMesh load(std::uint32_t region) override {
+    RegionMesh part;
+    for (const RegionFile::Place& place : regions_[region]) join(part, file_->read(place));
+    put_in_order(part);
+    visitors_.lock(region, tree_, part);
+    return part;
+  }
+
+ private:
+  void share_out(const RegionMesh& part) {
+    std::vector<std::uint32_t> home(part.ids.size());
+    for (std::size_t v = 0; v < home.size(); ++v) home[v] = tree_.at(part.mesh.positions[v]);
+    std::vector<std::vector<std::uint32_t>> triangles(tree_.regions());
+    for (std::uint32_t i = 0; i < part.mesh.triangles.size(); ++i) {
+      const Triangle& t = part.mesh.triangles[i];
+      const Triangle at{home[t[0]], home[t[1]], home[t[2]]};
+      const std::uint32_t region = region_of(at);
+      for (std::size_t k = 0; k < 3; ++k) {
+        if (at[k] != region) visitors_.add(part.ids[t[k]]);
+      }
+      triangles[region].push_back(i);
+    }
+    Extract extract(part);
+    for (std::size_t region = 0; region < triangles.size(); ++region) {
+      if (!triangles[region].empty()) regions_[region].push_back(file_->append(extract.take(triangles[region])));
+    }
+  }
+
+  static void join(RegionMesh& all, const RegionMesh& part) {
+    const auto first = static_cast<std::uint32_t>(all.ids.size());
+    const auto add = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
+    add(all.ids, part.ids);
+    add(all.quadrics, part.quadrics);
+    add(all.errors, part.errors);
+    add(all.mesh.positions, part.mesh.positions);
+    add(all.mesh.normals, part.mesh.normals);
+    all.mesh.layout = part.mesh.layout;
+    all.mesh.attributes.resize(part.mesh.attributes.size());
+    for (std::size_t a = 0; a < part.mesh.attributes.size(); ++a) add(all.mesh.attributes[a], part.mesh.attributes[a]);
+    for (const Triangle& t : part.mesh.triangles)
+      all.mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+
+  /// By their ids; of copies the first stays.
+  static void put_in_order(RegionMesh& part) {
+    std::vector<std::uint32_t> order(part.ids.size()), number(part.ids.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return part.ids[a] != part.ids[b] ? part.ids[a] < part.ids[b] : a < b;
+    });
+    RegionMesh sorted;
+    sorted.mesh.layout = part.mesh.layout;
+    sorted.mesh.attributes.resize(part.mesh.attributes.size());
+    for (const std::uint32_t v : order) {
+      const bool copy = !sorted.ids.empty() && sorted.ids.back() == part.ids[v];
+      if (copy) {
+        sorted.quadrics.back() += part.quadrics[v];
+      } else {
+        sorted.ids.push_back(part.ids[v]);
+        sorted.quadrics.push_back(part.quadrics[v]);
+        sorted.mesh.positions.push_back(part.mesh.positions[v]);
+        if (!part.mesh.normals.empty()) sorted.mesh.normals.push_back(part.mesh.normals[v]);
+        for (std::size_t a = 0; a < sorted.mesh.attributes.size(); ++a)
+          sorted.mesh.attributes[a].push_back(part.mesh.attributes[a][v]);
+      }
+      number[v] = static_cast<std::uint32_t>(sorted.ids.size() - 1);
+    }
+    sorted.mesh.triangles = std::move(part.mesh.triangles);
+    for (Triangle& t : sorted.mesh.triangles) {
+      for (std::uint32_t& v : t) v = number[v];
+    }
+    sorted.errors = std::move(part.errors);
+    part = std::move(sorted);
+  }
+
+  RegionTree tree_;
+  std::unique_ptr<RegionFile> file_;
+  std::vector<std::vector<RegionFile::Place>> regions_;
+  Visitors visitors_;
+};
+
+}  // namespace
+
+std::unique_ptr<Regions> regions_of_mesh(meshes::MeshBlocks& mesh, RegionTree tree, const std::string& tmp_dir,
+                                         const RunContext& run) {
+  return std::make_unique<MeshRegions>(mesh, std::move(tree), tmp_dir, run);
+}
+
+std::unique_ptr<Regions> regions_of_parts(const RegionFile& from, const std::vector<RegionFile::Place>& parts,
+                                          RegionTree tree, std::unique_ptr<RegionFile> to, const RunContext& run) {
+  return std::make_unique<PartRegions>(from, parts, std::move(tree), std::move(to), run);
+}
+
+}  // namespace lamina::simplify
