@@ -16,6 +16,7 @@
 #include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "lamina/volume_tools.h"
+#include "tables.h"
 #include "tool.h"
 
 namespace lamina::tools {
@@ -28,6 +29,7 @@ struct MergeOptions {
   MixedAttributes mixed = MixedAttributes::refuse;
   BadSamples bad = BadSamples::drop;
   Precision precision = Precision::automatic;
+  SimplifyGoal simplify;
   RunOptions run;
 };
 
@@ -92,15 +94,19 @@ void merge_grids(const MergeOptions& o, const std::vector<PointInput>& inputs, c
 
 void merge_chunks(const MergeOptions& o, const RunContext& context) {
   std::for_each(o.outputs.begin(), o.outputs.end(), require_mesh_name);
-  const MergedParts merged = merge_parts(o.inputs, o.outputs, context);
+  const MergedParts merged = merge_parts(o.inputs, o.outputs, context,
+                                         o.simplify.given() ? simplify_settings(o.simplify) : SimplifySettings{});
   context.info(fmt::format("{} vertices, {} triangles of {} parts", count_text(merged.vertices),
                            count_text(merged.triangles), merged.parts));
   context.info(describe(merged.holes));
+  if (o.simplify.given()) report_simplified(merged.simplified, shown_name(o.output), context);
 }
 
 void run_merge(const MergeOptions& o) {
   const RunContext context = make_context(o.run, o.output);
   if (std::any_of(o.inputs.begin(), o.inputs.end(), is_part)) return merge_chunks(o, context);
+  if (o.simplify.given())
+    throw Error(ExitCode::usage, "--error, --triangles and --ratio are for the parts of a mesh; see 'lamina simplify'");
   if (o.outputs.size() > 1)
     throw Error(ExitCode::usage, "several --output are for the parts of a mesh; name one, and convert it");
   const auto word = [](FileContent content) {
@@ -161,6 +167,7 @@ void add_merge(CLI::App& app) {
   add_point_options(*tool, o->reading);
   add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
+  add_simplify_goal(*tool, o->simplify, "Parts of a mesh");
   add_run_options(*tool, o->run);
   add_notes(
       *tool,

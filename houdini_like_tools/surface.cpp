@@ -163,6 +163,7 @@ void run_surface(SurfaceOptions& o) {
                              static_cast<double>(stats.samples_read) / stats.cpu * 1e-6,
                              static_cast<double>(stats.peak_memory) * 1e-6));
     if (!parts.chunk) context.info(describe(stats.holes));
+    if (settings.simplify.wanted() && !parts.chunk) report_simplified(stats.simplified, settings.input, context);
     const VolumeExportStats& v = stats.volume;
     if (v.voxel > 0) context.info(fmt::format("{} voxels of {:.4g}", count_text(v.voxels), v.voxel));
     if (v.files.size() == 1) context.info(fmt::format("{}: {}", v.files[0], bytes_text(v.bytes)));
@@ -193,6 +194,7 @@ SurfaceSettings surface_settings(SurfaceOptions& o, const RunContext& context) {
   if (o.preset) take_preset(o, context);
   SurfaceSettings settings = o.settings;
   settings.guess_trade = !o.preset && !o.raw;
+  if (o.simplify.given()) settings.simplify = simplify_settings(o.simplify);
   choose_what_is_not_given(o, settings);
   return settings;
 }
@@ -292,6 +294,7 @@ void add_surface_options(CLI::App& tool, SurfaceOptions& o) {
                 "shift and the .vdb's metadata shift name it")
       ->group(mesh);
 
+  add_simplify_goal(tool, o.simplify, "Simplification");
   add_volume_options(tool, s.volume);
   const std::string tiles = "Tiles";
   tool.add_option("--tiles", s.tiles.folder,

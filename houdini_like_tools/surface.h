@@ -11,6 +11,7 @@
 #include "common/parts.h"
 #include "lamina/run.h"
 #include "lamina/trade.h"
+#include "tables.h"
 
 namespace lamina::tools {
 
@@ -20,6 +21,7 @@ struct SurfaceOptions {
   SurfaceSettings settings;
   RunOptions run;
   PartsOptions parts;
+  SimplifyGoal simplify;
   std::string stats, preview;
   bool raw = false;
   std::optional<Trade> preset;

@@ -4,9 +4,11 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <span>
 #include <vector>
 
 #include "common/text.h"
@@ -47,19 +49,32 @@ std::string shell_line(const Words& words) {
   return fmt::format("{}", fmt::join(quoted, " "));
 }
 
-/// The options given that every task wants, too.
-Words common_options(const CLI::App& tool) {
-  static constexpr std::array kOwn{"output", "print-tasks", "json", "help", "stats", "preview"};
+/// What the merge is told, and no chunk.
+constexpr std::array kOfMerge{"error", "triangles", "ratio"};
+
+bool is_one_of(std::span<const char* const> names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
+
+/// The options given that pass.
+template <class Passes>
+Words options_given(const CLI::App& tool, const Passes& passes) {
   Words words;
   for (const CLI::Option* option : tool.get_options()) {
     if (option->count() == 0 || option->get_lnames().empty()) continue;
     const std::string& name = option->get_lnames().front();
-    if (std::find(kOwn.begin(), kOwn.end(), name) != kOwn.end()) continue;
+    if (!passes(name)) continue;
     words.push_back("--" + name);
     if (option->get_expected_min() == 0) continue;  // a flag
     for (const std::string& value : option->results()) words.push_back(value);
   }
   return words;
+}
+
+/// Those that every chunk wants, too.
+Words common_options(const CLI::App& tool) {
+  static constexpr std::array kOwn{"output", "print-tasks", "json", "help", "stats", "preview"};
+  return options_given(tool, [](const std::string& n) { return !is_one_of(kOwn, n) && !is_one_of(kOfMerge, n); });
 }
 
 struct Task {
@@ -88,6 +103,8 @@ std::vector<Task> list_tasks(const CLI::App& tool, const std::string& input, con
     merge.after.push_back(task.name);
     tasks.push_back(std::move(task));
   }
+  const Words of_merge = options_given(tool, [](const std::string& n) { return is_one_of(kOfMerge, n); });
+  merge.command.insert(merge.command.end(), of_merge.begin(), of_merge.end());
   for (const std::string& output : outputs) merge.command.insert(merge.command.end(), {"-o", output});
   tasks.push_back(std::move(merge));
   return tasks;

@@ -159,6 +159,12 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
                    {"kept_isovertices", s.clusters.kept_isovertices},
                    {"resolved", s.clusters.resolved}};
   j["holes"] = holes_json(s.holes);
+  if (settings.simplify.wanted()) {
+    j["simplified"] = {{"triangles_before", s.simplified.triangles_before},
+                       {"triangles_after", s.simplified.triangles_after},
+                       {"reached", s.simplified.reached},
+                       {"largest_deviation", s.simplified.deviation}};
+  }
   return j;
 }
 

@@ -46,19 +46,21 @@ struct MergedParts {
   std::uint64_t vertices = 0, triangles = 0;
   int parts = 0;
   HoleStats holes;
+  SimplifyStats simplified;  ///< where it was asked for: `vertices` and `triangles` are those left
 };
 
 /// True when the file begins as a part does. False for a file that cannot be opened.
 bool is_part(const std::string& path);
 
 /// Joins all parts of one reconstruction, given in any order, into one mesh, closes its holes, and writes it under each
-/// name of `outputs`, at least one (format by its ending; "-" is standard output). Memory grows with the boundary of a
+/// name of `outputs`, at least one (format by its ending; "-" is standard output). Simplified first, where `simplify`
+/// says how far. Memory grows with the boundary of a
 /// part, not with the mesh. run.tmp_dir is for what goes to standard output (empty: the system's). Throws
 /// Error(unreadable) naming the part that is missing, given twice, truncated, damaged, of another run or of a version
 /// this program does not know; Error(empty) when no part has surface; Error(budget) when the mesh has more than 2^32 -
 /// 1 vertices or cannot be written.
 MergedParts merge_parts(const std::vector<std::string>& paths, const std::vector<std::string>& outputs,
-                        const RunContext& run);
+                        const RunContext& run, const SimplifySettings& simplify = {});
 
 struct Checkpoint {
   std::string directory;  ///< holds the store and the finished parts; made where it is not there, removed at the end

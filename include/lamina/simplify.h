@@ -20,6 +20,7 @@ struct SimplifySettings {
 
 struct SimplifyStats {
   std::uint64_t triangles_before = 0, triangles_after = 0;
+  std::uint64_t vertices_after = 0;
   std::uint64_t contractions = 0;
   bool reached = false;  ///< no more triangles than wanted; else no contraction was left that keeps shape and topology.
                          ///< With `error`: true

@@ -18,6 +18,7 @@
 #include "lamina/points.h"
 #include "lamina/run.h"
 #include "lamina/sample.h"
+#include "lamina/simplify.h"
 #include "lamina/tiles.h"
 #include "lamina/volume_export.h"
 
@@ -95,9 +96,10 @@ struct SurfaceSettings {
   Length prune_size;   ///< so are parts whose box has a shorter diagonal; `r`, `R`: of the median sample; 0: none
   bool local = false;  ///< subtract a shift (SurfaceStats::shift) from coordinates, so that floats hold them
   int window = 1;      ///< >= 1: slabs that each stage advances at once; more is faster on many cores and takes memory
-  bool dry_run = false;  ///< only plan: read the input, write nothing
-  VolumeExport volume;   ///< grids to write beside the mesh
-  TileSettings tiles;    ///< 3D Tiles to write beside the mesh; their coordinate system is the input's
+  bool dry_run = false;       ///< only plan: read the input, write nothing
+  SimplifySettings simplify;  ///< how far the finished mesh is simplified, before it appears; nothing: it is not
+  VolumeExport volume;        ///< grids to write beside the mesh
+  TileSettings tiles;         ///< 3D Tiles to write beside the mesh; their coordinate system is the input's
 };
 
 /// What the settings mean for this cloud. Lengths in the input's units.
@@ -167,6 +169,7 @@ struct SurfaceStats {
   std::vector<std::uint64_t> leaf_cells;  ///< by level, finest first
   ClusterCounts clusters;
   HoleStats holes;
+  SimplifyStats simplified;              ///< where that was asked for; `vertices` and `triangles` are those left
   std::optional<NormalsReport> normals;  ///< where they were found
   VolumeExportStats volume;              ///< where grids were asked for
   TileStats tiles;                       ///< where they were asked for

@@ -70,6 +70,11 @@ ChunkStats run_chunk(const SurfaceSettings& settings, const Chunk& chunk, Job& j
 ChunkStats reconstruct_chunk(const SurfaceSettings& settings, const Chunk& chunk, const RunContext& run) {
   check_settings(settings);
   require_mesh_alone(settings, "--chunk");
+  if (settings.simplify.wanted()) {
+    throw Error(ExitCode::usage,
+                "--chunk makes a part of a mesh: give --triangles, --ratio or --error to 'lamina merge', which joins "
+                "the parts");
+  }
   if (chunk.count < 1 || chunk.count > kMostChunks || chunk.number < 1 || chunk.number > chunk.count) {
     throw Error(ExitCode::usage, fmt::format("--chunk {}/{}: must be i/n with 1 <= i <= n <= {}", chunk.number,
                                              chunk.count, kMostChunks));

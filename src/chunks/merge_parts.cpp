@@ -13,6 +13,8 @@
 #include "meshes/mesh_format.h"
 #include "meshes/stored_mesh.h"
 #include "meshes/streamed_ply.h"
+#include "meshes/writers.h"
+#include "simplify/streamed.h"
 
 namespace lamina {
 namespace {
@@ -140,7 +142,7 @@ std::vector<std::byte> encode_addition(const std::vector<std::array<std::uint32_
 }
 
 MergedParts merge_parts(const std::vector<std::string>& paths, const std::vector<std::string>& outputs,
-                        const RunContext& run) {
+                        const RunContext& run, const SimplifySettings& simplify) {
   const std::string& output = outputs.at(0);
   const std::vector<PartReader> parts = open_parts(paths);
   MergedParts merged;
@@ -166,7 +168,8 @@ MergedParts merge_parts(const std::vector<std::string>& paths, const std::vector
   layout.more_paths.assign(outputs.begin() + 1, outputs.end());
   layout.tmp_dir = run.tmp_dir;
   require_outputs(layout);
-  OutputFile file(staging_path(layout), run.tmp_dir);
+  if (simplify.wanted()) simplify::require_goal(simplify);
+  OutputFile file(simplify.wanted() ? simplify::unsimplified_path(layout) : staging_path(layout), run.tmp_dir);
   const std::uint64_t own_vertices = merged.vertices;
   const boundary::Addition addition = close_holes(parts, merged);
   meshes::warn_of_losses(layout, run);
@@ -204,9 +207,16 @@ MergedParts merge_parts(const std::vector<std::string>& paths, const std::vector
   }
   append(encode_addition(addition.triangles, merged.vertices));
   const std::uint64_t faces_at = bytes - merged.triangles * kFaceRecordBytes;
-  write_files(
-      {file.fd(), header.size(), file.fd(), faces_at, merged.vertices, merged.triangles}, layout,
-      [&] { file.complete(bytes); }, run);
+  const StoredMesh mesh{file.fd(), header.size(), file.fd(), faces_at, merged.vertices, merged.triangles};
+  if (simplify.wanted()) {
+    const SimplifySettings goal = simplify::goal_for(simplify, mesh.triangles, run);
+    merged.simplified = simplify::write_simplified(*stored_blocks(mesh, layout, run), goal, layout, run);
+    merged.vertices = merged.simplified.vertices_after;
+    merged.triangles = merged.simplified.triangles_after;
+  } else {
+    write_files(
+        mesh, layout, [&] { file.complete(bytes); }, run);
+  }
   return merged;
 }
 

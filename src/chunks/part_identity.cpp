@@ -16,11 +16,12 @@ std::string mesh_settings(const SurfaceSettings& settings) {
                normal_search, guess_trade, radius_scale, density, clean, max_radius, blend, refit, steps,
                step_tolerance, fit, diffuse, cell, levels, boundary, cluster, chord, vertex_levels, vertex_curvature,
                vertex_filled, close_holes, watertight, trim, prune_triangles, prune_size, local, window, dry_run,
-               volume, tiles] = settings;
+               simplify, volume, tiles] = settings;
   // Jobs of several runs refuse these: require_mesh_alone().
   (void)prune_triangles, (void)prune_size, (void)local, (void)tiles, (void)open, (void)receiver;
   (void)input, (void)more_inputs, (void)output, (void)more_outputs, (void)normals, (void)normal_search,
       (void)guess_trade, (void)window, (void)dry_run;
+  (void)simplify;  // is for what joins the parts
   const auto number = [](const std::optional<double>& v) { return v ? fmt::format("{}", *v) : "auto"; };
   const std::string frame_word = frame             ? fmt::format("{}", static_cast<int>(*frame))
                                  : volume.wanted() ? "grid"

@@ -142,10 +142,11 @@ class ResumableRun {
   void join() {
     try {
       job_.watch.time("commit", [&] {
-        const MergedParts merged = merge_parts(parts_, output_names(settings_), job_.run);
+        const MergedParts merged = merge_parts(parts_, output_names(settings_), job_.run, settings_.simplify);
         job_.stats.vertices = merged.vertices;
         job_.stats.triangles = merged.triangles;
         job_.stats.holes = merged.holes;
+        job_.stats.simplified = merged.simplified;
       });
     } catch (const Error& error) {
       if (error.code() != ExitCode::unreadable) throw;

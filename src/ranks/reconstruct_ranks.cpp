@@ -170,6 +170,10 @@ class RanksJob {
       const Place place = write_together(ranks_, plan, *part, output_names(settings_), job_);
       job_.stats.vertices = place.vertices;
       job_.stats.triangles = place.triangles;
+      if (plan.simplify.wanted() && ranks_.first()) {
+        job_.stats.vertices = job_.stats.simplified.vertices_after;
+        job_.stats.triangles = job_.stats.simplified.triangles_after;
+      }
     });
     job_.stats.disk_bytes = std::max(job_.stats.disk_bytes, disk_ + part->disk_bytes());
     own_.vertices = part->vertices();

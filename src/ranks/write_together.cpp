@@ -17,7 +17,9 @@
 #include "meshes/mesh_format.h"
 #include "meshes/stored_mesh.h"
 #include "meshes/streamed_ply.h"
+#include "meshes/writers.h"
 #include "reconstruct/job.h"
+#include "simplify/streamed.h"
 
 namespace lamina::ranks {
 namespace {
@@ -100,12 +102,18 @@ void write_addition(SharedFile& file, const RankSlabs& part, const Place& place,
 
 /// The file that all have written becomes the mesh.
 void publish_mesh(OutputFile& file, const RankSlabs& part, const Place& place, const MeshSinkSettings& layout,
-                  const RunContext& run) {
+                  const SimplifySettings& simplify, Job& job) {
   const std::uint64_t header = make_header(part, place).size();
   const std::uint64_t record = vertex_record_bytes(layout.attributes, layout.double_positions);
-  write_files(
-      {file.fd(), header, file.fd(), header + place.vertices * record, place.vertices, place.triangles}, layout,
-      [&] { file.publish(); }, run);
+  const StoredMesh mesh{file.fd(),      header,         file.fd(), header + place.vertices * record,
+                        place.vertices, place.triangles};
+  if (!simplify.wanted()) {
+    write_files(
+        mesh, layout, [&] { file.publish(); }, job.run);
+    return;
+  }
+  const SimplifySettings goal = simplify::goal_for(simplify, mesh.triangles, job.run);
+  job.stats.simplified = simplify::write_simplified(*stored_blocks(mesh, layout, job.run), goal, layout, job.run);
 }
 
 }  // namespace
@@ -146,7 +154,7 @@ Place write_together(Ranks& ranks, const ReconstructionPlan& plan, RankSlabs& pa
   MeshSinkSettings layout = part.layout();
   layout.path = outputs.at(0);
   layout.more_paths.assign(outputs.begin() + 1, outputs.end());
-  const std::string& output = staging_path(layout);
+  const std::string output = plan.simplify.wanted() ? simplify::unsimplified_path(layout) : staging_path(layout);
   const std::vector<Border> borders =
       gather_borders(ranks, {part.span(), part.any(), part.below(), part.last(), part.vertices(), part.triangles()});
   Place place;
@@ -177,7 +185,7 @@ Place write_together(Ranks& ranks, const ReconstructionPlan& plan, RankSlabs& pa
     shared.close();
   }
   ranks.together([&] {
-    if (file) publish_mesh(*file, part, place, layout, job.run);
+    if (file) publish_mesh(*file, part, place, layout, plan.simplify, job);
   });
   return place;
 }

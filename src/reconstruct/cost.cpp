@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "meshes/streamed_ply.h"
 #include "reconstruct/constants.h"
+#include "simplify/streamed.h"
 
 namespace lamina {
 namespace {
@@ -92,6 +94,20 @@ double refit_memory(const ReconstructionPlan& plan, double per_step) {
   return kBins + kHeld * within(2 * reach + slab) + kNormal * within(slabs_with_normals * slab);
 }
 
+/// Behind the sweep: the mesh as it was waits, and regions of it, with quadrics.
+void add_simplification(const ReconstructionPlan& plan, const SlabStore& store, ExpectedCost& cost) {
+  constexpr double kProgram = 60e6, kRegions = 84, kPlain = 2.2e-6, kWithin = 20e-6;
+  const double triangles = expected_triangles(plan);
+  const auto count = static_cast<std::uint64_t>(triangles);
+  cost.memory =
+      std::max(cost.memory, static_cast<std::uint64_t>(kProgram) + simplify::memory_for(plan.simplify, count));
+  const double vertex = static_cast<double>(vertex_record_bytes(plan.mesh_attributes, plan.double_positions));
+  const double regions = count > simplify::kRegionTriangles ? kRegions : 0;
+  cost.disk = std::max(cost.disk, store.disk_bytes() + static_cast<std::uint64_t>(
+                                                           (kFaceRecordBytes + 0.5 * vertex + regions) * triangles));
+  cost.cpu_seconds += (plan.simplify.error > 0 ? kWithin : kPlain) * triangles;
+}
+
 double mesh_memory(const ReconstructionPlan& plan, const SlabStore& store, double per_slab) {
   // Around each cell of surface lie some four and a half corners, and one and a half cells cross it.
   const auto attributes = static_cast<double>(plan.attributes.size());
@@ -149,6 +165,7 @@ ExpectedCost expected_cost(const ReconstructionPlan& plan, const Ingested& cloud
                table_bytes(plan, store);
   out.disk = expected_disk(store, expected_waiting_bytes(plan));
   out.cpu_seconds = expected_cpu_seconds(plan);
+  if (plan.simplify.wanted()) add_simplification(plan, store, out);
   out.reading_seconds = kReferenceRead * static_cast<double>(plan.samples);
   return out;
 }

@@ -198,6 +198,7 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
   plan.volume = s.volume;
   plan.volume.shift = cloud.shift;
   plan.volume.crs = cloud.info.crs;
+  plan.simplify = s.simplify;
   plan.tiles = s.tiles;
   plan.tiles.crs = cloud.shift ? std::string() : cloud.info.crs;  // shifted coordinates are not those of the system
   if (!cloud.info.crs.empty()) plan.comments.push_back("crs " + cloud.info.crs);
@@ -233,6 +234,7 @@ void check_settings(const SurfaceSettings& s) {
   require(s.chord >= 0 && s.chord <= 1, "--chord", "in 0..1");
   require(s.window >= 1 && s.window <= 1024, "--window", "in 1..1024");
   require_sane(s.clean);
+  if (s.simplify.wanted()) simplify::require_goal(s.simplify);
   check_volume_export(s.volume);
   require(!s.input.empty(), "the input", "a point file");
   require(!s.receiver || s.tiles.folder.empty(), "--tiles", "left out where the mesh goes to no file");

@@ -59,6 +59,7 @@ struct ReconstructionPlan {
   VertexSettings vertices;
   HoleSettings holes;
   PruneRule pruning;
+  SimplifySettings simplify;
   VolumeExport volume;
   TileSettings tiles;
   std::vector<std::string> comments;  ///< of the mesh file

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "base/staged_folder.h"
 #include "lamina/error.h"
@@ -16,6 +17,7 @@
 #include "reconstruct/plan.h"
 #include "reconstruct/pruner.h"
 #include "reconstruct/stored_cloud.h"
+#include "simplify/streamed.h"
 #include "tiles/write_tiles.h"
 
 namespace lamina {
@@ -58,11 +60,38 @@ std::optional<Error> write_tiles_beside(const ReconstructionPlan& plan, MeshSink
   return std::nullopt;
 }
 
+/// The mesh as the sweep has left it becomes one of fewer triangles, which goes where that was to go.
+std::unique_ptr<WholeMesh> simplified(const ReconstructionPlan& plan, MeshSink& full, const MeshSinkSettings& layout,
+                                      MeshReceiver* receiver, Job& job) {
+  std::unique_ptr<WholeMesh> fewer = open_whole_mesh(layout, receiver);
+  MeshSlab slab;
+  const auto take = [&](TriangleMesh piece) {
+    take_vertices(piece, 0, piece.positions.size(), slab.vertices);
+    slab.triangles = std::move(piece.triangles);
+    fewer->write(slab);
+    ++slab.slab;
+  };
+  job.watch.time("simplify", [&] {
+    const SimplifySettings goal = simplify::goal_for(plan.simplify, full.triangles(), job.run);
+    full.read_back(
+        [&](meshes::MeshBlocks& mesh) {
+          job.stats.simplified = simplify::simplify_blocks(mesh, goal, full.tmp_dir(), take, job.run);
+        },
+        job.run);
+  });
+  return fewer;
+}
+
 /// The mesh of a plan into its files, whose names and folder `layout` has, or to the receiver.
 void write_surface(const ReconstructionPlan& plan, StoredCloud& cloud, const MeshSinkSettings& layout,
                    MeshReceiver* receiver, Job& job) {
   if (receiver == nullptr) meshes::warn_of_losses(layout, job.run);
-  const std::unique_ptr<WholeMesh> whole = open_whole_mesh(layout, receiver);
+  MeshSinkSettings swept = layout;
+  if (plan.simplify.wanted()) {
+    swept.path = simplify::unsimplified_path(layout);
+    swept.more_paths.clear();
+  }
+  std::unique_ptr<WholeMesh> whole = open_whole_mesh(swept, plan.simplify.wanted() ? nullptr : receiver);
   std::optional<SurfaceVolume> volume;
   if (plan.volume.wanted())
     volume.emplace(plan.volume, plan.frame, plan.lattice, plan.main_level, plan.attributes, layout.tmp_dir);
@@ -83,6 +112,7 @@ void write_surface(const ReconstructionPlan& plan, StoredCloud& cloud, const Mes
     volume->commit();
     job.stats.volume = volume->stats();
   }
+  if (plan.simplify.wanted()) whole = simplified(plan, *whole->files(), layout, receiver, job);
   const std::optional<Error> no_tiles = write_tiles_beside(plan, whole->files(), job);
   job.watch.time("commit", [&] { whole->commit(job.run); });
   job.stats.vertices = whole->vertices();

@@ -75,6 +75,7 @@ SimplifyStats simplify_mesh(TriangleMesh& mesh, const SimplifySettings& settings
   });
   simplify::drop_unused(mesh);
   stats.triangles_after = mesh.triangles.size();
+  stats.vertices_after = mesh.positions.size();
   stats.reached = settings.error > 0 || stats.triangles_after <= wanted;
   return stats;
 }

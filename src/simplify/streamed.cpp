@@ -6,17 +6,22 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <filesystem>
 #include <memory>
+#include <span>
+#include <system_error>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
+#include "base/descriptor.h"
 #include "base/hashing.h"
 #include "base/union_find.h"
 #include "lamina/error.h"
 #include "lamina/measure.h"
 #include "measure/edge_table.h"
 #include "meshes/block_passes.h"
+#include "meshes/stored_mesh.h"
 #include "simplify/part.h"
 #include "simplify/regions.h"
 #include "simplify/rounds.h"
@@ -150,6 +155,7 @@ class StreamedSimplifier {
       regions = go_through(*regions, pass, share_of_pass(number + 1));
     }
     stats_.triangles_after = written_triangles_;
+    stats_.vertices_after = written_vertices_;
     stats_.reached = bound_ > 0 || stats_.triangles_after <= wanted_;
     return stats_;
   }
@@ -370,6 +376,25 @@ SimplifyStats simplify_blocks(MeshBlocks& mesh, const SimplifySettings& settings
   const SimplifyStats stats = simplify_mesh(whole, settings, run);
   take(std::move(whole));
   return stats;
+}
+
+std::string unsimplified_path(const MeshSinkSettings& layout) {
+  const std::string& output = staging_path(layout);
+  std::error_code ignored;
+  const auto kind = std::filesystem::status(output, ignored).type();
+  const bool beside = output != "-" && !output.empty() &&
+                      (kind == std::filesystem::file_type::regular || kind == std::filesystem::file_type::not_found);
+  const std::filesystem::path folder = !layout.tmp_dir.empty() ? std::filesystem::path(layout.tmp_dir)
+                                       : beside                ? std::filesystem::path(output).parent_path()
+                                                               : std::filesystem::path(system_tmp_dir());
+  return (folder / "unsimplified.ply").string();
+}
+
+SimplifySettings goal_for(const SimplifySettings& settings, std::uint64_t there, const RunContext& run) {
+  if (settings.triangles <= there) return settings;
+  run.warn(fmt::format("the mesh has {} triangles, no more than the {} that were wanted: it stays as it is", there,
+                       settings.triangles));
+  return {.ratio = 1};
 }
 
 SimplifyStats write_simplified(MeshBlocks& mesh, const SimplifySettings& settings, const MeshSinkSettings& layout,

@@ -33,6 +33,12 @@ SimplifyStats simplify_blocks(meshes::MeshBlocks& mesh, const SimplifySettings& 
                               const std::function<void(TriangleMesh)>& take, const RunContext& run,
                               std::uint64_t region = kRegionTriangles);
 
+/// What is left to do for a mesh that a run has made: for more triangles than there are nothing, which is said.
+SimplifySettings goal_for(const SimplifySettings& settings, std::uint64_t there, const RunContext& run);
+
+/// Where a mesh may wait that is to become `layout`'s files by write_simplified(): never published.
+std::string unsimplified_path(const MeshSinkSettings& layout);
+
 /// The same into the files that `layout` names, which appear when they are complete. The mesh has the layout's
 /// attributes, and normals.
 SimplifyStats write_simplified(meshes::MeshBlocks& mesh, const SimplifySettings& settings,

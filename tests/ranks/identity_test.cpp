@@ -65,6 +65,10 @@ TEST_F(RankIdentity, VaryingDensity) {
   expect_same({test::write_cloud(pipe(12000), folder_ / "in.ply"), "--threads", "1"}, {1, 2, 5});
 }
 
+TEST_F(RankIdentity, SimplifiedMesh) {
+  expect_same({test::write_cloud(pipe(6000), folder_ / "in.ply"), "--triangles", "3000", "--threads", "1"}, {3});
+}
+
 TEST_F(RankIdentity, InputThatIsReadInOrder) {
   expect_same({test::write_cloud(pipe(6000), folder_ / "in.ply", PlyFormat::ascii), "--threads", "2"}, {3});
 }

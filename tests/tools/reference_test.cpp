@@ -105,7 +105,7 @@ TEST_F(Statistics, OfSurfaceAndNormalAreDocumented) {
   Fields surface =
       fields_of({"lamina surface scan.ply more.ply -o out.ply -o out.glb --clip -2,-2,-2,2,2,0.3 --normals estimate "
                  "--local --prune 5 "
-                 "--vdb out.vdb --tiles out_tiles --stats - -q",
+                 "--vdb out.vdb --tiles out_tiles --ratio 0.5 --stats - -q",
                  "lamina sort scan.ply --store scan.store -q && lamina surface scan.store --chunk 1/2 -o out.lmesh "
                  "--stats - -q"});
   add_fields({{"ranks", ranks_json({RankStats{}})}}, "", surface);
