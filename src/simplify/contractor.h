@@ -47,6 +47,11 @@ class Contractor {
   /// Contractions of any cost are asked for from now on, in small steps.
   void expect_all() { raise_limit(std::numeric_limits<float>::infinity()); }
 
+  /// With a bound: gives memory back until the next run().
+  void rest() {
+    if (tracker_) tracker_->rest();
+  }
+
   [[nodiscard]] std::uint64_t size() const { return size_; }  ///< triangles that are there
   [[nodiscard]] const std::vector<Merge>& merges() const { return merges_; }
   /// Of the triangles that are there; only with a bound.

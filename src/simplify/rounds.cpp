@@ -30,7 +30,7 @@ constexpr double kLastRound = 1.15;              ///< of the wanted ones: what t
 constexpr double kInTurn = 1.01;  ///< from this many of the wanted ones on, pieces take turns, the cheapest edge of all
 
 constexpr double kHardlyAny =
-    0.01;  ///< of the triangles: where vertices are locked, a round that takes fewer is the last
+    0.01;  ///< of the triangles: a round that ends before its goal and takes fewer is the last
 
 constexpr std::uint64_t kPieceKeeps = 8;  ///< one in so many triangles, where a limit of the cost says how far to go
 
@@ -125,6 +125,7 @@ class Round {
       while (!run.cancelled() &&
              c.run(std::numeric_limits<float>::max(), c.size() - std::max<std::uint64_t>(c.size() / 8, 1)) > 0) {
       }
+      c.rest();
     });
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
   }
@@ -279,27 +280,40 @@ WorkMesh begin_work_mesh(TriangleMesh& mesh) {
   return work;
 }
 
-void add_planes(WorkMesh& work, const measure::EdgeTable& edges) {
-  const TriangleMesh& mesh = work.mesh;
-  const auto at = [&](std::uint32_t v) { return mesh.positions[v] - work.centre; };
-  const auto normal_of = [&](const Triangle& t) { return cross(at(t[1]) - at(t[0]), at(t[2]) - at(t[0])); };
-  for (const Triangle& t : mesh.triangles) {
-    const Vec3 n = normal_of(t);
+namespace {
+
+/// Of a corner of a work mesh, about its centre.
+Vec3 local_place(const WorkMesh& work, std::uint32_t v) {
+  return work.mesh.positions[v] - work.centre;
+}
+Vec3 local_normal(const WorkMesh& work, const Triangle& t) {
+  const Vec3 a = local_place(work, t[0]);
+  return cross(local_place(work, t[1]) - a, local_place(work, t[2]) - a);
+}
+
+}  // namespace
+
+void add_planes(WorkMesh& work) {
+  for (const Triangle& t : work.mesh.triangles) {
+    const Vec3 n = local_normal(work, t);
     const double twice = norm(n);
     if (!(twice > 0)) continue;
-    const Quadric plane = plane_quadric(at(t[0]), (1 / twice) * n, 0.5 * twice, kNormalNoise);
+    const Quadric plane = plane_quadric(local_place(work, t[0]), (1 / twice) * n, 0.5 * twice, kNormalNoise);
     for (const std::uint32_t v : t) work.quadrics[v] += plane;
   }
+}
+
+void add_walls(WorkMesh& work, const measure::EdgeTable& edges) {
   edges.for_each_edge([&](std::span<const measure::Side> sides) {
     if (sides.size() != 1) return;
     const std::uint32_t corner = sides[0].corner;
-    const Triangle& t = mesh.triangles[corner / 3];
+    const Triangle& t = work.mesh.triangles[corner / 3];
     const std::uint32_t u = t[corner % 3], v = t[sides[0].next_corner() % 3];
     if (!work.locked.empty() && work.locked[u] != 0 && work.locked[v] != 0) return;
-    const Vec3 edge = at(v) - at(u), n = normal_of(t);
+    const Vec3 edge = local_place(work, v) - local_place(work, u), n = local_normal(work, t);
     if (!(norm(n) > 0)) return;
-    const Quadric wall =
-        plane_quadric(at(u), unit(cross(edge, unit(n))), kBoundaryWeight * dot(edge, edge), kNormalNoise);
+    const Quadric wall = plane_quadric(local_place(work, u), unit(cross(edge, unit(n))),
+                                       kBoundaryWeight * dot(edge, edge), kNormalNoise);
     work.quadrics[u] += wall;
     work.quadrics[v] += wall;
   });
@@ -307,7 +321,8 @@ void add_planes(WorkMesh& work, const measure::EdgeTable& edges) {
 
 WorkMesh make_work_mesh(TriangleMesh& mesh, const measure::EdgeTable& edges) {
   WorkMesh work = begin_work_mesh(mesh);
-  add_planes(work, edges);
+  add_planes(work);
+  add_walls(work, edges);
   return work;
 }
 
@@ -325,12 +340,12 @@ std::uint64_t contract_to(WorkMesh& work, std::uint64_t wanted, const RunContext
                                     : std::max(times_wanted(kLastRound / kInTurn) - 1,
                                                static_cast<std::uint64_t>(kRoundShrinks * static_cast<double>(there)));
     Round round(work, share_of_round(number));
-    round.reduce(goal, last, run);
+    const bool reached = round.reduce(goal, last, run);
     contractions += round.finish();
     const bool whole = there <= kPieceTriangles;  // nothing was held fast
     if (last && (whole || (stuck && work.mesh.triangles.size() == there))) break;
     const auto gone = static_cast<double>(there - work.mesh.triangles.size());
-    if (!work.locked.empty() && gone < kHardlyAny * static_cast<double>(there)) break;
+    if (!work.locked.empty() && !reached && gone < kHardlyAny * static_cast<double>(there)) break;
     stuck = work.mesh.triangles.size() == there;
   }
   return contractions;

@@ -28,10 +28,12 @@ struct WorkMesh {
 
 /// Quadrics are 0, about the middle of the mesh's box.
 WorkMesh begin_work_mesh(TriangleMesh& mesh);
-/// Sums up planes of triangles and boundary edges; those between locked vertices are taken for borders with other
-/// meshes. `edges`: of the mesh.
-void add_planes(WorkMesh& work, const measure::EdgeTable& edges);
-/// Both.
+/// Sums up planes of triangles.
+void add_planes(WorkMesh& work);
+/// And those through boundary edges; edges between locked vertices are taken for borders with other meshes. `edges`: of
+/// the mesh.
+void add_walls(WorkMesh& work, const measure::EdgeTable& edges);
+/// All of it.
 WorkMesh make_work_mesh(TriangleMesh& mesh, const measure::EdgeTable& edges);
 
 /// Contracts edges until `wanted` triangles are left, or no edge can go. Returns the number of contractions. Vertices

@@ -38,9 +38,9 @@ constexpr double kAboveWanted = 1.12;      ///< where it leaves more than are wa
 constexpr double kLastShare = 0.8;         ///< of the triangles are wanted: the round is the last
 constexpr double kHardlyFewer = 0.97;      ///< a round that leaves so many has found no more to do
 constexpr int kBoundPasses = 2;            ///< with a bound: through all regions
-constexpr std::uint32_t kSampleRegions = 8;
-constexpr std::size_t kSamplePieces = 4;  ///< of each, whose contractions tell what the whole mesh's will cost
-constexpr std::size_t kAfterPieces = 2;   ///< of each region, behind a round: what the next round's will
+constexpr std::uint32_t kSampleRegions = 16;
+constexpr std::size_t kSamplePieces = 32;  ///< of all these, whose contractions tell what the whole mesh's will cost
+constexpr std::size_t kAfterPieces = 2;    ///< of each region, behind a round: what the next round's will
 
 double share_of_pass(int pass) {
   constexpr std::array<double, 3> kShares{0.5, 0.41, 0.59};
@@ -187,13 +187,16 @@ class StreamedSimplifier {
 
   /// What contractions will cost, from a few pieces of a few regions.
   void sample(Regions& regions) {
-    const std::uint32_t few = std::min(kSampleRegions, (regions.count() + 3) / 4);
+    const std::uint32_t few = std::min(kSampleRegions, regions.count());
     for (std::uint32_t i = 0; i < few; ++i) {
       RegionMesh part =
           regions.load(static_cast<std::uint32_t>((2 * std::uint64_t{i} + 1) * regions.count() / (2 * few)));
       if (part.mesh.triangles.empty()) continue;
-      WorkMesh work = begin(part);
-      sample_pieces(work, kSamplePieces);
+      WorkMesh work = begin_work_mesh(part.mesh);
+      work.locked = part.locked;
+      add_planes(work);
+      // Of a mesh of few regions a sixteenth is enough.
+      sample_pieces(work, std::max<std::size_t>(std::min(kSamplePieces / few, pieces_of(work) / 16), 1));
     }
   }
 
@@ -209,7 +212,8 @@ class StreamedSimplifier {
     work.bound = bound_;
     work.locked = part.locked;
     if (part.quadrics.empty()) {
-      add_planes(work, edges);
+      add_planes(work);
+      add_walls(work, edges);
     } else {
       for (std::size_t v = 0; v < part.ids.size(); ++v)
         work.quadrics[v] = part.quadrics[v].moved(part.mesh.positions[v] - work.centre);

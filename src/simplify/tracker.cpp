@@ -12,12 +12,18 @@ using namespace meshes;
 
 constexpr double kRounding = 1e-6;  ///< of the bound: what arithmetic may cost
 
+float above(double error) {
+  const auto f = static_cast<float>(error);
+  return static_cast<double>(f) >= error ? f : std::nextafter(f, std::numeric_limits<float>::infinity());
+}
+
 constexpr int kCuts = 30;  ///< of a triangle, to prove it near another few
 
-/// No less than x.
-float float_above(double x) {
-  const auto f = static_cast<float>(x);
-  return static_cast<double>(f) >= x ? f : std::nextafter(f, std::numeric_limits<float>::infinity());
+/// How far they lie from a point, at most.
+double size_about(const std::vector<Vec3>& positions, const Vec3& origin) {
+  double size = 0;
+  for (const Vec3& p : positions) size = std::max(size, norm(p - origin));
+  return size;
 }
 
 }  // namespace
@@ -30,7 +36,8 @@ Tracker::Tracker(const std::vector<Vec3>& positions, const std::vector<Triangle>
       head_(triangles.size()),
       links_(triangles.size()),
       bound_((1 - kRounding) * bound),
-      cover_(bound_) {
+      origin_(positions.empty() ? Vec3{} : positions[positions.size() / 2]),
+      cover_(bound_, origin_, size_about(positions, origin_) + bound) {
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
     olds_[t] = {triangles[t], errors[t], errors[t].out, 1, {t}, 0};
     back_[t] = errors[t].back;
@@ -39,22 +46,45 @@ Tracker::Tracker(const std::vector<Vec3>& positions, const std::vector<Triangle>
   }
 }
 
+void Tracker::prepare(const Stars& stars, std::span<const Vec3> positions) {
+  const auto& triangles = stars.triangles();
+  faces_.resize(triangles.size());
+  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+    const Triangle& t = triangles[i];
+    if (t[0] == kNone) continue;
+    faces_[i] = make_facet(positions[t[0]], positions[t[1]], positions[t[2]], origin_);
+    faces_[i].id = i;
+  }
+  old_facets_.resize(olds_.size());
+  for (std::uint32_t i = 0; i < olds_.size(); ++i) {
+    const std::array<Vec3, 3> c = old_corners(olds_[i]);
+    old_facets_[i] = make_facet(c[0], c[1], c[2], origin_);
+    old_facets_[i].error = static_cast<double>(olds_[i].errors.back);
+  }
+}
+
+void Tracker::rest() {
+  faces_ = {};
+  old_facets_ = {};
+}
+
 bool Tracker::allows(const Stars& stars, std::span<const Vec3> positions, std::uint32_t u, std::uint32_t v,
                      const Vec3& to) {
+  if (faces_.empty()) prepare(stars, positions);
   gather(stars, u, v);
   before_.clear();
   after_.clear();
   for (const std::uint32_t triangle : star_) {
     const Triangle& t = stars.triangles()[triangle];
     std::array<Vec3, 3> c{positions[t[0]], positions[t[1]], positions[t[2]]};
-    before_.push_back(make_facet(c[0], c[1], c[2]));
+    before_.push_back(faces_[triangle]);
     before_.back().error = static_cast<double>(back_[triangle]);
     if (names(t, u) && names(t, v)) continue;
     c[corner_of(t, names(t, u) ? u : v)] = to;
-    after_.push_back(make_facet(c[0], c[1], c[2]));
+    after_.push_back(make_facet(c[0], c[1], c[2], origin_));
     after_.back().id = triangle;
   }
-  return still_covered(stars, positions) && covers();
+  return still_covered() && covers();
 }
 
 void Tracker::gather(const Stars& stars, std::uint32_t u, std::uint32_t v) {
@@ -76,23 +106,22 @@ void Tracker::gather(const Stars& stars, std::uint32_t u, std::uint32_t v) {
 }
 
 /// Are the old triangles near what would be there?
-bool Tracker::still_covered(const Stars& stars, std::span<const Vec3> positions) {
+bool Tracker::still_covered() {
   proofs_.clear();
-  facets_ = after_;
+  facets_.clear();
+  for (const Facet& f : after_) facets_.push_back(&f);
   for (const std::uint32_t number : affected_) {
     const Old& old = olds_[number];
     facets_.resize(after_.size());
     for (std::size_t i = 0; i < old.size; ++i) {
       const std::uint32_t face = old.faces[i];
       if (std::find(star_.begin(), star_.end(), face) != star_.end()) continue;
-      const Triangle& t = stars.triangles()[face];
-      facets_.push_back(make_facet(positions[t[0]], positions[t[1]], positions[t[2]]));
-      facets_.back().id = face;
+      facets_.push_back(&faces_[face]);
     }
     if (!cover_.prove(old_corners(old), static_cast<double>(old.errors.out), facets_, kCuts) ||
         cover_.used().size() > kFaces)
       return false;
-    Proof proof{number, float_above(cover_.error()), static_cast<std::uint8_t>(cover_.used().size()), {}};
+    Proof proof{number, above(cover_.error()), static_cast<std::uint8_t>(cover_.used().size()), {}};
     std::copy(cover_.used().begin(), cover_.used().end(), proof.faces.begin());
     proofs_.push_back(proof);
   }
@@ -102,8 +131,10 @@ bool Tracker::still_covered(const Stars& stars, std::span<const Vec3> positions)
 /// Would what is there be near the old triangles?
 bool Tracker::covers() {
   after_back_.clear();
+  before_list_.clear();
+  for (const Facet& f : before_) before_list_.push_back(&f);
   for (const Facet& f : after_) {
-    if (!cover_.prove(f.corners, 0, before_, kCuts)) {
+    if (!cover_.prove(f.corners, 0, before_list_, kCuts)) {
       // Step by step it is too far. What about the way from the beginning?
       Vec3 low = f.corners[0], high = low;
       for (const Vec3& c : f.corners) {
@@ -114,19 +145,18 @@ bool Tracker::covers() {
       }
       facets_.clear();
       for (const std::uint32_t number : affected_) {
-        const auto c = old_corners(olds_[number]);
+        const std::array<Vec3, 3>& c = old_facets_[number].corners;
         bool apart = false;
         for (std::size_t k = 0; k < 3; ++k) {
           apart = apart || std::max({c[0][k], c[1][k], c[2][k]}) < low[k] ||
                   std::min({c[0][k], c[1][k], c[2][k]}) > high[k];
         }
         if (apart) continue;
-        facets_.push_back(make_facet(c[0], c[1], c[2]));
-        facets_.back().error = static_cast<double>(olds_[number].errors.back);
+        facets_.push_back(&old_facets_[number]);
       }
       if (!cover_.prove(f.corners, 0, facets_, 8 * static_cast<int>(facets_.size()))) return false;
     }
-    after_back_.push_back(float_above(cover_.error()));
+    after_back_.push_back(above(cover_.error()));
   }
   return true;
 }
@@ -166,7 +196,10 @@ void Tracker::accept() {
     old.size = proof.size;
     old.faces = proof.faces;
   }
-  for (std::size_t i = 0; i < after_.size(); ++i) back_[after_[i].id] = after_back_[i];
+  for (std::size_t i = 0; i < after_.size(); ++i) {
+    back_[after_[i].id] = after_back_[i];
+    faces_[after_[i].id] = after_[i];
+  }
 }
 
 std::vector<Errors> Tracker::errors() const {

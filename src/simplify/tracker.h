@@ -30,6 +30,8 @@ class Tracker {
               const meshes::Vec3& to);
   /// What was allowed last is done.
   void accept();
+  /// Gives back the memory that questions need, until the next one.
+  void rest();
 
   /// Of the triangles, those present now.
   [[nodiscard]] std::vector<Errors> errors() const;
@@ -57,7 +59,8 @@ class Tracker {
   };
 
   void gather(const Stars& stars, std::uint32_t u, std::uint32_t v);
-  bool still_covered(const Stars& stars, std::span<const meshes::Vec3> positions);
+  void prepare(const Stars& stars, std::span<const meshes::Vec3> positions);
+  bool still_covered();
   bool covers();
   [[nodiscard]] std::array<meshes::Vec3, 3> old_corners(const Old& old) const {
     return {base_[old.corners[0]], base_[old.corners[1]], base_[old.corners[2]]};
@@ -71,13 +74,15 @@ class Tracker {
   std::vector<Link> links_;
   std::uint32_t free_ = kEnd;
   double bound_;
+  meshes::Vec3 origin_;  ///< of facets
 
   // Of the contraction in question.
   std::uint32_t question_ = 0;
   std::vector<std::uint32_t> star_;      ///< triangles around it
   std::vector<std::uint32_t> affected_;  ///< old triangles near them
   std::vector<Facet> before_, after_;    ///< these triangles; those that stay
-  std::vector<Facet> facets_;
+  std::vector<const Facet*> before_list_, facets_;
+  std::vector<Facet> faces_, old_facets_;  ///< of the present triangles and the old ones, while questions are asked
   std::vector<Proof> proofs_;
   std::vector<float> after_back_;
   Cover cover_;

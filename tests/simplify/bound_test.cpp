@@ -165,8 +165,8 @@ TEST(Cover, DistanceIsTheDistance) {
   for (int i = 0; i < 2000; ++i) {
     const Vec3 a = any(), b = any(), c = i % 10 == 0 ? 0.5 * (a + b) : any(), x = any();
     const double truth = i % 10 == 0 ? point_to_triangle(x, a, b, b) : point_to_triangle(x, a, b, c);
-    EXPECT_NEAR(simplify::distance_within(x, simplify::make_facet(a, b, c), 10), truth, 1e-6);
-    EXPECT_EQ(simplify::distance_within(x, simplify::make_facet(a, b, c), 0.9 * truth - 1e-6),
+    EXPECT_NEAR(simplify::distance_within(x, simplify::make_facet(a, b, c, {}), 10), truth, 1e-6);
+    EXPECT_EQ(simplify::distance_within(x, simplify::make_facet(a, b, c, {}), 0.9 * truth - 1e-6),
               std::numeric_limits<double>::infinity());
   }
 }
@@ -176,18 +176,23 @@ TEST(Cover, ATriangleLiesNearItsParts) {
   std::uniform_real_distribution<> real(0, 1);
   for (int i = 0; i < 200; ++i) {
     const Vec3 a{0, 0, 0}, b{1, 0, 0}, c{0, 1, 0}, m{0.2 + 0.3 * real(random), 0.2 + 0.2 * real(random), 0};
-    std::vector<simplify::Facet> parts{simplify::make_facet(a, b, m), simplify::make_facet(b, c, m),
-                                       simplify::make_facet(c, a, m)};
-    simplify::Cover cover(1e-6);
-    EXPECT_TRUE(cover.prove({a, b, c}, 0, parts, 30));
+    std::vector<simplify::Facet> parts{simplify::make_facet(a, b, m, {}), simplify::make_facet(b, c, m, {}),
+                                       simplify::make_facet(c, a, m, {})};
+    const auto near_parts = [&](simplify::Cover& cover, double error) {
+      std::vector<const simplify::Facet*> list;
+      for (const simplify::Facet& part : parts) list.push_back(&part);
+      return cover.prove({a, b, c}, error, list, 30);
+    };
+    simplify::Cover cover(1e-6, {}, 2);
+    EXPECT_TRUE(near_parts(cover, 0));
     EXPECT_LT(cover.error(), 1e-6);
     parts.pop_back();
-    EXPECT_FALSE(cover.prove({a, b, c}, 0, parts, 30));
-    parts.push_back(simplify::make_facet(c, a, m + Vec3{0, 0, 0.01}));
-    EXPECT_FALSE(cover.prove({a, b, c}, 0, parts, 30));
-    simplify::Cover wider(0.011);
-    EXPECT_TRUE(wider.prove({a, b, c}, 0, parts, 30));
-    EXPECT_FALSE(wider.prove({a, b, c}, 0.01, parts, 30));
+    EXPECT_FALSE(near_parts(cover, 0));
+    parts.push_back(simplify::make_facet(c, a, m + Vec3{0, 0, 0.01}, {}));
+    EXPECT_FALSE(near_parts(cover, 0));
+    simplify::Cover wider(0.011, {}, 2);
+    EXPECT_TRUE(near_parts(wider, 0));
+    EXPECT_FALSE(near_parts(wider, 0.01));
   }
 }
 
