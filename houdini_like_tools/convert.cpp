@@ -9,6 +9,7 @@
 #include "common/inputs.h"
 #include "common/outputs.h"
 #include "common/text.h"
+#include "lamina/convert_mesh.h"
 #include "lamina/edit_points.h"
 #include "lamina/error.h"
 #include "lamina/file_ending.h"
@@ -111,6 +112,13 @@ void write_vertices(const ConvertOptions& o, const TriangleMesh& mesh, const Run
 }
 
 void convert_mesh(const ConvertOptions& o, const RunContext& context) {
+  if (!o.vertices && !o.fog) {
+    if (const auto converted = convert_mesh_file(o.input, o.output, context)) {
+      context.info(fmt::format("wrote {} vertices, {} triangles", count_text(converted->vertices),
+                               count_text(converted->triangles)));
+      return;
+    }
+  }
   const TriangleMesh mesh = read_mesh_input(o.input, context, o.bad);
   if (o.vertices) return write_vertices(o, mesh, context);
   if (o.fog)

@@ -39,6 +39,11 @@ double fraction_done(const Progress& p) {
   return std::clamp(fraction, 0.0, 1.0);
 }
 
+/// What a stage goes through one by one.
+std::string_view piece_of(std::string_view stage) {
+  return stage == "tiles" ? "tile" : "slab";
+}
+
 std::string progress_text(const Progress& p, double fraction, double elapsed) {
   std::string text(p.stage);
   if (p.samples_total > 0) {
@@ -46,7 +51,7 @@ std::string progress_text(const Progress& p, double fraction, double elapsed) {
   } else if (p.samples_done > 0) {
     text += fmt::format("  {} samples", count_text(p.samples_done));
   }
-  if (p.slabs_total > 0) text += fmt::format("  slab {} of {}", p.slabs_done, p.slabs_total);
+  if (p.slabs_total > 0) text += fmt::format("  {} {} of {}", piece_of(p.stage), p.slabs_done, p.slabs_total);
   if (p.samples_total > 0 || p.slabs_total > 0) {
     text += fmt::format("  {:.0f} %", 100 * fraction);
     // Too early an estimate is noise.

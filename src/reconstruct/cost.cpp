@@ -1,5 +1,7 @@
 #include "reconstruct/cost.h"
 
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -125,6 +127,18 @@ double mesh_memory(const ReconstructionPlan& plan, const SlabStore& store, doubl
   return kProgram + cached + rest + refit_memory(plan, per_slab / plan.lattice.slab_height());
 }
 
+/// Of --tiles: the cells and the leaves' buffers, and what a thread works on.
+double tiles_memory(const ReconstructionPlan& plan) {
+  if (plan.tiles.folder.empty()) return 0;
+  constexpr double kProgram = 60e6, kLeaves = 48e6, kVertices = 64e6, kThread = 60e6;
+  constexpr double kPerTriangle = 1.0, kLeafTriangles = 45'000;
+  const double triangles = expected_triangles(plan);
+  const double threads =
+      std::min(static_cast<double>(tbb::this_task_arena::max_concurrency()), 1 + triangles / (8 * kLeafTriangles));
+  return kProgram + std::min(kLeaves, 12 * triangles) + std::min(kVertices, 2 * triangles) + kThread * threads +
+         kPerTriangle * triangles;
+}
+
 }  // namespace
 
 double expected_triangles(const ReconstructionPlan& plan) {
@@ -164,6 +178,12 @@ ExpectedCost expected_cost(const ReconstructionPlan& plan, const Ingested& cloud
   out.memory = static_cast<std::uint64_t>(mesh_memory(plan, store, per_slab) + volume_memory(plan, per_slab)) +
                table_bytes(plan, store);
   out.disk = expected_disk(store, expected_waiting_bytes(plan));
+  if (!plan.tiles.folder.empty()) {
+    out.memory = std::max(out.memory, static_cast<std::uint64_t>(tiles_memory(plan)));
+    constexpr double kSortedTriangle = 12;  // bytes, beside the mesh that waits
+    const auto sorted = static_cast<std::uint64_t>(kSortedTriangle * expected_triangles(plan));
+    out.disk = std::max(out.disk, expected_waiting_bytes(plan) + sorted);
+  }
   out.cpu_seconds = expected_cpu_seconds(plan);
   if (plan.simplify.wanted()) add_simplification(plan, store, out);
   out.reading_seconds = kReferenceRead * static_cast<double>(plan.samples);
@@ -193,7 +213,9 @@ double expected_cpu_seconds(const ReconstructionPlan& plan) {
   const double support = plan.refit.support;
   const double refit = support > 0 ? kRefit + kRefitSums * support * support : 0;
   const double attributes = kPerAttribute * static_cast<double>(plan.attributes.size());
-  return static_cast<double>(plan.samples) * (kSample + attributes + refit + sums + (kCell + volume) * cells);
+  constexpr double kTileTriangle = 1.6e-6;  // --tiles: read, sorted, simplified, written
+  const double tiles = plan.tiles.folder.empty() ? 0 : kTileTriangle * expected_triangles(plan);
+  return static_cast<double>(plan.samples) * (kSample + attributes + refit + sums + (kCell + volume) * cells) + tiles;
 }
 
 }  // namespace lamina

@@ -10,6 +10,8 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
+#include <type_traits>
 #include <vector>
 
 #include "base/little_endian.h"
@@ -252,6 +254,54 @@ void add_colours(ContentWriter& writer, ContentJson& primitive, const TriangleMe
   add_rows(writer, primitive, "COLOR_0", std::move(accessor), rows, order.vertices.size());
 }
 
+/// The component that holds an attribute's type; what glTF has none for, or would not round, is a float.
+glb::Component component_of_tile(ScalarType type) {
+  switch (type) {
+    case ScalarType::int8:
+      return glb::kByte;
+    case ScalarType::uint8:
+      return glb::kUbyte;
+    case ScalarType::int16:
+      return glb::kShort;
+    case ScalarType::uint16:
+      return glb::kUshort;
+    default:
+      return glb::kFloat;
+  }
+}
+
+/// What is no colour, as "_NAME".
+void add_attributes(ContentWriter& writer, ContentJson& primitive, const TriangleMesh& mesh, const TileOrder& order) {
+  constexpr int kFloatBits = 15, kAllBits = 23;  // those left out are 0 and compress to nothing
+  const auto colours = meshes::find_colours(mesh);
+  std::set<std::string> taken;
+  for (std::size_t a = 0; a < mesh.layout.size(); ++a) {
+    const AttributeSpec& spec = mesh.layout[a];
+    if (colours && is_colour(spec.name)) continue;
+    const glb::Component component = component_of_tile(spec.type);
+    const ScalarType type = component == glb::kFloat ? ScalarType::float32 : spec.type;
+    const int bits = is_integer_type(spec.type) ? kAllBits : kFloatBits;
+    std::string rows;
+    rows.reserve(4 * order.vertices.size());
+    for (const std::uint32_t v : order.vertices) {
+      const float value = std::isfinite(mesh.attributes[a][v]) ? mesh.attributes[a][v] : 0.0F;
+      with_scalar_type(type, [&](auto zero) {
+        using Number = decltype(zero);
+        if constexpr (std::is_floating_point_v<Number>) {
+          append_little(rows, static_cast<float>(meshopt_quantizeFloat(value, bits)));
+        } else {
+          append_little(rows, to_scalar<Number>(value));
+        }
+      });
+      rows.resize((rows.size() + 3) / 4 * 4, '\0');
+    }
+    std::string semantic = glb::semantic_of(spec.name);
+    while (!taken.insert(semantic).second) semantic += '_';
+    add_rows(writer, primitive, semantic.c_str(),
+             {{"name", spec.name}, {"componentType", component}, {"type", "SCALAR"}}, rows, order.vertices.size());
+  }
+}
+
 void add_indices(ContentWriter& writer, ContentJson& primitive, const TileOrder& order) {
   const bool words = order.vertices.size() < 0xFFFF;
   std::string plain;
@@ -300,6 +350,7 @@ std::string tile_content(const TriangleMesh& mesh, const TileLattice& lattice, b
   add_positions(writer, primitive, mesh, order, middle);
   add_normals(writer, primitive, mesh, order);
   add_colours(writer, primitive, mesh, order);
+  add_attributes(writer, primitive, mesh, order);
   add_indices(writer, primitive, order);
   primitive["mode"] = 4;
   primitive["material"] = 0;

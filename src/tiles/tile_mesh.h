@@ -31,7 +31,7 @@ struct SharedVertex {
 };
 
 struct TileMesh {
-  TriangleMesh mesh;                 ///< positions in whole steps of the lattice; of the attributes only colours
+  TriangleMesh mesh;                 ///< positions in whole steps of the lattice
   std::vector<SharedVertex> shared;  ///< with tiles beside the one this is
   double error = 0;                  ///< steps: how far it may be from the mesh that the leaves have
 };

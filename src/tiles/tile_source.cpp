@@ -58,14 +58,6 @@ std::uint32_t leaf_of_triangle(const std::array<std::uint32_t, 3>& homes) {
   return *std::min_element(homes.begin(), homes.end());
 }
 
-std::vector<std::size_t> colour_attributes(const AttributeLayout& layout) {
-  std::vector<std::size_t> found;
-  for (std::size_t a = 0; a < layout.size(); ++a) {
-    if (is_colour(layout[a].name)) found.push_back(a);
-  }
-  return found;
-}
-
 }  // namespace
 
 TileSource::TileSource(meshes::MeshBlocks& mesh, const TileOctree& octree, const std::string& tmp_dir,
@@ -74,8 +66,7 @@ TileSource::TileSource(meshes::MeshBlocks& mesh, const TileOctree& octree, const
       octree_(octree),
       file_(tmp_dir),
       leaves_(octree.nodes().size()),
-      most_held_(std::clamp<std::size_t>((std::size_t{48} << 20) / (sizeof(Corners) * leaves_.size()), 32, 1024)),
-      colours_(colour_attributes(mesh.layout())) {
+      most_held_(std::clamp<std::size_t>((std::size_t{48} << 20) / (sizeof(Corners) * leaves_.size()), 32, 1024)) {
   read(run);
 }
 
@@ -169,8 +160,8 @@ TileMesh TileSource::leaf(std::uint32_t node, const TileLattice& lattice) {
 }
 
 void TileSource::read_vertices(const std::vector<std::uint32_t>& ids, const TileLattice& lattice, TriangleMesh& out) {
-  for (const std::size_t a : colours_) out.layout.push_back(mesh_.layout()[a]);
-  out.attributes.resize(colours_.size());
+  out.layout = mesh_.layout();
+  out.attributes.resize(out.layout.size());
   out.positions.reserve(ids.size());
   out.normals.reserve(ids.size());
   for (auto& values : out.attributes) values.reserve(ids.size());
@@ -181,7 +172,7 @@ void TileSource::read_vertices(const std::vector<std::uint32_t>& ids, const Tile
   meshes::for_vertex_rows(ids, read, [&](const TriangleMesh& rows, std::size_t row) {
     out.positions.push_back(lattice.steps(rows.positions[row]));
     out.normals.push_back(rows.normals[row]);
-    for (std::size_t a = 0; a < colours_.size(); ++a) out.attributes[a].push_back(rows.attributes[colours_[a]][row]);
+    for (std::size_t a = 0; a < out.attributes.size(); ++a) out.attributes[a].push_back(rows.attributes[a][row]);
   });
 }
 

@@ -58,7 +58,6 @@ class TileSource {
   std::vector<Use> uses_;  ///< of vertices in leaves other than their own
   std::size_t most_uses_ = 1U << 20;
   std::vector<std::pair<std::uint32_t, int>> shared_;  ///< vertices, ascending, with SharedVertex::depth
-  std::vector<std::size_t> colours_;                   ///< attributes that tiles carry
   std::uint64_t triangles_ = 0, left_out_ = 0;
   std::mutex reading_;  ///< of mesh_
 };

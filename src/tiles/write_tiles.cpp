@@ -8,7 +8,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -83,7 +85,7 @@ class TileBuilder {
     const TileNode& place = octree_.nodes()[node];
     if (place.leaf()) {
       TileMesh tile = source_.leaf(node, lattice_);
-      write(node, tile);
+      write(node, tile, run);
       return tile;
     }
     std::vector<TileMesh> parts(place.children.size());
@@ -97,17 +99,24 @@ class TileBuilder {
     const auto there = static_cast<double>(tile.mesh.triangles.size());
     const double wanted = std::clamp(kShrinks * there, sizes_.least, sizes_.most);
     if (there > wanted) coarsen_tile(tile, static_cast<std::uint64_t>(wanted), simplifier_, run);
-    write(node, tile);
+    write(node, tile, run);
     return tile;
   }
 
   [[nodiscard]] const std::vector<TileEntry>& entries() const { return entries_; }
 
  private:
-  void write(std::uint32_t node, const TileMesh& tile) {
+  void write(std::uint32_t node, const TileMesh& tile, const RunContext& run) {
     TileEntry& entry = entries_[node];
     entry.triangles = tile.mesh.triangles.size();
-    if (entry.triangles == 0) return;
+    if (entry.triangles > 0) write_content(node, tile);
+    const std::lock_guard lock(telling_);
+    ++done_;
+    if (run.progress) run.progress({"tiles", 0, 0, done_, static_cast<std::int64_t>(entries_.size())});
+  }
+
+  void write_content(std::uint32_t node, const TileMesh& tile) {
+    TileEntry& entry = entries_[node];
     entry.box = box_of_tile(tile.mesh);
     entry.error = tile.error;
     const std::string bytes = tile_content(tile.mesh, lattice_, compress_);
@@ -124,6 +133,8 @@ class TileBuilder {
   StagedFolder& folder_;
   std::vector<TileEntry> entries_;
   simplify::PartSimplifier simplifier_;
+  std::mutex telling_;
+  std::int64_t done_ = 0;  ///< tiles
 };
 
 /// Normals of vertices by the areas of the triangles around them.

@@ -82,6 +82,15 @@ TEST(SurfacePlan, CoincidentSamplesDoNotSetTheScale) {
   EXPECT_NEAR(test::area(r.mesh), 4 * std::numbers::pi, 0.3);
 }
 
+TEST(SurfacePlan, CountsTiles) {
+  const Cloud cloud = test::torus_cloud(20000);
+  const SurfacePlan without = plan_of(cloud);
+  const SurfacePlan with = plan_of(cloud, [](auto& s) { s.tiles.folder = "tiles"; });
+  EXPECT_GT(with.memory_bytes, without.memory_bytes);
+  EXPECT_GE(with.disk_bytes, without.disk_bytes);
+  EXPECT_GT(with.disk_bytes, 12 * with.triangles);
+}
+
 // What was expected is what it took, within a factor that a user can plan with.
 TEST(SurfacePlan, ExpectsTheDiskItTakes) {
   const Cloud cloud = test::sphere_cloud(30000);

@@ -82,6 +82,40 @@ TEST(Tiles, LeavesHaveEveryTriangleWithItsColours) {
   }
 }
 
+TEST(Tiles, EveryTileHasTheAttributes) {
+  const ScratchFolder folder;
+  TriangleMesh mesh = bumpy_ball(70, true);
+  mesh.layout.insert(mesh.layout.end(), {{"height", ScalarType::float64}, {"Class", ScalarType::uint8}});
+  mesh.attributes.resize(5);
+  for (const auto& p : mesh.positions) {
+    mesh.attributes[3].push_back(static_cast<float>(p[2]));
+    mesh.attributes[4].push_back(p[2] > 0 ? 200.0F : 7.0F);
+  }
+  for (const bool compress : {true, false}) {
+    const std::string name = folder.file(compress ? "small" : "plain");
+    write_small_tiles(mesh, into(name, compress, {}));
+    const Tileset set(name);
+    set.visit([&](const Json& tile, const Json*) {
+      const Glb glb = read_glb_chunks(name + "/" + tile["content"]["uri"].get<std::string>());
+      const Json& primitive = glb.json["meshes"][0]["primitives"][0];
+      const Json& attributes = primitive["attributes"];
+      const auto at = numbers_of(glb, attributes["POSITION"], 3), heights = numbers_of(glb, attributes["_HEIGHT"], 1),
+                 classes = numbers_of(glb, attributes["_CLASS"], 1);
+      EXPECT_EQ(glb.json["accessors"][attributes["_CLASS"].get<std::size_t>()]["name"], "Class");
+      ASSERT_EQ(3 * heights.size(), at.size());
+      ASSERT_EQ(heights.size(), classes.size());
+      const bool leaf = !tile.contains("children");
+      for (std::size_t v = 0; v < heights.size(); ++v) {
+        // y up in the content; a vertex of a coarser tile has its attribute from along an edge.
+        const double z =
+            at[3 * v + 1] * set.step + glb.json["nodes"][0]["translation"][1].get<double>() + set.origin[2];
+        ASSERT_NEAR(heights[v], z, leaf ? 1e-4 : 0.03);
+        if (leaf) ASSERT_EQ(classes[v], z > 0 ? 200 : 7);
+      }
+    });
+  }
+}
+
 TEST(Tiles, TreeIsSound) {
   const ScratchFolder folder;
   const TileStats stats = write_small_tiles(bumpy_ball(90, false), into(folder.file("set")));
@@ -306,6 +340,8 @@ TEST(Tiles, KhronosValidatorFindsNothing) {
     GTEST_SKIP() << "gltf-validator is not installed";
   const ScratchFolder folder;
   TriangleMesh mesh = bumpy_ball(40, true);
+  mesh.layout.insert(mesh.layout.end(), {{"height", ScalarType::float32}, {"class", ScalarType::uint8}});
+  mesh.attributes.resize(5, std::vector<float>(mesh.positions.size(), 1.5F));
   write_small_tiles(mesh, into(folder.file("plain"), false, {}));
   write_small_tiles(mesh, into(folder.file("packed"), true, {}));
   for (auto& p : mesh.positions) p[0] *= 1e4;

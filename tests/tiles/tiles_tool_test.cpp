@@ -3,10 +3,14 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
+#include "lamina/error.h"
+#include "lamina/mesh.h"
+#include "lamina/surface.h"
 #include "support/program.h"
 #include "tools/tool_files.h"
 
@@ -46,6 +50,34 @@ TEST_F(TilesTool, BesideTheMeshOrOfItAreTheSame) {
       EXPECT_TRUE(read_text(set_ + file) == read_text((folder_ / other) + file)) << other << file;
   ASSERT_EQ(run_lamina({"tiles", mesh_, "-o", folder_ / "plain", "--plain"}).code, 0);
   EXPECT_GT(fs::file_size((folder_ / "plain") + "/tiles/0.glb"), fs::file_size(set_ + "/tiles/0.glb"));
+}
+
+// Somebody else puts a file there meanwhile.
+TEST_F(TilesTool, AMeshIsThereWithoutItsTiles) {
+  SurfaceSettings settings;
+  settings.input = scan_;
+  settings.output = mesh_;
+  settings.tiles.folder = set_;
+  RunContext run;
+  run.progress = [&](const Progress& p) {
+    if (p.stage == "surface")
+      write_points((fs::create_directories(set_), set_ + "/other.ply"), sphere_rows(10), sphere_columns());
+  };
+  try {
+    reconstruct_surface(settings, run);
+    ADD_FAILURE() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.code(), ExitCode::budget);
+    EXPECT_THAT(error.what(), HasSubstr("set: the folder is not empty"));
+  }
+  EXPECT_GT(read_mesh(mesh_).triangles.size(), 1000U);
+  EXPECT_EQ(folder_.entries(), 3);  // the scan, the mesh, the folder
+  EXPECT_EQ(std::distance(fs::directory_iterator(set_), fs::directory_iterator()), 1);
+}
+
+TEST_F(TilesTool, TellsHowFarItIs) {
+  const auto outcome = run_lamina({"surface", scan_, "-o", mesh_, "--tiles", set_});
+  EXPECT_THAT(outcome.err, HasSubstr("lamina: tiles  tile 1 of 1  100 %"));
 }
 
 TEST_F(TilesTool, Refusals) {

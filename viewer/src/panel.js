@@ -205,11 +205,18 @@ export class Panel {
     this.mode = choice('Move', [['orbit', 'Orbit'], ['fly', 'Fly']], 'orbit', (mode) => viewer.controls.setMode(mode));
     this.up = choice('Up', [['x', 'x'], ['y', 'y'], ['z', 'z']], viewer.controls.up, (axis) => viewer.controls.setUp(axis));
     this.theme = choice('Ground', [['dark', 'Dark'], ['light', 'Light']], 'dark', (theme) => viewer.setTheme(theme));
-    return section('View', this.mode.row, this.up.row, this.theme.row,
+    this.speed = make('div', { className: 'value hint speed', textContent: '– frames a second' });
+    viewer.stage.afterDraw.push(() => this.showSpeed());
+    return section('View', this.mode.row, this.up.row, this.theme.row, this.speed,
       make('div', { className: 'buttons' },
         button('Fit', 'See all of it (F)', () => viewer.controls.home()),
         button('Picture', 'Save a PNG (P)', () => viewer.savePicture()),
         button('Keys', 'What the keys do (?)', () => this.help.toggle())));
+  }
+
+  showSpeed() {
+    const { framesPerSecond: speed } = this.viewer.stage;
+    if (speed) this.speed.textContent = `${speed.toFixed(speed < 10 ? 1 : 0)} frames a second`;
   }
 
   showPlace(place) {

@@ -37,6 +37,8 @@ export class Stage {
     this.outline = [];  // places that a picture of everything has to show
     this.covered = 0;
     this.drawing = false;
+    this.steps = [];  // milliseconds between frames that followed each other
+    this.drawnAt = this.endedAt = this.askedAt = -Infinity;
     this.beforeDraw = [];
     this.afterDraw = [];
     this.setTheme('dark');
@@ -77,6 +79,7 @@ export class Stage {
 
   /** Wants a picture with the next frame. */
   draw() {
+    if (!this.drawing) this.askedAt = performance.now();
     this.drawing = true;
   }
 
@@ -86,7 +89,22 @@ export class Stage {
     this.drawing = false;
     this.adjustDepth();
     this.renderer.render(this.scene, this.camera);
+    this.clock(time);
     for (const step of this.afterDraw) step();
+    this.endedAt = performance.now();
+  }
+
+  /** Frames are drawn on demand: one that nobody asked for for a while says nothing of how fast they come. */
+  clock(time) {
+    const pause = 250;
+    if (this.askedAt - this.endedAt > pause) this.steps = [];
+    else this.steps = [...this.steps.slice(-29), time - this.drawnAt];
+    this.drawnAt = time;
+  }
+
+  /** Frames a second of the last ones, while there is movement; else nothing. */
+  get framesPerSecond() {
+    return this.steps.length < 3 ? null : (1000 * this.steps.length) / this.steps.reduce((sum, step) => sum + step, 0);
   }
 
   /** Near and far planes as close around the model as the camera's place allows. */
