@@ -68,7 +68,7 @@ TEST_F(TilesTool, AMeshIsThereWithoutItsTiles) {
     ADD_FAILURE() << "no error";
   } catch (const Error& error) {
     EXPECT_EQ(error.code(), ExitCode::budget);
-    EXPECT_THAT(error.what(), HasSubstr("set: the folder is not empty"));
+    EXPECT_THAT(error.what(), HasSubstr("set: is there and not empty"));
   }
   EXPECT_GT(read_mesh(mesh_).triangles.size(), 1000U);
   EXPECT_EQ(folder_.entries(), 3);  // the scan, the mesh, the folder
