@@ -18,9 +18,9 @@ StepBox box_of_tile(const TriangleMesh& mesh);
 
 /// Binary glTF 2.0 with y up, as 3D Tiles want it: x, z, -y of the lattice. Positions are whole numbers of steps from
 /// the middle of the tile in 16 bits (KHR_mesh_quantization), in floats where these do not do; the node brings them to
-/// units of the mesh from the lattice's origin. Normals in bytes; colours linear, 8 bits in 16, others as floats; further
-/// attributes as _NAME in whole numbers of their own type, or floats to 16 bits of a number.
-/// `compress`: EXT_meshopt_compression.
+/// units of the mesh from the lattice's origin. Normals in bytes; colours linear, 8 bits in 16, others as floats;
+/// further attributes as _NAME in whole numbers of their own type, or floats to 16 bits of a number. `compress`:
+/// EXT_meshopt_compression.
 std::string tile_content(const TriangleMesh& mesh, const TileLattice& lattice, bool compress);
 
 }  // namespace lamina::tiles
