@@ -29,12 +29,16 @@ Contractor::Contractor(Piece piece)
 Placed Contractor::place(std::uint32_t u, std::uint32_t v) const {
   Quadric sum = piece_.quadrics[u];
   sum += piece_.quadrics[v];
-  Placed placed = place_edge(sum, piece_.positions[u] - piece_.centre, piece_.positions[v] - piece_.centre);
-  placed.at = placed.at + piece_.centre;
+  const Placed placed = place_edge(sum, piece_.positions[u] - piece_.centre, piece_.positions[v] - piece_.centre);
+  Vec3 at = placed.at + piece_.centre;
   if (piece_.floats) {
-    for (double& c : placed.at) c = static_cast<double>(static_cast<float>(c));
+    for (double& c : at) {
+      // Without volatile GCC 12 computes two coordinates at once and leaves out that they are rounded.
+      const volatile float rounded = static_cast<float>(c);
+      c = static_cast<double>(rounded);
+    }
   }
-  return placed;
+  return {at, placed.cost};
 }
 
 void Contractor::offer(std::uint32_t u, std::uint32_t v) {

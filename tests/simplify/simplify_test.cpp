@@ -86,6 +86,16 @@ TEST(Simplify, ASphereStaysNearItsSurface) {
   for (const auto& p : mesh.positions) EXPECT_NEAR(meshes::norm(p), 1, 4 * area / std::sqrt(3.0) / 3);
 }
 
+TEST(Simplify, FloatsStayFloats) {
+  TriangleMesh mesh = sphere(1, 60, 120);
+  const auto as_float = [](double c) { return static_cast<double>(static_cast<float>(c)); };
+  for (auto& p : mesh.positions) p = {as_float(p[0]), as_float(p[1]), as_float(p[2])};
+  simplify_mesh(mesh, {mesh.triangles.size() / 4});
+  for (const auto& p : mesh.positions) {
+    for (const double c : p) ASSERT_EQ(c, as_float(c));
+  }
+}
+
 TEST(Simplify, ACreaseKeepsItsPlace) {
   TriangleMesh mesh = field(40, [](double x, double) { return std::abs(x - 0.5); });
   const TriangleMesh before = mesh;
