@@ -109,6 +109,8 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
   j["sheet_refinement"] = s.plan.refine_sheets;
   j["watertight"] = s.plan.watertight;
   j["trim"] = s.plan.trim;
+  j["features"] = s.plan.features;
+  j["blurred_normals"] = s.plan.blurred_normals;
   j["close_holes"] = s.plan.longest_rim;
   j["finest_cell"] = s.plan.finest_cell;
   j["slab_height"] = s.plan.slab_height;

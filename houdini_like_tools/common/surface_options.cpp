@@ -52,6 +52,16 @@ void add_fit_options(CLI::App& tool, SurfaceSettings& s) {
       ->group(fit);
   tool.add_flag("--diffuse", s.diffuse, "Project cell centres and average them at the corners: smoother")->group(fit);
 
+  tool.add_option_function<std::string>(
+          "--features",
+          [&s](const std::string& word) { s.features = word == "auto" ? std::nullopt : std::optional(word == "yes"); },
+          "Sharp edges and corners where the samples' normals show them; of clean clouds normals that were "
+          "interpolated "
+          "over edges are found again; auto: where --blend is auto")
+      ->check(CLI::IsMember({"auto", "yes", "no"}).description(""))
+      ->type_name("auto|yes|no")
+      ->default_str("auto")
+      ->group("Fit");
   const std::string lattice = "Octree";
   tool.add_option_function<std::string>(
           "--cell", [&s](const std::string& text) { s.cell = length_of("--cell", text); },

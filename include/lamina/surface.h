@@ -90,6 +90,10 @@ struct SurfaceSettings {
   /// their weighted mean lies so far to one side); 0.235 is the straight edge of evenly spread samples. 0: nowhere,
   /// whole triangles are kept or left out. Unset: chosen where `blend` is, else 0.
   std::optional<double> trim;
+  /// Sharp edges: where the normals around a corner fall into two or three groups, each is fitted by itself, vertices
+  /// are put on the edges and corners where they meet, and normals that a clean cloud has interpolated over such edges
+  /// are found again. Where the data show none nothing changes. Unset: where `blend` is.
+  std::optional<bool> features;
   /// Connected parts of the mesh with fewer triangles are dropped. Unset: a two-thousandth of the samples' number, at
   /// most 500; in jobs of several runs, which write no whole mesh, none.
   std::optional<std::uint64_t> prune_triangles = 0;
@@ -114,11 +118,14 @@ struct SurfacePlan {
   double worst_noise = 0;            ///< median in the noisiest of a few stretches of the cloud, in radii
   std::array<double, 3> noisiest{};  ///< the middle of that stretch
   double normal_noise = 0;           ///< median angle of their normals to that surface's, degrees
+  double blurred_normals = 0;        ///< share of normals that are interpolated over sharp edges
   double blend = 0, refit = 0;       ///< as given or chosen
   Length cell;
   bool refine_sheets = false;  ///< half of it where things are thin
   bool watertight = false;     ///< as given or chosen
   double trim = 0;             ///< R, as given or chosen
+  bool features = false;       ///< as given or chosen
+  bool sharpen = false;        ///< blurred normals are found again
   double longest_rim = 0;      ///< R, of boundary loops to be closed: close_holes as given or chosen
   double finest_cell = 0;
   int levels = 0;

@@ -15,14 +15,15 @@ std::string mesh_settings(const SurfaceSettings& settings) {
   const auto& [input, more_inputs, open, reading, output, more_outputs, receiver, frame, bad_samples, normals,
                normal_search, guess_trade, radius_scale, density, clean, max_radius, blend, refit, steps,
                step_tolerance, fit, diffuse, cell, levels, boundary, cluster, chord, vertex_levels, vertex_curvature,
-               vertex_filled, close_holes, watertight, trim, prune_triangles, prune_size, local, window, dry_run,
-               simplify, volume, tiles] = settings;
+               vertex_filled, close_holes, watertight, trim, features, prune_triangles, prune_size, local, window,
+               dry_run, simplify, volume, tiles] = settings;
   // Jobs of several runs refuse these: require_mesh_alone().
   (void)prune_triangles, (void)prune_size, (void)local, (void)tiles, (void)open, (void)receiver;
   (void)input, (void)more_inputs, (void)output, (void)more_outputs, (void)normals, (void)normal_search,
       (void)guess_trade, (void)window, (void)dry_run;
   (void)simplify;  // is for what joins the parts
   const auto number = [](const std::optional<double>& v) { return v ? fmt::format("{}", *v) : "auto"; };
+  const auto word = [](const std::optional<bool>& v) { return v ? (*v ? "yes" : "no") : "auto"; };
   const std::string frame_word = frame             ? fmt::format("{}", static_cast<int>(*frame))
                                  : volume.wanted() ? "grid"
                                                    : "auto";
@@ -32,12 +33,12 @@ std::string mesh_settings(const SurfaceSettings& settings) {
       "{}\nmax_radius {}\n"
       "blend {}\nrefit {}\nsteps {}\nstep_tolerance {}\nfit {}\ndiffuse {}\ncell {}\nlevels {}\nboundary {}\ncluster "
       "{}\n"
-      "chord {}\nlevel {}\ncurvature {}\nfilled {}\nclose_holes {}\nwatertight {}\ntrim {}\n",
+      "chord {}\nlevel {}\ncurvature {}\nfilled {}\nclose_holes {}\nwatertight {}\ntrim {}\nfeatures {}\n",
       reading.columns, reading.project_degrees, to_string(reading.select), frame_word, static_cast<int>(bad_samples),
       normals_words(settings), cleaning_words(clean), radius_scale, density, to_string(max_radius), number(blend),
       number(refit), steps, step_tolerance, static_cast<int>(fit), diffuse, cell ? to_string(*cell) : "auto", levels,
       boundary, static_cast<int>(cluster), chord, vertex_levels, vertex_curvature, vertex_filled, number(close_holes),
-      watertight ? (*watertight ? "yes" : "no") : "auto", number(trim));
+      word(watertight), number(trim), word(features));
 }
 
 std::uint64_t job_hash(const SurfaceSettings& settings, const std::string& input_id, const ReconstructionPlan& plan) {

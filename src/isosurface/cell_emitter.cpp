@@ -208,12 +208,35 @@ IsoVertex CellEmitter::centre(const std::array<std::int32_t, 3>& origin) const {
   return out;
 }
 
+/// Where a vertex of the loop goes with its cluster.
+LoopSeat CellEmitter::seat(const Point& p, const std::array<std::int32_t, 3>& origin) const {
+  const IsoVertex& v = vertex(p.vertex);
+  const IsoSlab& slab = p.vertex.next() ? *next_ : *here_;
+  const SlabIndex i = v.near_high ? v.high : v.low;
+  const SurfaceCorner& c = i.next() ? next_->corners[i.index()] : slab.corners[i.index()];
+  LoopSeat out;
+  for (int k = 0; k < 3; ++k) out.position[k] = static_cast<float>(c.position[k] - origin[k]) + c.offset[k];
+  out.normal = c.normal;
+  out.crease = c.crease;
+  return out;
+}
+
+/// Cuts `loop_` into triangles; false where no chords can.
+bool CellEmitter::cut(const std::array<std::int32_t, 3>& origin) {
+  outline_.clear();
+  seats_.clear();
+  cut_.clear();
+  for (const Point& p : loop_) {
+    outline_.push_back(p.geometry);
+    seats_.push_back(seat(p, origin));
+  }
+  const bool creased = std::any_of(seats_.begin(), seats_.end(), [](const LoopSeat& s) { return s.crease; });
+  return creased ? cut_loop_along_creases(outline_, seats_, cut_) : cut_loop(outline_, cut_);
+}
+
 /// The triangles of `loop_`.
 void CellEmitter::emit_loop(const std::array<std::int32_t, 3>& origin, TriangleRun& run) {
-  outline_.clear();
-  for (const Point& p : loop_) outline_.push_back(p.geometry);
-  cut_.clear();
-  if (cut_loop(outline_, cut_)) {
+  if (cut(origin)) {
     for (const auto& t : cut_) run.triangles.push_back({loop_[t[0]].vertex, loop_[t[1]].vertex, loop_[t[2]].vertex});
     return;
   }

@@ -72,6 +72,8 @@ class CellEmitter {
   }
   [[nodiscard]] Point locate(const CellCrossing& c, const std::array<std::int32_t, 3>& origin);
   void emit_loop(const std::array<std::int32_t, 3>& origin, TriangleRun& run);
+  [[nodiscard]] LoopSeat seat(const Point& p, const std::array<std::int32_t, 3>& origin) const;
+  bool cut(const std::array<std::int32_t, 3>& origin);
   [[nodiscard]] IsoVertex centre(const std::array<std::int32_t, 3>& origin) const;
   void note_quadrants(int level, const Cell& cell, const CellCrossing& c, SlabIndex i, bool covered) const;
 
@@ -84,6 +86,7 @@ class CellEmitter {
   std::vector<Point> points_;
   std::vector<Point> loop_;
   std::vector<LoopPoint> outline_;
+  std::vector<LoopSeat> seats_;
   std::vector<std::array<std::uint8_t, 3>> cut_;
 };
 

@@ -29,7 +29,8 @@ struct SurfaceCorner {
   /// |projected point - weighted average of the samples| / local support radius; negative where that is not trusted and
   /// the value is extended from neighbours, or uncertain. A corner without any value has a zero normal.
   float offset_from_mean = -1;
-  float overhang = 0;  ///< how far the surface reaches beyond its samples here, support radii (mls/overhang.h)
+  bool crease = false;  ///< the projected point lies on a sharp edge, and the normal is the mean of the sides'
+  float overhang = 0;   ///< how far the surface reaches beyond its samples here, support radii (mls/overhang.h)
 };
 
 /// An isovertex: a minimal edge whose ends have different signs. Owned by the slab that holds the edge's lower end.

@@ -17,6 +17,64 @@ void emit(const std::array<std::array<std::uint8_t, kMaxChordLoop>, kMaxChordLoo
   emit(apex, k, j, triangles);
 }
 
+float chord_length(const std::array<float, 3>& a, const std::array<float, 3>& b) {
+  const float x = a[0] - b[0];
+  const float y = a[1] - b[1];
+  const float z = a[2] - b[2];
+  return std::sqrt(x * x + y * y + z * z);
+}
+
+/// How much of a triangle's area, twice, faces away from the normals of its seats; those on a sharp edge do not count.
+float turned_area(const LoopSeat& a, const LoopSeat& b, const LoopSeat& c) {
+  std::array<float, 3> u;
+  std::array<float, 3> v;
+  for (std::size_t k = 0; k < 3; ++k) {
+    u[k] = b.position[k] - a.position[k];
+    v[k] = c.position[k] - a.position[k];
+  }
+  const std::array<float, 3> area{u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
+  const float size = std::sqrt(area[0] * area[0] + area[1] * area[1] + area[2] * area[2]);
+  float turned = 0;
+  for (const LoopSeat* seat : {&a, &b, &c}) {
+    if (seat->crease) continue;
+    turned += size - (area[0] * seat->normal[0] + area[1] * seat->normal[1] + area[2] * seat->normal[2]);
+  }
+  return turned;
+}
+
+/// The triangulation of least cost, chords (i, j) and triangles (i, k, j), by dynamic programming; no chord may lie in
+/// a face of the cell. False where there is none, or the loop is too long.
+template <typename Chord, typename Across>
+bool cut_cheapest(std::span<const LoopPoint> loop, const Chord& chord, const Across& across,
+                  std::vector<std::array<std::uint8_t, 3>>& triangles) {
+  const std::size_t n = loop.size();
+  if (n > kMaxChordLoop) return false;
+  constexpr float kForbidden = std::numeric_limits<float>::infinity();
+  std::array<std::array<float, kMaxChordLoop>, kMaxChordLoop>
+      cost;  // of cutting the polygon i..j, its own chord included
+  std::array<std::array<std::uint8_t, kMaxChordLoop>, kMaxChordLoop> apex;
+  for (std::size_t i = 0; i + 1 < n; ++i) cost[i][i + 1] = 0;
+  for (std::size_t span = 2; span < n; ++span) {
+    for (std::size_t i = 0; i + span < n; ++i) {
+      const std::size_t j = i + span;
+      cost[i][j] = kForbidden;
+      const bool last = span + 1 == n;
+      if (!last && (loop[i].faces & loop[j].faces) != 0) continue;
+      const float own = last ? 0.0F : chord(i, j);
+      for (std::size_t k = i + 1; k < j; ++k) {
+        const float c = cost[i][k] + cost[k][j] + own + across(i, k, j);
+        if (c < cost[i][j]) {
+          cost[i][j] = c;
+          apex[i][j] = static_cast<std::uint8_t>(k);
+        }
+      }
+    }
+  }
+  if (cost[0][n - 1] == kForbidden) return false;
+  emit(apex, 0, static_cast<std::uint8_t>(n - 1), triangles);
+  return true;
+}
+
 std::uint64_t edge_key(int edge) {
   std::array<int, 3> middle = edge_low_corner(edge);
   for (int& c : middle) c *= 2;
@@ -135,43 +193,33 @@ void LoopTracer::trace() {
 }
 
 bool cut_loop(std::span<const LoopPoint> loop, std::vector<std::array<std::uint8_t, 3>>& triangles) {
-  const std::size_t n = loop.size();
-  if (n == 3) {
+  if (loop.size() == 3) {
     triangles.push_back({0, 1, 2});
     return true;
   }
-  if (n > kMaxChordLoop) return false;
-  constexpr float kForbidden = std::numeric_limits<float>::infinity();
-  std::array<std::array<float, kMaxChordLoop>, kMaxChordLoop>
-      cost;  // of cutting the polygon i..j, its own chord included
-  std::array<std::array<std::uint8_t, kMaxChordLoop>, kMaxChordLoop> apex;
-  for (std::size_t i = 0; i + 1 < n; ++i) cost[i][i + 1] = 0;
-  for (std::size_t span = 2; span < n; ++span) {
-    for (std::size_t i = 0; i + span < n; ++i) {
-      const std::size_t j = i + span;
-      cost[i][j] = kForbidden;
-      float chord = 0;
-      if (span + 1 < n) {
-        if ((loop[i].faces & loop[j].faces) != 0) continue;
-        const auto& a = loop[i].position;
-        const auto& b = loop[j].position;
-        const float x = a[0] - b[0];
-        const float y = a[1] - b[1];
-        const float z = a[2] - b[2];
-        chord = std::sqrt(x * x + y * y + z * z);
-      }
-      for (std::size_t k = i + 1; k < j; ++k) {
-        const float c = cost[i][k] + cost[k][j] + chord;
-        if (c < cost[i][j]) {
-          cost[i][j] = c;
-          apex[i][j] = static_cast<std::uint8_t>(k);
-        }
-      }
-    }
+  return cut_cheapest(
+      loop, [&](std::size_t i, std::size_t j) { return chord_length(loop[i].position, loop[j].position); },
+      [](std::size_t, std::size_t, std::size_t) { return 0.0F; }, triangles);
+}
+
+bool cut_loop_along_creases(std::span<const LoopPoint> loop, std::span<const LoopSeat> seats,
+                            std::vector<std::array<std::uint8_t, 3>>& triangles) {
+  if (loop.size() == 3) {
+    triangles.push_back({0, 1, 2});
+    return true;
   }
-  if (cost[0][n - 1] == kForbidden) return false;
-  emit(apex, 0, static_cast<std::uint8_t>(n - 1), triangles);
-  return true;
+  // Chords decide where triangles do not: in planes, and where seats are clustered into one.
+  constexpr float kChordShare = 1e-3F;
+  float largest = 0;
+  for (std::size_t i = 1; i < seats.size(); ++i)
+    largest = std::max(largest, chord_length(seats[0].position, seats[i].position));
+  return cut_cheapest(
+      loop,
+      [&](std::size_t i, std::size_t j) {
+        return kChordShare * largest * chord_length(seats[i].position, seats[j].position);
+      },
+      [&](std::size_t i, std::size_t k, std::size_t j) { return turned_area(seats[i], seats[k], seats[j]); },
+      triangles);
 }
 
 const std::array<CaseTriangles, 256>& case_table() {

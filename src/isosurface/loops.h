@@ -75,6 +75,18 @@ inline constexpr std::size_t kMaxChordLoop = 24;
 /// longer than kMaxChordLoop: it wants a centre.
 bool cut_loop(std::span<const LoopPoint> loop, std::vector<std::array<std::uint8_t, 3>>& triangles);
 
+/// Where the vertices of a loop go when they are clustered.
+struct LoopSeat {
+  std::array<float, 3> position{};
+  std::array<float, 3> normal{};
+  bool crease = false;  ///< on a sharp edge: it may have triangles that face any way
+};
+
+/// cut_loop() where sharp edges pass the cell: of all triangulations without chords in a face the one whose triangles
+/// keep most to the normals of their seats that lie on no edge, so that an edge is not cut across.
+bool cut_loop_along_creases(std::span<const LoopPoint> loop, std::span<const LoopSeat> seats,
+                            std::vector<std::array<std::uint8_t, 3>>& triangles);
+
 /// Corner i of a cell lies at (i & 1, (i >> 1) & 1, i >> 2); edge e runs along axis e / 4 from the corner whose
 /// coordinates on axes axis + 1 and axis + 2 (cyclic) are the two bits of e % 4.
 struct CaseTriangles {

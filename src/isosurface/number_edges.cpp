@@ -8,8 +8,10 @@
 
 #include "base/resize_anew.h"
 #include "isosurface/crossing.h"
+#include "mls/crease_seats.h"
 #include "mls/extension.h"
 #include "mls/overhang.h"
+#include "mls/sheets.h"
 
 namespace lamina {
 namespace {
@@ -80,6 +82,27 @@ void clamp_to_samples(const float* record, float cell, std::array<float, 3>& off
   for (int i = 0; i < 3; ++i) offset[i] -= back * away[i];
 }
 
+/// Side of the cells in which the finest level that holds a corner measures, steps.
+float cell_of_value(const Window& window, int level, const Cell& corner) {
+  const CornerBlock* const block = window.probe(level, block_of(corner));
+  if (block->shared.test(offset_in_block(corner))) {
+    const FinerCorner finer = finer_corner(window, level, corner);
+    return cell_of_value(window, finer.level, finer.corner);
+  }
+  return static_cast<float>(window.lattice().cell_size(level));
+}
+
+/// Takes the corner's vertex to the sharp edge that its record knows of.
+void put_on_crease(const float* record, float cell, SurfaceCorner& c) {
+  meshes::Vec3 place{};
+  meshes::Vec3 normal{};
+  if (!unpacked_crease(record + kCrease, place, normal)) return;
+  for (int k = 0; k < 3; ++k) c.offset[k] = cell * static_cast<float>(place[k]);
+  c.normal = meshes::to_float(normal);
+  c.curvature = 0;
+  c.crease = true;
+}
+
 /// Fills in the tile's surface corners. Trusted corners are read here, which is what corner_value() answers for them in
 /// the finest level that holds them, without its search.
 void fill_corners(const Window& window, const TileView& tile, DoubtfulPoints points, IsoSlab& out) {
@@ -119,6 +142,9 @@ void fill_corners(const Window& window, const TileView& tile, DoubtfulPoints poi
       c.normal = value.normal;
       c.distance = value.distance;
       c.curvature = value.curvature;
+      if (leaf.creased.test(z * 64 + bit) &&
+          takes_crease(window, tile.level, cell, static_cast<std::int32_t>(out.slab), record()))
+        put_on_crease(record(), cell_of_value(window, tile.level, cell), c);
       c.overhang = overhang(window, tile.level, cell, value.normal);
       for (int a = 0; a < attributes; ++a) out.corner_attributes[a][id] = extra[a];
       out.corners[id++] = c;

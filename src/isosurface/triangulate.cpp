@@ -125,6 +125,15 @@ std::uint64_t beside_busy(const TileView& tile, int z) {
   return around(Slice(tile, &CornerBlock::busy, z)) | around(Slice(tile, &CornerBlock::busy, z + 1));
 }
 
+/// Cells with a corner whose vertex lies on a sharp edge.
+std::uint64_t beside_creased(const TileView& tile, int z) {
+  const auto word = [](const CornerBlock& b, int layer) { return b.creased.words[layer]; };
+  const Corner4 below(tile, z, word);
+  const Corner4 above(tile, z + 1, word);
+  return below.here | below.next_column() | below.next_row() | below.next_both() | above.here | above.next_column() |
+         above.next_row() | above.next_both();
+}
+
 class TilePass {
  public:
   TilePass(BlockCache& cache, std::int32_t slab, IsoSlab& here, IsoSlab& next, const std::array<PlainCase, 256>& cases)
@@ -153,6 +162,7 @@ class TilePass {
         mixed &= ~partial | cells_with(tile, z, valid_edges);
         partial &= mixed;
       }
+      if (mixed != 0) partial |= mixed & beside_creased(tile, z);
       if ((mixed & ~partial) != 0) {
         for (loaded = std::max(loaded, z); loaded <= z + 1; ++loaded) load_edges(tile, loaded);
       }
@@ -163,7 +173,8 @@ class TilePass {
 
  private:
   struct Kinds {
-    std::uint64_t general, mixed, partial;
+    std::uint64_t general, mixed;
+    std::uint64_t partial;  ///< of the mixed ones those that the table does not serve
   };
 
   void load_edges(const TileView& tile, int z) {

@@ -56,6 +56,19 @@ struct Queries {
   Lanes x, y, z;
 };
 
+/// Samples of one sheet, told by their normals: those with n . a >= least for both of two axes a. An axis of zero with
+/// a least of zero or less takes all.
+struct NormalRegion {
+  Queries first, second;
+  Lanes first_least, second_least;
+};
+
+/// Sums over a sheet's samples: Sum up to kSums, without kNearest, and one more.
+inline constexpr int kThickness = kSums;  ///< sum w (p.n)^2
+inline constexpr int kSheetSums = kSums + 1;
+/// Sums of the products of normals' components, w nx nx, nx ny, nx nz, ny ny, ny nz, nz nz; behind them sum w.
+inline constexpr int kMoments = 6;
+
 /// Where the samples spread less than this (support^2) no curvature is estimated: rounding would make it.
 inline constexpr float kFlatSpread = 1e-3F;
 
@@ -131,6 +144,12 @@ struct Kernel {
   /// The same without the samples whose normals point away from a query's `facing`, a vector of any length.
   void (*accumulate_facing)(const TileSamples&, const SampleRange* ranges, int count, const Queries&,
                             const Queries& facing, Lanes* sums);
+  /// Adds the samples of one sheet to its sums (kSheetSums lanes), and to the moments of its normals (kMoments + 1
+  /// lanes).
+  void (*accumulate_sheet)(const TileSamples&, const SampleRange* ranges, int count, const Queries&,
+                           const NormalRegion&, Lanes* sums);
+  void (*accumulate_moments)(const TileSamples&, const SampleRange* ranges, int count, const Queries&,
+                             const NormalRegion&, Lanes* moments);
   void (*fit)(const Lanes* sums, const FitInput&, FitOutput&);
   /// Extends trusted neighbours' planes to the eight corners of row (y, z) of a tile. `cell` in steps; `surrounded2`:
   /// squared distance in cells up to which a corner is surrounded.

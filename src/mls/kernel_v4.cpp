@@ -13,7 +13,7 @@ namespace {
 }  // namespace
 
 Kernel kernel() {
-  return {"x86-64-v4", &accumulate, &accumulate_facing, &fit, &extend};
+  return {"x86-64-v4", &accumulate, &accumulate_facing, &accumulate_sheet, &accumulate_moments, &fit, &extend};
 }
 
 }  // namespace lamina::kernel_v4

@@ -23,6 +23,7 @@ struct Projector::Scratch {
     std::vector<Query> queries;
     TileState state;
     TileFit fit;
+    CreaseState creases;
     ProjectCounts counts;  ///< of the slab
   };
   tbb::enumerable_thread_specific<Local> local;
@@ -145,7 +146,12 @@ class Projector::Level {
       local.rows.gather(lattice_, layers_, blocks[t], bins.of(t), rule_.settings.band);
       steps.accumulate(local.rows);
       for (int pass = 1; pass < rule_.passes() && steps.advance(pass); ++pass) steps.accumulate(local.rows);
-      finish(work_[t], local, local.state);
+      steps.settle();
+      if (rule_.settings.creases) {
+        CreaseFinder finder(rule_, local.queries, local.state, local.creases);
+        for (bool on = finder.start(); on; on = finder.advance()) finder.accumulate(local.rows);
+      }
+      finish(work_[t], local, local.state, local.creases);
     });
   }
 
@@ -158,13 +164,54 @@ class Projector::Level {
       going = begin_pass(pass, going, kept);
       if (going.empty()) break;
       layers_.margin = pass > 0 ? margin() : 0.0F;
-      for (const NumberedBuckets& numbers : batches) add_batch(numbers, going, kept);
+      for (const NumberedBuckets& numbers : batches) {
+        add_batch(numbers, going, [&](std::size_t t, Scratch::Local& local) {
+          TileSteps(rule_, local.queries, kept[t]).accumulate(local.rows);
+        });
+      }
     }
+    std::vector<CreaseState> creases(work_.size());
+    find_creases_in_turns(batches, kept, creases);
     tbb::parallel_for(std::size_t{0}, work_.size(), [&](std::size_t t) {
       Scratch::Local& local = scratch_.local.local();
       list_queries(work_[t], local.queries);
-      finish(work_[t], local, kept[t]);
+      finish(work_[t], local, kept[t], creases[t]);
     });
+  }
+
+  /// Settles the steps and looks for creases, pass by pass.
+  void find_creases_in_turns(const std::vector<NumberedBuckets>& batches, std::vector<TileState>& kept,
+                             std::vector<CreaseState>& creases) {
+    std::vector<std::uint32_t> going(work_.size());
+    std::iota(going.begin(), going.end(), 0U);
+    for (bool first = true; !going.empty(); first = false) {
+      std::vector<std::uint8_t> on(going.size());
+      tbb::parallel_for(std::size_t{0}, going.size(), [&](std::size_t a) {
+        const std::uint32_t t = going[a];
+        Scratch::Local& local = scratch_.local.local();
+        list_queries(work_[t], local.queries);
+        if (first) TileSteps(rule_, local.queries, kept[t]).settle();
+        CreaseFinder finder(rule_, local.queries, kept[t], creases[t]);
+        on[a] = rule_.settings.creases && (first ? finder.start() : finder.advance()) ? 1 : 0;
+      });
+      going = those(going, on);
+      for (const NumberedBuckets& numbers : batches) {
+        if (going.empty()) break;
+        add_batch(numbers, going, [&](std::size_t t, Scratch::Local& local) {
+          list_queries(work_[t], local.queries);
+          CreaseFinder(rule_, local.queries, kept[t], creases[t]).accumulate(local.rows);
+        });
+      }
+    }
+  }
+
+  static std::vector<std::uint32_t> those(const std::vector<std::uint32_t>& tiles,
+                                          const std::vector<std::uint8_t>& on) {
+    std::vector<std::uint32_t> out;
+    for (std::size_t a = 0; a < tiles.size(); ++a) {
+      if (on[a] != 0) out.push_back(tiles[a]);
+    }
+    return out;
   }
 
   /// Those of the tiles that go on.
@@ -178,15 +225,12 @@ class Projector::Level {
       if (pass == 0) steps.start();
       on[a] = pass == 0 || steps.advance(pass) ? 1 : 0;
     });
-    std::vector<std::uint32_t> going;
-    for (std::size_t a = 0; a < tiles.size(); ++a) {
-      if (on[a] != 0) going.push_back(tiles[a]);
-    }
-    return going;
+    return those(tiles, on);
   }
 
-  void add_batch(const NumberedBuckets& numbers, const std::vector<std::uint32_t>& tiles,
-                 std::vector<TileState>& kept) {
+  /// Gathers the samples of a batch for each of the tiles and calls add(tile, local), which finds them in local.rows.
+  template <typename Add>
+  void add_batch(const NumberedBuckets& numbers, const std::vector<std::uint32_t>& tiles, const Add& add) {
     std::vector<Block> blocks;
     blocks.reserve(tiles.size());
     for (const std::uint32_t t : tiles) blocks.push_back(work_[t].tile.block);
@@ -195,14 +239,13 @@ class Projector::Level {
     tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t a) {
       Scratch::Local& local = scratch_.local.local();
       local.rows.gather(lattice_, layers_, blocks[a], bins.of(a), rule_.settings.band);
-      TileSteps(rule_, local.queries, kept[tiles[a]]).accumulate(local.rows);
+      add(tiles[a], local);
     });
   }
 
-  /// `local.queries` are the tile's.
-  void finish(const Work& work, Scratch::Local& local, TileState& state) {
-    TileSteps(rule_, local.queries, state).settle();
-    fit_tile(rule_, state, local.queries, local.fit, local.counts);
+  /// `local.queries` are the tile's; its steps are settled.
+  void finish(const Work& work, Scratch::Local& local, const TileState& state, const CreaseState& creases) {
+    fit_tile(rule_, state, local.queries, creases.found, local.fit, local.counts);
     store_values(window_, level_, work, local.queries, state, local.fit);
   }
 

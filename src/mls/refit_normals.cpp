@@ -11,6 +11,7 @@
 
 #include "base/floor_divide.h"
 #include "mls/row_samples.h"
+#include "samples/consensus_plane.h"
 
 namespace lamina {
 
@@ -53,13 +54,19 @@ std::vector<Placed> place(const LocalSamples& s, std::int32_t cell) {
 struct Scratch {
   RowSamples rows;
   std::array<SampleRange, RowSamples::kRows> ranges{};
+  ConsensusPlane plane;
 };
 
 /// One tile's fits.
 class TileRefit {
  public:
-  TileRefit(const Kernel& kernel, const LocalSamples& samples, Scratch& scratch, UnitNormals& out)
-      : kernel_(kernel), s_(samples), scratch_(scratch), out_(out) {}
+  TileRefit(const Kernel& kernel, bool only_blurred, const ActiveBucket& bucket, Scratch& scratch, UnitNormals& out)
+      : kernel_(kernel),
+        only_blurred_(only_blurred),
+        s_(bucket.samples),
+        support_(bucket.support),
+        scratch_(scratch),
+        out_(out) {}
 
   /// Of the samples of a block of cells so large.
   void fit(const Block& block, std::int32_t cell, std::span<const Placed> placed) {
@@ -90,7 +97,16 @@ class TileRefit {
     const int n = scratch_.rows.ranges(*y_lo, *y_hi, *z_lo, *z_hi, scratch_.ranges.data());
     std::array<Lanes, kSums> sums{};
     sums[kNearest].v.fill(1e30F);
-    kernel_.accumulate_facing(scratch_.rows.samples(), scratch_.ranges.data(), n, at, facing, sums.data());
+    const TileSamples& around = scratch_.rows.samples();
+    if (only_blurred_) {
+      kernel_.accumulate(around, scratch_.ranges.data(), n, at, sums.data());
+      for (std::size_t k = 0; k < placed.size(); ++k) {
+        const int l = static_cast<int>(k);
+        sharpen(placed[k].sample, {at.x[l], at.y[l], at.z[l]}, n, mean_of_normals(sums.data(), l));
+      }
+      return;
+    }
+    kernel_.accumulate_facing(around, scratch_.ranges.data(), n, at, facing, sums.data());
     FitOutput fit{};
     kernel_.fit(sums.data(), FitInput{}, fit);
     for (std::size_t k = 0; k < placed.size(); ++k) {
@@ -98,17 +114,52 @@ class TileRefit {
       const int l = static_cast<int>(k);
       const float along = fit.nx[l] * s_.nx[i] + fit.ny[l] * s_.ny[i] + fit.nz[l] * s_.nz[i];
       const bool keep = !(along > 0) || sums[kSeen][l] < kLeastRefitSamples;
-      out_.x[i] = keep ? s_.nx[i] : fit.nx[l];
-      out_.y[i] = keep ? s_.ny[i] : fit.ny[l];
-      out_.z[i] = keep ? s_.nz[i] : fit.nz[l];
+      put(i, keep ? normal_of(i) : Point{fit.nx[l], fit.ny[l], fit.nz[l]});
     }
+  }
+  using Point = std::array<float, 3>;
+  [[nodiscard]] static float mean_of_normals(const Lanes* sums, int l) {
+    const float x = sums[kNx][l];
+    const float y = sums[kNy][l];
+    const float z = sums[kNz][l];
+    return (x * x + y * y + z * z) / std::max(1e-30F, sums[kW][l] * sums[kW][l]);
+  }
+  /// One sample's normal; it stays where those around are the same, whose mean has this squared length.
+  void sharpen(std::uint32_t i, const Point& at, int ranges, float mean2) {
+    Point normal = normal_of(i);
+    if (mean2 < 1 - kBlurredVariance) {
+      gather(at, support_[i] * inv_, ranges);
+      Point found{};
+      if (scratch_.plane.find(normal, found)) normal = found;
+    }
+    put(i, normal);
+  }
+  void gather(const Point& at, float reach, int ranges) {
+    const TileSamples& s = scratch_.rows.samples();
+    scratch_.plane.neighbours.clear();
+    for (int r = 0; r < ranges; ++r) {
+      for (std::uint32_t i = scratch_.ranges[static_cast<std::size_t>(r)].begin;
+           i < scratch_.ranges[static_cast<std::size_t>(r)].end; ++i) {
+        const Point p{(s.x[i] - at[0]) / reach, (s.y[i] - at[1]) / reach, (s.z[i] - at[2]) / reach};
+        const float d2 = p[0] * p[0] + p[1] * p[1] + p[2] * p[2];
+        if (d2 > 0 && d2 < 1) scratch_.plane.neighbours.push_back(p);
+      }
+    }
+  }
+  [[nodiscard]] Point normal_of(std::uint32_t i) const { return {s_.nx[i], s_.ny[i], s_.nz[i]}; }
+  void put(std::uint32_t i, const Point& normal) {
+    out_.x[i] = normal[0];
+    out_.y[i] = normal[1];
+    out_.z[i] = normal[2];
   }
   [[nodiscard]] float relative(std::int32_t v, std::size_t axis) const {
     return static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(v) - origin_[axis])) * inv_;
   }
 
   const Kernel& kernel_;
+  bool only_blurred_;
   const LocalSamples& s_;
+  const std::vector<float>& support_;
   Scratch& scratch_;
   UnitNormals& out_;
   std::array<std::uint32_t, 3> origin_{};
@@ -184,7 +235,7 @@ UnitNormals RefitNormals::find(std::size_t bucket) {
     Scratch& local = scratch.local();
     constexpr float kNoBand = 1e4F;
     local.rows.gather(lattice_, layers, blocks[t], bins.of(t), kNoBand);
-    TileRefit(kernel_, s, local, out)
+    TileRefit(kernel_, settings_.only_blurred, own.bucket, local, out)
         .fit(blocks[t], cell, std::span(placed).subspan(tiles[t].begin, tiles[t].end - tiles[t].begin));
   });
   return out;

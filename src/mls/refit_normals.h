@@ -14,8 +14,15 @@ namespace lamina {
 /// A fit that turns a normal around, or has fewer samples than this, is no better than what came.
 inline constexpr float kLeastRefitSamples = 6;
 
+/// Variance of the normals around a sample, of length one, up to which none of them can be blurred: they turn by less
+/// than four degrees.
+inline constexpr float kBlurredVariance = 0.0005F;
+
 struct RefitSettings {
-  double support = 0;    ///< radii within which a sample acts; 0: normals stay
+  double support = 0;  ///< radii within which a sample acts; 0: normals stay
+  /// Instead of all normals, noisy ones, only those are replaced that were interpolated over a sharp edge, by those of
+  /// the planes that the samples' neighbours lie on (samples/consensus_plane.h).
+  bool only_blurred = false;
   float max_radius = 0;  ///< a longer radius acts as this, steps, > 0: how far is known before streaming
   int level = 0;         ///< whose cells are about a radius long: only time depends on it
 };

@@ -45,6 +45,29 @@ void keep_to_samples(const Lanes* sums, const FitInput& in, int l, FitOutput& fi
   fit.curvature[l] = 0;
 }
 
+/// Puts what a point's sheets say in place of its fit, provided that it can be trusted.
+void take_crease(const Crease& crease, TileFit& out, ProjectCounts& counts) {
+  const SheetsValue& value = crease.value;
+  const double offset = meshes::norm(value.lean) / crease.support;
+  if (out.seen[crease.query] == 0 || offset > kMostLean) return;
+  FitOutput& fit = out.fits[crease.query / kLanes];
+  const int l = static_cast<int>(crease.query % kLanes);
+  fit.distance[l] = static_cast<float>(value.distance);
+  fit.nx[l] = static_cast<float>(value.normal[0]);
+  fit.ny[l] = static_cast<float>(value.normal[1]);
+  fit.nz[l] = static_cast<float>(value.normal[2]);
+  fit.curvature[l] = static_cast<float>(value.curvature);
+  fit.offset_from_mean[l] = static_cast<float>(offset);
+  fit.lean_x[l] = static_cast<float>(value.lean[0] / crease.support);
+  fit.lean_y[l] = static_cast<float>(value.lean[1] / crease.support);
+  fit.lean_z[l] = static_cast<float>(value.lean[2] / crease.support);
+  counts.trusted += out.trusted[crease.query] == 0 ? 1 : 0;
+  out.trusted[crease.query] = 1;
+  if (!value.creased) return;
+  if (out.creases.empty()) out.creases.resize(out.seen.size());
+  out.creases[crease.query] = packed_crease(value.crease, value.crease_normal);
+}
+
 /// Takes over `seen`, `trusted` and the signs of a layer's shared corners that are active.
 void take_shared(const Window& window, int level, const Tile& tile, int z) {
   CornerBlock& leaf = *tile.leaf;
@@ -55,6 +78,7 @@ void take_shared(const Window& window, int level, const Tile& tile, int z) {
     leaf.seen.words[z] |= one;
     if (from.block->trusted.test(from.offset)) leaf.trusted.words[z] |= one;
     if (from.block->outside.test(from.offset)) leaf.outside.words[z] |= one;
+    if (from.block->creased.test(from.offset)) leaf.creased.words[z] |= one;
   }
 }
 
@@ -67,8 +91,8 @@ void copy_value(const Window& window, const FinerCorner& from, CornerValues& to,
 
 }  // namespace
 
-void fit_tile(const ProjectRule& rule, const TileState& state, const std::vector<Query>& queries, TileFit& out,
-              ProjectCounts& counts) {
+void fit_tile(const ProjectRule& rule, const TileState& state, const std::vector<Query>& queries,
+              const std::vector<Crease>& creases, TileFit& out, ProjectCounts& counts) {
   const ProjectSettings& settings = rule.settings;
   const std::size_t groups = state.all.points.size();
   out.fits.resize(std::max(groups, out.fits.size()));
@@ -96,6 +120,8 @@ void fit_tile(const ProjectRule& rule, const TileState& state, const std::vector
       counts.torn += seen && is_torn(sums, l) ? 1 : 0;
     }
   }
+  out.creases.clear();
+  for (const Crease& c : creases) take_crease(c, out, counts);
 }
 
 void store_values(Window& window, int level, const Work& work, const std::vector<Query>& queries,
@@ -107,7 +133,7 @@ void store_values(Window& window, int level, const Work& work, const std::vector
   const std::size_t channels = kSums + static_cast<std::size_t>(window.attributes());
   for (int z = begin; z < end; ++z) {
     points.seen.words[z] = points.trusted.words[z] = 0;
-    if (corners) leaf.outside.words[z] = 0;
+    if (corners) leaf.outside.words[z] = leaf.creased.words[z] = 0;
   }
   for (std::size_t i = 0; i < queries.size(); ++i) {
     if (fit.seen[i] == 0) continue;
@@ -116,6 +142,7 @@ void store_values(Window& window, int level, const Work& work, const std::vector
     points.seen.words[q.z] |= one;
     if (fit.trusted[i] != 0) points.trusted.words[q.z] |= one;
     if (corners && fit.fits[i / kLanes].distance[static_cast<int>(i % kLanes)] >= 0) leaf.outside.words[q.z] |= one;
+    if (!fit.creases.empty() && fit.creases[i] != std::array<float, 2>{}) leaf.creased.words[q.z] |= one;
   }
   std::array<std::uint16_t, 512> numbers;  // of queries, by place
   for (std::size_t i = 0; i < queries.size(); ++i) {
@@ -153,6 +180,8 @@ void store_values(Window& window, int level, const Work& work, const std::vector
       v[kCurvature] = out.curvature[l] / cell;
       v[kOffsetFromMean] = out.offset_from_mean[l];
       v[kLean] = packed_lean({out.lean_x[l], out.lean_y[l], out.lean_z[l]});
+      v[kCrease] = fit.creases.empty() ? 0.0F : fit.creases[query][0];
+      v[kCreaseEnd] = fit.creases.empty() ? 0.0F : fit.creases[query][1];
       const float inv = 1.0F / sums[kW][l];
       for (int c = 0; c < window.attributes(); ++c) v[kFirstAttribute + c] = sums[kSums + c][l] * inv;
     }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "mls/creases.h"
 #include "mls/overhang.h"
 #include "mls/queries.h"
 
@@ -20,11 +21,13 @@ struct TileFit {
   std::vector<FitOutput> fits;        ///< by group of eight queries; those of unseen groups are left as they were
   std::vector<std::uint8_t> seen;     ///< by query: samples near enough contributed
   std::vector<std::uint8_t> trusted;  ///< by query: the fit is trusted
+  /// By query, packed_crease(); empty where the tile has no creases.
+  std::vector<std::array<float, 2>> creases;
 };
 
-/// Fits all queries of a tile and counts what came of them.
-void fit_tile(const ProjectRule& rule, const TileState& state, const std::vector<Query>& queries, TileFit& out,
-              ProjectCounts& counts);
+/// Fits all queries of a tile, those with creases by their sheets, and counts what came of them.
+void fit_tile(const ProjectRule& rule, const TileState& state, const std::vector<Query>& queries,
+              const std::vector<Crease>& creases, TileFit& out, ProjectCounts& counts);
 
 /// Writes what later stages need into the slab's layers of the block: `seen`, `trusted`, the signs of the seen points'
 /// own distances in `outside` (corners only), and the values, for the seen points alone: `active` becomes `seen`.

@@ -18,8 +18,20 @@ namespace lamina {
 /// distance * normal; curvature is the fit's signed curvature there (1/steps, positive where the surface bends away
 /// from its normal, as a sphere seen from outside); offset from the mean is |projected point - weighted average| in
 /// units of the local support radius. Of a corner that is not trusted the projected point is that average itself (its
-/// offset is the fit's).
-enum Channel : int { kDistance = 0, kNormalX, kNormalY, kNormalZ, kCurvature, kOffsetFromMean, kLean, kFirstAttribute };
+/// offset is the fit's). Where a sharp edge passes the corner the crease channels, two, hold the place and the normal
+/// of its vertex (mls/sheets.h), else zero.
+enum Channel : int {
+  kDistance = 0,
+  kNormalX,
+  kNormalY,
+  kNormalZ,
+  kCurvature,
+  kOffsetFromMean,
+  kLean,
+  kCrease,
+  kCreaseEnd,
+  kFirstAttribute
+};
 
 /// Leaves what it allocates as it is, for values that are written next.
 template <typename T>
@@ -125,6 +137,7 @@ struct CornerBlock : Projected {
   std::array<BlockMask, 3> accepted;  ///< subset of crossing: the isovertex is valid
   BlockMask busy;     ///< cells with an accepted edge of this or a finer level at or above their low corner
   BlockMask surface;  ///< corners at an end of an accepted edge
+  BlockMask creased;  ///< corners whose vertex lies on a sharp edge; written by projection
   std::array<LayerNumbers, 8> numbers{};
 
   /// Cell centres, where diffusion projects those instead of the corners; shared so that a block can be copied.

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "reconstruct/constants.h"
+#include "samples/consensus_plane.h"
 
 namespace lamina {
 namespace {
@@ -54,6 +55,11 @@ StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& surve
   if (out.trim > 0 && survey.noise > kNoisy) out.doubtful = DoubtfulPoints::as_extended;
   if (s.cell) out.feed.cell = *s.cell;
   if (s.refit) out.refit.support = *s.refit;
+  out.projection.creases = s.features.value_or(!s.blend) && !s.diffuse;
+  if (out.projection.creases && !s.refit && survey.noise <= kNoisy && survey.blurred > kBlurred) {
+    out.refit.support = double{kConsensusReach};
+    out.refit.only_blurred = true;
+  }
   // Free clustering joins sheets: a boundary loop may pass through a vertex several times.
   out.holes.longest = s.cluster == ClusterMode::free ? 0 : s.close_holes.value_or(kLongestRim);
   out.holes.mark = s.vertex_filled;

@@ -65,4 +65,7 @@ inline constexpr double kMainCell = 0.7;
 /// Half the side of a counting cell of 16 samples in radii: two radii wide, with room for scatter.
 inline constexpr double kCountingHalfWidth = 1.15;
 
+/// Share of samples with normals interpolated over sharp edges from which on such normals are found again.
+inline constexpr double kBlurred = 0.01;
+
 }  // namespace lamina

@@ -25,6 +25,8 @@ std::string noise_text(const SurfacePlan& plan) {
 std::string normals_text(const SurfaceStats& stats) {
   std::string text = stats.normals ? "normals found" : "normals of the file";
   text += fmt::format(", {:.2g} degrees off the surface", stats.plan.normal_noise);
+  if (stats.plan.sharpen)
+    text += fmt::format(", {:.2g} % interpolated over sharp edges", 100 * stats.plan.blurred_normals);
   return text;
 }
 
@@ -53,6 +55,8 @@ std::string chosen(const SurfaceSettings& s, const SurfacePlan& plan) {
                                        plan.refine_sheets ? " (half of it where things are thin)" : ""));
   add(!s.refit && !s.blend, fmt::format("--refit {:g}", plan.refit));
   add(!s.trim && !s.blend, fmt::format("--trim {:g}", plan.trim));
+  add(!s.features && !s.blend, fmt::format("--features {}{}", plan.features ? "yes" : "no",
+                                           plan.sharpen ? " (and normals found again at edges)" : ""));
   add(!s.close_holes, fmt::format("--close-holes {:g}", plan.longest_rim));
   add(!s.watertight && !s.blend, fmt::format("--watertight {}", plan.watertight ? "yes" : "no"));
   return text.empty() ? text : "\nchosen:" + text;

@@ -10,6 +10,7 @@
 #include "base/output_file.h"
 #include "base/scalar_type.h"
 #include "lamina/error.h"
+#include "meshes/mesh_sink.h"
 #include "reconstruct/stored_cloud.h"
 #include "samples/cleaning.h"
 

@@ -318,7 +318,10 @@ SurfacePlan summary_of(const ReconstructionPlan& p) {
   Eigen::Map<Eigen::Vector3d>(out.noisiest.data()) = p.frame.to_world(Eigen::Vector3f(x, y, z).cast<double>());
   out.normal_noise = static_cast<double>(p.radius.normal_noise) * 180 / std::numbers::pi;
   out.blend = p.feed.blend;
-  out.refit = p.refit.support;
+  out.refit = p.refit.only_blurred ? 0 : p.refit.support;
+  out.blurred_normals = static_cast<double>(p.radius.blurred);
+  out.features = p.projection.creases;
+  out.sharpen = p.refit.only_blurred;
   out.cell = p.feed.cell;
   out.refine_sheets = p.feed.refine_sheets;
   out.watertight = p.holes.watertight;

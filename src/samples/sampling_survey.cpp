@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/hashing.h"
+#include "samples/consensus_plane.h"
 #include "samples/density_octree.h"
 
 namespace lamina {
@@ -254,6 +255,25 @@ class SeedNeighbourhoods {
   std::unordered_map<NoiseCell, std::vector<std::uint32_t>, CellHash> cells_;
 };
 
+/// A normal that lies so far from the surface, 15 degrees, was interpolated over an edge and not over facets.
+constexpr float kBlurredCosine = 0.966F;
+
+/// Whether the normal of the origin is worse than a plane that its neighbours agree on; their places in units of the
+/// neighbourhood.
+bool is_blurred(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& normal, ConsensusPlane& plane) {
+  if (normal.isZero()) return false;
+  constexpr double kNearer = kNeighbourhood / double{kConsensusReach};
+  plane.neighbours.clear();
+  for (const Eigen::Vector3d& p : points) {
+    const Eigen::Vector3f q = (kNearer * p).cast<float>();
+    if (q.squaredNorm() < 1) plane.neighbours.push_back({q.x(), q.y(), q.z()});
+  }
+  const Eigen::Vector3f own = normal.cast<float>();
+  std::array<float, 3> found{};
+  return plane.find({own.x(), own.y(), own.z()}, found) &&
+         found[0] * own.x() + found[1] * own.y() + found[2] * own.z() < kBlurredCosine;
+}
+
 /// The value that the share of all lies below; 0 where there are too few to tell.
 float quantile_of(std::vector<float>& values, double share) {
   if (values.size() < kEnough) return 0;
@@ -286,6 +306,9 @@ Noise survey_noise(const SlabStore& store, const ReadBucket& read, float radius)
   std::vector<float> distances;
   std::vector<float> angles;
   std::vector<Eigen::Vector3d> neighbours;
+  ConsensusPlane plane;
+  std::size_t looked_at = 0;
+  std::size_t blurred = 0;
   Noise noise;
   const bool small = store.total() <= kRuns * kRunSamples;
   for (int run = 0; run < (small ? 1 : kRuns); ++run) {
@@ -299,6 +322,8 @@ Noise survey_noise(const SlabStore& store, const ReadBucket& read, float radius)
     for (const std::size_t seed : around.seeds()) {
       around.gather(seed, neighbours);
       if (neighbours.size() < kLeast) continue;
+      ++looked_at;
+      blurred += is_blurred(neighbours, around.normal(seed), plane) ? 1 : 0;
       const Deviation d = deviation(neighbours, around.normal(seed));
       if (d.distance >= 0) here.push_back(static_cast<float>(d.distance * kNeighbourhood));
       if (d.angle >= 0) angles.push_back(static_cast<float>(d.angle));
@@ -313,6 +338,7 @@ Noise survey_noise(const SlabStore& store, const ReadBucket& read, float radius)
   noise.distance = median_of(distances);
   noise.high = quantile_of(distances, kAllButATenth);
   noise.angle = median_of(angles);
+  if (looked_at >= kEnough) noise.blurred = static_cast<float>(blurred) / static_cast<float>(looked_at);
   return noise;
 }
 
@@ -344,6 +370,7 @@ RadiusSurvey survey_radii(const SlabStore& store, const ReadBucket& read, std::u
   survey.noise = noise.distance;
   survey.normal_noise = noise.angle;
   survey.high_noise = noise.high;
+  survey.blurred = noise.blurred;
   survey.worst_noise = noise.worst;
   survey.noisiest = noise.worst_at;
   return survey;

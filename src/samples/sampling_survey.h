@@ -16,7 +16,10 @@ struct RadiusSurvey {
   float low = 0, median = 0, high = 0;  ///< 1 %, 50 %, 99 % quantiles, steps
   float noise = 0;  ///< median distance of samples from the surface their neighbours suggest, in units of `median`
   float normal_noise = 0;  ///< median angle of samples' normals to that surface's, radians
-  float high_noise = 0;    ///< a tenth of samples lies farther from that surface, in units of `median`
+  /// Share of samples whose normals are far from their neighbours' places and near those of several sides: interpolated
+  /// over a sharp edge (samples/consensus_plane.h).
+  float blurred = 0;
+  float high_noise = 0;  ///< a tenth of samples lies farther from that surface, in units of `median`
   /// The noisiest of a few stretches of the cloud: the median there, and its middle, steps.
   float worst_noise = 0;
   std::array<float, 3> noisiest{};
@@ -38,6 +41,7 @@ RadiusSurvey survey_radii(const SlabStore& store, const ReadBucket& read, std::u
 struct Noise {
   float distance = 0;               ///< in units of the median radius
   float angle = 0;                  ///< of normals, radians, 0 to pi / 2
+  float blurred = 0;                ///< RadiusSurvey::blurred
   float high = 0;                   ///< a tenth of the samples has a larger distance
   float worst = 0;                  ///< median distance in the stretch where it is largest
   std::array<float, 3> worst_at{};  ///< the middle of that stretch, steps

@@ -176,6 +176,30 @@ TEST_F(ChunkIdentity, OfAClosedThingWithHoles) {
   EXPECT_EQ(plan_.blend, 1) << "half cells where things are thin, and all rims closed";
 }
 
+/// A bar with eight long edges and normals that are interpolated over them.
+Cloud octagonal_bar(std::size_t count) {
+  std::mt19937 random(23);
+  std::uniform_real_distribution<> u(-1, 1);
+  Cloud cloud;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double a = static_cast<double>(random() % 8) * std::numbers::pi / 4;
+    const double t = u(random) * std::tan(std::numbers::pi / 8);
+    const double z = 2 * u(random);
+    const double turn = 0.3 * std::pow(t / std::tan(std::numbers::pi / 8), 3);
+    cloud.add({0.4 * (std::cos(a) - t * std::sin(a)), 0.4 * (std::sin(a) + t * std::cos(a)), z},
+              {std::cos(a + turn), std::sin(a + turn), 0});
+  }
+  return cloud;
+}
+
+TEST_F(ChunkIdentity, SharpEdges) {
+  SurfaceSettings s;
+  s.features = true;
+  expect_same(octagonal_bar(12000), s, {2, 7});
+  EXPECT_TRUE(plan_.features);
+  EXPECT_TRUE(plan_.sharpen) << plan_.blurred_normals;
+}
+
 TEST_F(ChunkIdentity, RadiiThatTheInputGives) {
   Cloud cloud = long_cloud(4000);
   cloud.add_property("radius", ScalarType::float32, [](const Point3& p) { return 0.05 + 0.03 * std::sin(5 * p[2]); });

@@ -110,6 +110,52 @@ TEST_P(KernelSums, AreTheDefinition) {
 
 INSTANTIATE_TEST_SUITE_P(Sides, KernelSums, testing::Values(8.0, 2.0, 0.0));
 
+TEST(Kernel, SheetsAreSumsOverARegionOfNormals) {
+  std::mt19937_64 random(7);
+  const TileSamples s = random_samples(random, 150, 0);
+  const auto axes = [&] {
+    return Queries{random_lanes(random, -1, 1), random_lanes(random, -1, 1), random_lanes(random, -1, 1)};
+  };
+  const Queries q{random_lanes(random, 2, 6), random_lanes(random, 2, 6), random_lanes(random, 2, 6)};
+  NormalRegion region{axes(), axes(), random_lanes(random, -1, 0.5), random_lanes(random, -1, 0.5)};
+  region.first.x[0] = region.first.y[0] = region.first.z[0] = region.first_least[0] = 0;  // takes all
+  const std::vector<SampleRange> ranges{{0, 40}, {50, 150}};
+  std::vector<std::vector<Lanes>> of_kernels;
+  for (const Kernel& kernel : available_kernels()) {
+    std::vector<Lanes> sums(kSheetSums + kMoments + 1, Lanes{});
+    kernel.accumulate_sheet(s, ranges.data(), 2, q, region, sums.data());
+    kernel.accumulate_moments(s, ranges.data(), 2, q, region, &sums[kSheetSums]);
+    of_kernels.push_back(sums);
+    for (std::size_t k = 0; k < sums.size(); ++k) EXPECT_TRUE(same_bits(sums[k], of_kernels[0][k])) << kernel.name;
+  }
+  for (int l = 0; l < kLanes; ++l) {
+    std::vector<double> expected(kSheetSums + kMoments + 1, 0.0);
+    for (const SampleRange& r : ranges) {
+      for (std::uint32_t i = r.begin; i < r.end; ++i) {
+        const std::array<double, 3> d{double{s.x[i]} - q.x[l], double{s.y[i]} - q.y[l], double{s.z[i]} - q.z[l]};
+        const std::array<double, 3> n{s.nx[i], s.ny[i], s.nz[i]};
+        const auto along = [&](const Queries& a) { return n[0] * a.x[l] + n[1] * a.y[l] + n[2] * a.z[l]; };
+        const double d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+        const double t = 1 - d2 / (double{s.support[i]} * s.support[i]);
+        if (t <= 0 || along(region.first) < region.first_least[l] || along(region.second) < region.second_least[l])
+          continue;
+        const double w = s.weight[i] * std::pow(t, 4);
+        const double pn = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
+        const std::array<double, kSheetSums> own{w,        w * d[0], w * d[1],   w * d[2], w * n[0],
+                                                 w * n[1], w * n[2], w * d2,     w * pn,   w * s.support[i],
+                                                 0,        1,        w * pn * pn};
+        for (std::size_t k = 0; k < own.size(); ++k) expected[k] += own[k];
+        const std::array<double, kMoments + 1> moments{
+            w * n[0] * n[0], w * n[0] * n[1], w * n[0] * n[2], w * n[1] * n[1], w * n[1] * n[2], w * n[2] * n[2], w};
+        for (std::size_t k = 0; k < moments.size(); ++k) expected[kSheetSums + k] += moments[k];
+      }
+    }
+    for (std::size_t k = 0; k < expected.size(); ++k) {
+      EXPECT_NEAR(of_kernels[0][k][l], expected[k], 1e-3 * (1 + std::abs(expected[k]))) << "sum " << k;
+    }
+  }
+}
+
 TEST(Kernel, SamplesThatFaceAwayDoNotCount) {
   std::mt19937_64 random(5);
   const TileSamples s = random_samples(random, 120, 1);
