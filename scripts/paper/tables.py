@@ -112,6 +112,12 @@ def cells(results):
                   "mean: vertices to truth", "mesh to truth", "truth to mesh", "boundary edges, main part"], rows)
 
 
+def edges(results):
+    rows = [[c["model"], c["name"], *(cost_cells(c["cost"]) + quality_cells(c) if "cost" in c else [c["failed"]] + ["-"] * 10)]
+            for c in results]
+    return table(["", "", "s", "CPU s", "MB"] + QUALITY, rows)
+
+
 SHAPE = {"k triangles": lambda c: f"{c['triangles'] / 1e3:.0f}", "parts": lambda c: c["parts"], "loops": lambda c: c["loops"],
          "ragged": lambda c: f"{c['ragged']:.2f}", "turn": lambda c: f"{c['turn']:.0f}"}
 SURVEY = {"CD": lambda c: f"{c['chamfer']:.1f}", "accuracy": lambda c: f"{c['accuracy']:.1f}",
