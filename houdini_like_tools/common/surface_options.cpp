@@ -57,7 +57,7 @@ void add_fit_options(CLI::App& tool, SurfaceSettings& s) {
           [&s](const std::string& word) { s.features = word == "auto" ? std::nullopt : std::optional(word == "yes"); },
           "Sharp edges and corners where the samples' normals show them; of clean clouds normals that were "
           "interpolated "
-          "over edges are found again; auto: where --blend is auto")
+          "over edges are found again; auto: where --blend is auto and finds a clean cloud")
       ->check(CLI::IsMember({"auto", "yes", "no"}).description(""))
       ->type_name("auto|yes|no")
       ->default_str("auto")

@@ -92,7 +92,8 @@ struct SurfaceSettings {
   std::optional<double> trim;
   /// Sharp edges: where the normals around a corner fall into two or three groups, each is fitted by itself, vertices
   /// are put on the edges and corners where they meet, and normals that a clean cloud has interpolated over such edges
-  /// are found again. Where the data show none nothing changes. Unset: where `blend` is.
+  /// are found again. Where the data show none nothing changes. Unset: where `blend` is and the cloud is
+  /// clean.
   std::optional<bool> features;
   /// Connected parts of the mesh with fewer triangles are dropped. Unset: a two-thousandth of the samples' number, at
   /// most 500; in jobs of several runs, which write no whole mesh, none.

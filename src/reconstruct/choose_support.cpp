@@ -55,8 +55,9 @@ StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& surve
   if (out.trim > 0 && survey.noise > kNoisy) out.doubtful = DoubtfulPoints::as_extended;
   if (s.cell) out.feed.cell = *s.cell;
   if (s.refit) out.refit.support = *s.refit;
-  out.projection.creases = s.features.value_or(!s.blend) && !s.diffuse;
-  if (out.projection.creases && !s.refit && survey.noise <= kNoisy && survey.blurred > kBlurred) {
+  const bool clean = survey.noise <= kNoisy;
+  out.projection.creases = s.features.value_or(!s.blend && clean) && !s.diffuse;
+  if (out.projection.creases && !s.refit && clean && survey.blurred > kBlurred) {
     out.refit.support = double{kConsensusReach};
     out.refit.only_blurred = true;
   }

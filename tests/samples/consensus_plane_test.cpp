@@ -8,22 +8,22 @@
 namespace lamina {
 namespace {
 
-using Point = std::array<float, 3>;
+using Place = std::array<float, 3>;
 
-double degrees_between(const Point& a, const Point& b) {
+double degrees_between(const Place& a, const Place& b) {
   const double c = double{a[0]} * b[0] + double{a[1]} * b[1] + double{a[2]} * b[2];
   return std::acos(std::min(1.0, c)) * 57.29577951308232;
 }
 
 /// Samples of the two faces z = 0, x < edge and x = edge, z < 0 of a block, around the origin.
-std::vector<Point> block_edge(float edge, unsigned seed) {
+std::vector<Place> block_edge(float edge, unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<float> u(-1, 1);
-  std::vector<Point> out;
+  std::vector<Place> out;
   for (int i = 0; i < 70; ++i) {
-    const Point top{u(random), u(random), 0};
+    const Place top{u(random), u(random), 0};
     if (top[0] < edge && top[0] * top[0] + top[1] * top[1] < 1) out.push_back(top);
-    const Point side{edge, u(random), u(random)};
+    const Place side{edge, u(random), u(random)};
     if (side[2] < 0 && side[0] * side[0] + side[1] * side[1] + side[2] * side[2] < 1) out.push_back(side);
   }
   return out;
@@ -36,7 +36,7 @@ TEST(ConsensusPlane, FindsItsOwnSideOfAnEdge) {
     plane.neighbours = block_edge(0.2F, seed);
     for (const float blur : {15.0F, 30.0F, 44.0F}) {
       const float a = blur / 57.29578F;
-      Point normal{};
+      Place normal{};
       ASSERT_TRUE(plane.find({std::sin(a), 0, std::cos(a)}, normal)) << seed;
       EXPECT_LT(degrees_between(normal, {0, 0, 1}), 0.1) << seed << ", blurred by " << blur;
     }
@@ -47,7 +47,7 @@ TEST(ConsensusPlane, LeavesTrueNormalsAlone) {
   ConsensusPlane plane;
   for (unsigned seed = 1; seed <= 50; ++seed) {
     plane.neighbours = block_edge(0.2F, seed);
-    Point normal{};
+    Place normal{};
     EXPECT_FALSE(plane.find({0, 0, 1}, normal)) << seed;
   }
 }
@@ -63,10 +63,10 @@ TEST(ConsensusPlane, LeavesSpheresAlone) {
     while (plane.neighbours.size() < 50) {
       const float x = u(random);
       const float y = u(random);
-      const Point p{x, y, std::sqrt(kRadius * kRadius - x * x - y * y) - kRadius};
+      const Place p{x, y, std::sqrt(kRadius * kRadius - x * x - y * y) - kRadius};
       if (p[0] * p[0] + p[1] * p[1] + p[2] * p[2] < 1) plane.neighbours.push_back(p);
     }
-    Point normal{};
+    Place normal{};
     if (plane.find({0, 0, 1}, normal)) {
       EXPECT_LT(degrees_between(normal, {0, 0, 1}), 1);
     }
@@ -84,12 +84,12 @@ TEST(ConsensusPlane, BendsWithItsSide) {
     for (int i = 0; i < 60; ++i) {
       const float y = u(random);
       const float z = u(random);
-      const Point mantle{std::sqrt(kRadius * kRadius - y * y) - kRadius, y, z};
+      const Place mantle{std::sqrt(kRadius * kRadius - y * y) - kRadius, y, z};
       if (z < 0.1F && mantle[0] * mantle[0] + y * y + z * z < 1) plane.neighbours.push_back(mantle);
-      const Point top{u(random), u(random), 0.1F};
+      const Place top{u(random), u(random), 0.1F};
       if (top[0] < 0 && top[0] * top[0] + top[1] * top[1] < 0.98F) plane.neighbours.push_back(top);
     }
-    Point normal{};
+    Place normal{};
     ASSERT_TRUE(plane.find({0.819F, 0, 0.574F}, normal));
     EXPECT_LT(degrees_between(normal, {1, 0, 0}), 0.5);
   }
@@ -97,7 +97,7 @@ TEST(ConsensusPlane, BendsWithItsSide) {
 
 TEST(ConsensusPlane, WantsNeighbours) {
   ConsensusPlane plane;
-  Point normal{};
+  Place normal{};
   EXPECT_FALSE(plane.find({0, 0, 1}, normal));
   plane.neighbours = {{0.1F, 0, 0}, {0.2F, 0, 0}, {-0.3F, 0, 0}, {0.4F, 0, 0}, {0.5F, 0, 0}, {-0.6F, 0, 0}};
   EXPECT_FALSE(plane.find({0, 0, 1}, normal)) << "all on a line through the sample";
