@@ -137,10 +137,10 @@ void Matching::gather(std::size_t begin, std::size_t end, std::size_t step) {
     const Triangle& t = stars_.triangles()[triangle];
     for (std::size_t k = 0; k < 3; ++k) {  // without branches: chance decides
       const std::uint32_t u = t[k], v = t[(k + 1) % 3];
-      const bool rim = stars_.boundary(u) & stars_.boundary(v);
-      const bool free = (held_[u] | held_[v]) == 0;
+      const unsigned rim = unsigned{stars_.boundary(u)} & unsigned{stars_.boundary(v)};
+      const auto free = static_cast<unsigned>((held_[u] | held_[v]) == 0);
       *out = {u, v};
-      out += static_cast<int>(free & ((u < v) | rim));
+      out += free & (static_cast<unsigned>(u < v) | rim);
     }
   }
   edges_.resize(static_cast<std::size_t>(out - edges_.data()));

@@ -1,0 +1,81 @@
+// The kernel's sums over the samples of a sheet (mls/creases.h); included by kernel_v*.cpp behind kernel_source.h, inside
+// the same namespace. No include guard on purpose.
+
+/// Calls add(i, dx, dy, dz, d2, t, w) for the samples that act on the queries' box; t > 0 and w > 0 in the lanes in
+/// whose region they are.
+template <typename Add>
+void for_region(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query,
+                const NormalRegion& region, const Add& add) {
+  const Vec zero = splat(0.0F);
+  const Vec one = splat(1.0F);
+  Picker picker(s, ranges, count, query);
+  std::array<std::uint32_t, Picker::kMost> picked;
+  while (const int n = picker.next(picked.data())) {
+    for (int k = 0; k < n; ++k) {
+      const std::uint32_t i = picked[k];
+      const Vec dx = splat(s.x[i]) - vec(query.x);
+      const Vec dy = splat(s.y[i]) - vec(query.y);
+      const Vec dz = splat(s.z[i]) - vec(query.z);
+      const Vec d2 = dx * dx + dy * dy + dz * dz;
+      const auto along = [&](const Queries& axis) {
+        return splat(s.nx[i]) * vec(axis.x) + splat(s.ny[i]) * vec(axis.y) + splat(s.nz[i]) * vec(axis.z);
+      };
+      Vec t = one - d2 * splat(s.inv_support2[i]);
+      t = along(region.first) >= vec(region.first_least) ? t : zero;
+      t = along(region.second) >= vec(region.second_least) ? t : zero;
+      const Vec phi = t > zero ? t : zero;
+      const Vec phi2 = phi * phi;
+      add(i, dx, dy, dz, d2, t, splat(s.weight[i]) * (phi2 * phi2));
+    }
+  }
+}
+
+inline void accumulate_sheet(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query,
+                             const NormalRegion& region, Lanes* sums) {
+  std::array<Vec, kSheetSums> sum;
+  for (int k = 0; k < kSheetSums; ++k) sum[k] = vec(sums[k]);
+  for_region(
+      s, ranges, count, query, region,
+      [&](std::uint32_t i, const Vec& dx, const Vec& dy, const Vec& dz, const Vec& d2, const Vec& t, const Vec& w)
+          __attribute__((always_inline)) {
+            const Vec nx = splat(s.nx[i]);
+            const Vec ny = splat(s.ny[i]);
+            const Vec nz = splat(s.nz[i]);
+            const Vec pn = dx * nx + dy * ny + dz * nz;
+            sum[kW] += w;
+            sum[kPx] += w * dx;
+            sum[kPy] += w * dy;
+            sum[kPz] += w * dz;
+            sum[kNx] += w * nx;
+            sum[kNy] += w * ny;
+            sum[kNz] += w * nz;
+            sum[kPP] += w * d2;
+            sum[kPN] += w * pn;
+            sum[kWR] += w * splat(s.support[i]);
+            sum[kSeen] += t > splat(0.0F) ? splat(1.0F) : splat(0.0F);
+            sum[kThickness] += w * pn * pn;
+          });
+  for (int k = 0; k < kSheetSums; ++k) vec(sums[k]) = sum[k];
+}
+
+inline void accumulate_moments(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query,
+                               const NormalRegion& region, Lanes* moments) {
+  std::array<Vec, kMoments + 1> sum;
+  for (int k = 0; k <= kMoments; ++k) sum[k] = vec(moments[k]);
+  for_region(
+      s, ranges, count, query, region,
+      [&](std::uint32_t i, const Vec&, const Vec&, const Vec&, const Vec&, const Vec&, const Vec& w)
+          __attribute__((always_inline)) {
+            const Vec nx = splat(s.nx[i]);
+            const Vec ny = splat(s.ny[i]);
+            const Vec nz = splat(s.nz[i]);
+            sum[0] += w * (nx * nx);
+            sum[1] += w * (nx * ny);
+            sum[2] += w * (nx * nz);
+            sum[3] += w * (ny * ny);
+            sum[4] += w * (ny * nz);
+            sum[5] += w * (nz * nz);
+            sum[kMoments] += w;
+          });
+  for (int k = 0; k <= kMoments; ++k) vec(moments[k]) = sum[k];
+}
