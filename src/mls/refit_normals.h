@@ -19,12 +19,12 @@ inline constexpr float kLeastRefitSamples = 6;
 inline constexpr float kBlurredVariance = 0.0005F;
 
 struct RefitSettings {
-  double support = 0;  ///< radii within which a sample acts; 0: normals stay
+  double support = 0;    ///< radii within which a sample acts; 0: normals stay
+  float max_radius = 0;  ///< a longer radius acts as this, steps, > 0: how far is known before streaming
+  int level = 0;         ///< whose cells are about a radius long: only time depends on it
   /// Instead of all normals, noisy ones, only those are replaced that were interpolated over a sharp edge, by those of
   /// the planes that the samples' neighbours lie on (samples/consensus_plane.h).
   bool only_blurred = false;
-  float max_radius = 0;  ///< a longer radius acts as this, steps, > 0: how far is known before streaming
-  int level = 0;         ///< whose cells are about a radius long: only time depends on it
 };
 
 /// The fit is the projection's (kernel.h) at the sample's own place, with the weights of projection, without the

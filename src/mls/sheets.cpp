@@ -58,17 +58,10 @@ class Surface {
       c_.inner = first;
       return first != Bend::neither;
     }
-    const std::array<Bend, 3> opposite{bend_of(sheets_[1], sheets_[2]), bend_of(sheets_[0], sheets_[2]), first};
-    for (const Bend b : opposite) {
-      if (b == Bend::neither) return false;
+    for (std::size_t third = 3; third-- > 0;) {
+      if (joins_last(third)) return true;
     }
-    // The pair that differs from the two others comes first.
-    std::size_t odd = 2;
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (opposite[k] != opposite[(k + 1) % 3] && opposite[k] != opposite[(k + 2) % 3]) odd = k;
-    }
-    c_ = {{(odd + 1) % 3, (odd + 2) % 3, odd}, opposite[odd], opposite[(odd + 1) % 3]};
-    return true;
+    return false;
   }
 
   [[nodiscard]] double at(const Vec3& x) const {
@@ -78,6 +71,21 @@ class Surface {
     return count_ == 2 ? two : joined(c_.outer, two, sheets_[c_.order[2]].at(x));
   }
   [[nodiscard]] bool holds(const Vec3& x) const { return std::abs(at(x)) <= kOn; }
+
+  /// Whether two sheets meet in an edge that the third one ends. Its own samples may lie on either side of one of them,
+  /// as those of a wall beside a step do.
+  bool joins_last(std::size_t third) {
+    const std::size_t a = (third + 1) % 3;
+    const std::size_t b = (third + 2) % 3;
+    const Bend inner = bend_of(sheets_[a], sheets_[b]);
+    if (inner == Bend::neither) return false;
+    const double over_a = sheets_[third].at(sheets_[a].mean);
+    const double over_b = sheets_[third].at(sheets_[b].mean);
+    const double over = joined(inner, sheets_[a].at(sheets_[third].mean), sheets_[b].at(sheets_[third].mean));
+    if ((over_a < 0) != (over_b < 0) || (over_a < 0) != (over < 0)) return false;
+    c_ = {{a, b, third}, inner, over < 0 ? Bend::convex : Bend::concave};
+    return true;
+  }
 
   /// The point of the edge of two sheets that is nearest to the corner.
   [[nodiscard]] bool edge(std::size_t j, std::size_t k, Vec3& x) const {

@@ -185,7 +185,7 @@ float mean_distance(const Oriented& s, std::size_t place, const Company& company
   return sum / static_cast<float>(kStrayNeighbours);
 }
 
-/// Whether fewer than `least` of the company lie on the surface of a sample.
+/// Whether fewer than `least` of the company lie on the surface of a sample, and too few exactly.
 bool is_off_surface(const Oriented& s, std::size_t place, const Company& company, float least) {
   if (company.count == 0) return true;
   std::array<float, kStrayNeighbours> off;
@@ -199,12 +199,15 @@ bool is_off_surface(const Oriented& s, std::size_t place, const Company& company
     farthest2 = std::max(farthest2, dx * dx + dy * dy + dz * dz);
   }
   const float limit = kNearPlane * std::sqrt(farthest2);
+  const float exact_limit = kOnPlane * std::sqrt(farthest2);
+  std::size_t exact = 0;
   std::size_t along = 0;  // its surface, facing its way
   std::size_t against = 0;
   std::array<float, 3> mean{};  // of all neighbours' normals
   for (std::size_t i = 0; i < company.count; ++i) {
     const std::size_t n = company.places[i];
     const float cosine = s.nx[n] * s.nx[place] + s.ny[n] * s.ny[place] + s.nz[n] * s.nz[place];
+    exact += off[i] <= exact_limit && cosine > kSameWay ? 1 : 0;
     along += off[i] <= limit && cosine > kAlongSurface ? 1 : 0;
     against += off[i] <= limit && cosine < -kAlongSurface ? 1 : 0;
     mean[0] += s.nx[n];
@@ -215,7 +218,7 @@ bool is_off_surface(const Oriented& s, std::size_t place, const Company& company
   const float agreement = std::sqrt(mean[0] * mean[0] + mean[1] * mean[1] + mean[2] * mean[2]) / all;
   // Neighbours that do not agree among themselves say nothing of the way a sample faces.
   if (agreement < kAgreeing) along += against;
-  return static_cast<float>(along) < least * all;
+  return static_cast<float>(along) < least * all && static_cast<float>(exact) < kLeastExact * all;
 }
 
 /// Whether the samples of a leaf lie close together on one plane and face its way: none of them can be a stray.

@@ -27,6 +27,11 @@ inline constexpr float kAgreeing = 0.7F;
 /// A sample lies on no surface when fewer of its neighbours than this share do: of a ball filled at random a third is
 /// near the plane, and a third of those face along it; at a right edge half of them do.
 inline constexpr float kLeastOnSurface = 0.35F;
+/// At the corner of a cube a third of them do, but these exactly: within so little of the plane, facing the same way to
+/// within 25 degrees. Where so large a share does the sample stays; chance puts one in twenty so near.
+inline constexpr float kOnPlane = 0.05F;
+inline constexpr float kSameWay = 0.9F;
+inline constexpr float kLeastExact = 0.2F;
 /// A few strays far from everything but each other have chance company, and most of so few lie near the plane of one of
 /// them. Where fewer neighbours are found than are looked for, though there are many not much farther away, more is
 /// asked for: so many neighbours, so large a share of them on the sample's surface.

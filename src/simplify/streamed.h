@@ -9,18 +9,13 @@
 #include "lamina/simplify.h"
 #include "meshes/mesh_sink.h"
 #include "meshes/writers.h"
+#include "simplify/goal.h"
 
 namespace lamina::simplify {
 
 /// A mesh of no more triangles is held in memory; larger ones are cut into regions of no more. Part of what the result
 /// is, on any machine.
 constexpr std::uint64_t kRegionTriangles = 1'000'000;
-
-/// Throws Error(usage) where not one of the three is given, or out of range.
-void require_goal(const SimplifySettings& settings);
-
-/// How many triangles are wanted of so many; 0 where a bound says it. Throws Error(usage) for more than there are.
-std::uint64_t wanted_triangles(const SimplifySettings& settings, std::uint64_t there);
 
 /// Memory that a simplification takes, about.
 std::uint64_t memory_for(const SimplifySettings& settings, std::uint64_t triangles);
@@ -32,9 +27,6 @@ std::uint64_t memory_for(const SimplifySettings& settings, std::uint64_t triangl
 SimplifyStats simplify_blocks(meshes::MeshBlocks& mesh, const SimplifySettings& settings, const std::string& tmp_dir,
                               const std::function<void(TriangleMesh)>& take, const RunContext& run,
                               std::uint64_t region = kRegionTriangles);
-
-/// What is left to do for a mesh that a run has made: for more triangles than there are nothing, which is said.
-SimplifySettings goal_for(const SimplifySettings& settings, std::uint64_t there, const RunContext& run);
 
 /// Where a mesh may wait that is to become `layout`'s files by write_simplified(): never published.
 std::string unsimplified_path(const MeshSinkSettings& layout);
