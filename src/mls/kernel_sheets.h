@@ -1,5 +1,5 @@
-// The kernel's sums over the samples of a sheet (mls/creases.h); included by kernel_v*.cpp behind kernel_source.h,
-// inside the same namespace. No include guard on purpose.
+// The kernel's sums over the samples of a sheet (mls/creases.h); included by kernel_source.h, inside its namespace. No
+// include guard on purpose.
 
 /// Calls add(i, dx, dy, dz, d2, t, w) for the samples that act on the queries' box; t > 0 and w > 0 in the lanes in
 /// whose region they are.

@@ -201,6 +201,8 @@ inline void accumulate_facing(const TileSamples& s, const SampleRange* ranges, i
                   : accumulate_some<false, true>(s, ranges, count, query, facing, sums);
 }
 
+#include "mls/kernel_sheets.h"
+
 /// Exactly rounded, so the same on all processors.
 inline Vec root(const Vec& v) {
   Vec out;

@@ -9,10 +9,7 @@
 
 namespace lamina::kernel_v3 {
 namespace {
-// clang-format off: the second builds on the first
 #include "mls/kernel_source.h"
-#include "mls/kernel_sheets.h"
-// clang-format on
 }  // namespace
 
 Kernel kernel() {
