@@ -6,7 +6,7 @@ import os
 from paper import models
 
 NAMES = ("anchor", "lordquas", "gear", "lathe")
-CHOICES = {"surface": [], "surface --features no": ["--features", "no"]}
+CHOICES = {"lamina": [], "lamina --features no": ["--features", "no"]}
 PEER = "MeshLab screened Poisson, depth 10"
 
 
