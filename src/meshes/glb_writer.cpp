@@ -154,25 +154,9 @@ GlbColumn colour_column(const GlbColours& colours, const AttributeSpec& red) {
   return column;
 }
 
-/// glTF allows no whole numbers of 32 bits for vertices, and no doubles: those are floats, as they are in memory.
-glb::Component component_of(ScalarType type) {
-  switch (type) {
-    case ScalarType::int8:
-      return glb::kByte;
-    case ScalarType::uint8:
-      return glb::kUbyte;
-    case ScalarType::int16:
-      return glb::kShort;
-    case ScalarType::uint16:
-      return glb::kUshort;
-    default:
-      return glb::kFloat;
-  }
-}
-
 GlbColumn attribute_column(const AttributeLayout& layout, std::size_t attribute, std::set<std::string>& taken) {
   const AttributeSpec& spec = layout[attribute];
-  const glb::Component component = component_of(spec.type);
+  const glb::Component component = glb::component_of(spec.type);
   GlbColumn column{
       glb::semantic_of(spec.name), {{"name", spec.name}, {"componentType", component}, {"type", "SCALAR"}}, 4};
   while (!taken.insert(column.semantic).second) column.semantic += '_';

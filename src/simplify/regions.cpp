@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <deque>
 #include <numeric>
 #include <span>
 #include <utility>
@@ -13,6 +12,7 @@
 #include "lamina/error.h"
 #include "measure/edge_table.h"
 #include "meshes/block_passes.h"
+#include "meshes/vertex_homes.h"
 #include "meshes/vertex_rows.h"
 #include "simplify/stars.h"
 
@@ -49,42 +49,6 @@ class Visitors {
  private:
   std::vector<std::uint32_t> ids_;  ///< ascending
   std::size_t most_ = 1U << 20;
-};
-
-/// The regions of vertices as they are asked for.
-class VertexHomes {
- public:
-  VertexHomes(meshes::MeshBlocks& mesh, const RegionTree& tree)
-      : mesh_(mesh), tree_(tree), blocks_((mesh.vertices() + meshes::kBlockRows - 1) / meshes::kBlockRows) {}
-
-  std::uint32_t of(std::uint32_t vertex) {
-    const Block& block = blocks_[vertex / meshes::kBlockRows];
-    return (block ? block : load(vertex / meshes::kBlockRows))[vertex % meshes::kBlockRows];
-  }
-
- private:
-  using Block = std::unique_ptr<std::uint32_t[]>;
-
-  const Block& load(std::size_t number) {
-    constexpr std::size_t kMostBlocks = 4096;  // 64 MB
-    if (loaded_.size() == kMostBlocks) {
-      blocks_[loaded_.front()].reset();
-      loaded_.pop_front();
-    }
-    const std::uint64_t first = std::uint64_t{number} * meshes::kBlockRows;
-    const std::size_t count = std::min<std::uint64_t>(meshes::kBlockRows, mesh_.vertices() - first);
-    mesh_.read_vertices(first, count, rows_);
-    blocks_[number] = std::make_unique<std::uint32_t[]>(meshes::kBlockRows);
-    for (std::size_t v = 0; v < count; ++v) blocks_[number][v] = tree_.at(rows_.positions[v]);
-    loaded_.push_back(number);
-    return blocks_[number];
-  }
-
-  meshes::MeshBlocks& mesh_;
-  const RegionTree& tree_;
-  std::vector<Block> blocks_;
-  std::deque<std::size_t> loaded_;
-  TriangleMesh rows_;
 };
 
 class MeshRegions final : public Regions {
@@ -137,7 +101,7 @@ class MeshRegions final : public Regions {
   };
 
   void sort_triangles(const RunContext& run) {
-    VertexHomes homes(mesh_, tree_);
+    meshes::VertexHomes homes(mesh_, [this](const meshes::Vec3& at) { return tree_.at(at); });
     std::uint64_t seen = 0;
     meshes::for_triangles(mesh_, [&](const Triangle& t) {
       if (++seen % (1U << 20) == 0) require_running(run);

@@ -254,22 +254,6 @@ void add_colours(ContentWriter& writer, ContentJson& primitive, const TriangleMe
   add_rows(writer, primitive, "COLOR_0", std::move(accessor), rows, order.vertices.size());
 }
 
-/// The component that holds an attribute's type; what glTF has none for, or would not round, is a float.
-glb::Component component_of_tile(ScalarType type) {
-  switch (type) {
-    case ScalarType::int8:
-      return glb::kByte;
-    case ScalarType::uint8:
-      return glb::kUbyte;
-    case ScalarType::int16:
-      return glb::kShort;
-    case ScalarType::uint16:
-      return glb::kUshort;
-    default:
-      return glb::kFloat;
-  }
-}
-
 /// What is no colour, as "_NAME".
 void add_attributes(ContentWriter& writer, ContentJson& primitive, const TriangleMesh& mesh, const TileOrder& order) {
   constexpr int kFloatBits = 15, kAllBits = 23;  // those left out are 0 and compress to nothing
@@ -278,7 +262,7 @@ void add_attributes(ContentWriter& writer, ContentJson& primitive, const Triangl
   for (std::size_t a = 0; a < mesh.layout.size(); ++a) {
     const AttributeSpec& spec = mesh.layout[a];
     if (colours && is_colour(spec.name)) continue;
-    const glb::Component component = component_of_tile(spec.type);
+    const glb::Component component = glb::component_of(spec.type);
     const ScalarType type = component == glb::kFloat ? ScalarType::float32 : spec.type;
     const int bits = is_integer_type(spec.type) ? kAllBits : kFloatBits;
     std::string rows;

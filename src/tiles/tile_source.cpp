@@ -3,53 +3,16 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <deque>
-#include <memory>
 #include <span>
 
 #include "lamina/error.h"
 #include "measure/edge_table.h"
 #include "meshes/block_passes.h"
+#include "meshes/vertex_homes.h"
 #include "meshes/vertex_rows.h"
 
 namespace lamina::tiles {
 namespace {
-
-/// The leaf that each vertex lies in, as they are asked for: neighbours follow each other in meshes that were streamed.
-class VertexLeaves {
- public:
-  VertexLeaves(meshes::MeshBlocks& mesh, const TileOctree& octree)
-      : mesh_(mesh), octree_(octree), blocks_((mesh.vertices() + meshes::kBlockRows - 1) / meshes::kBlockRows) {}
-
-  std::uint32_t of(std::uint32_t vertex) {
-    const auto& block = blocks_[vertex / meshes::kBlockRows];
-    return (block ? block : load(vertex / meshes::kBlockRows))[vertex % meshes::kBlockRows];
-  }
-
- private:
-  using Block = std::unique_ptr<std::uint32_t[]>;
-
-  const Block& load(std::size_t number) {
-    constexpr std::size_t kMostBlocks = 4096;  // 64 MB
-    if (loaded_.size() == kMostBlocks) {
-      blocks_[loaded_.front()].reset();
-      loaded_.pop_front();
-    }
-    const std::uint64_t first = std::uint64_t{number} * meshes::kBlockRows;
-    const std::size_t count = std::min<std::uint64_t>(meshes::kBlockRows, mesh_.vertices() - first);
-    mesh_.read_vertices(first, count, rows_);
-    blocks_[number] = std::make_unique<std::uint32_t[]>(meshes::kBlockRows);
-    for (std::size_t v = 0; v < count; ++v) blocks_[number][v] = octree_.leaf_at(rows_.positions[v]);
-    loaded_.push_back(number);
-    return blocks_[number];
-  }
-
-  meshes::MeshBlocks& mesh_;
-  const TileOctree& octree_;
-  std::vector<Block> blocks_;
-  std::deque<std::size_t> loaded_;
-  TriangleMesh rows_;
-};
 
 /// The one that most corners are in, else the first.
 std::uint32_t leaf_of_triangle(const std::array<std::uint32_t, 3>& homes) {
@@ -71,7 +34,7 @@ TileSource::TileSource(meshes::MeshBlocks& mesh, const TileOctree& octree, const
 }
 
 void TileSource::read(const RunContext& run) {
-  VertexLeaves leaves(mesh_, octree_);
+  meshes::VertexHomes leaves(mesh_, [this](const meshes::Vec3& at) { return octree_.leaf_at(at); });
   std::uint64_t seen = 0;
   meshes::for_triangles(mesh_, [&](const Corners& t) {
     if (++seen % (1U << 20) == 0 && run.cancelled()) throw Error(ExitCode::internal, "cancelled");
