@@ -57,7 +57,7 @@ StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& surve
   if (s.refit) out.refit.support = *s.refit;
   const bool clean = survey.noise <= kNoisy;
   out.projection.creases = s.features.value_or(!s.blend && clean) && !s.diffuse;
-  if (out.projection.creases && !s.refit && clean && survey.blurred > kBlurred) {
+  if (out.projection.creases && !s.refit && survey.noise <= kExact && survey.blurred > kBlurred) {
     out.refit.support = double{kConsensusReach};
     out.refit.only_blurred = true;
   }

@@ -67,5 +67,7 @@ inline constexpr double kCountingHalfWidth = 1.15;
 
 /// Share of samples with normals interpolated over sharp edges from which on such normals are found again.
 inline constexpr double kBlurred = 0.01;
+/// Median residual (r) up to which positions are exact enough to judge normals by: rough detail has more.
+inline constexpr double kExact = 0.01;
 
 }  // namespace lamina
