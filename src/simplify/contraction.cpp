@@ -12,10 +12,16 @@ using namespace meshes;
 constexpr double kLeastCosine = 0.2;  ///< a triangle turns no farther at one contraction
 constexpr double kSliver = 0.05;      ///< no contraction makes triangles worse than this (1: equilateral)
 
-/// Squared: 1 for equilateral triangles, 0 for those without area.
-double shape2(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& twice_area) {
-  const double sides = dot(b - a, b - a) + dot(c - b, c - b) + dot(a - c, a - c);
-  return 12 * dot(twice_area, twice_area) / (sides * sides);
+/// Four times the squared area of a triangle over the square of the sum of its squared sides: 1/12 where it is
+/// equilateral, 0 where it has no area.
+struct Shape {
+  double area, sides;
+  [[nodiscard]] bool at_least(double quality) const { return 12 * area >= quality * quality * sides * sides; }
+  [[nodiscard]] bool worse_than(const Shape& o) const { return area * o.sides * o.sides < o.area * sides * sides; }
+};
+
+Shape shape_of(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& twice_area) {
+  return {dot(twice_area, twice_area), dot(b - a, b - a) + dot(c - b, c - b) + dot(a - c, a - c)};
 }
 
 }  // namespace
@@ -42,10 +48,9 @@ bool keeps_shape(const Stars& stars, std::span<const Vec3> positions, std::uint3
       const Vec3 &p = positions[t[(k + 1) % 3]], &q = positions[t[(k + 2) % 3]];
       const Vec3 before = cross(p - from, q - from), after = cross(p - to, q - to);
       const double along = dot(before, after);
-      if (!(along > 0 && along * along > kLeastCosine * kLeastCosine * dot(before, before) * dot(after, after)))
-        return false;
-      const double shape = shape2(to, p, q, after);
-      if (!(shape >= kSliver * kSliver) && shape < shape2(from, p, q, before)) return false;
+      const Shape shape = shape_of(to, p, q, after);
+      if (!(along > 0 && along * along > kLeastCosine * kLeastCosine * dot(before, before) * shape.area)) return false;
+      if (!shape.at_least(kSliver) && shape.worse_than(shape_of(from, p, q, before))) return false;
     }
   }
   return true;

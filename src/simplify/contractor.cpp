@@ -5,23 +5,32 @@
 #include <utility>
 
 #include "simplify/contraction.h"
+#include "simplify/proof.h"
 
 namespace lamina::simplify {
 
 using namespace meshes;
+
+namespace {
+constexpr int kAttempts = 3;  ///< to go on where contractions were taken back
+}  // namespace
 
 Contractor::Contractor(Piece piece)
     : piece_(std::move(piece)),
       stars_(std::move(piece_.triangles), piece_.positions.size()),
       size_(stars_.triangles().size()),
       version_(piece_.positions.size()) {
-  if (piece_.bound > 0) tracker_.emplace(piece_.positions, stars_.triangles(), std::move(piece_.errors), piece_.bound);
+  if (piece_.bound > 0) {
+    old_.emplace(piece_.positions, stars_.triangles(), std::move(piece_.errors), piece_.bound);
+    tracker_.emplace(*old_);
+    change_.assign(size_, kNone);
+  }
   later_.reserve(2 * size_);
   for (std::uint32_t u = 0; u < version_.size(); ++u) {
     if (piece_.fixed[u] != 0) continue;
     stars_.neighbours(u, near_);
     for (const std::uint32_t v : near_) {
-      if (u < v) offer(u, v);
+      if (u < v && !(tried(u) && tried(v))) offer(u, v);
     }
   }
 }
@@ -95,16 +104,17 @@ std::uint64_t Contractor::run(float dearest, std::uint64_t keep) {
     heap_.pop_back();
     if (!stars_.contractible(e.u, e.v)) continue;
     const Placed to = place(e.u, e.v);
-    if (!keeps_shape(stars_, piece_.positions, e.u, e.v, to.at) || (tracker_ && !stays_near(e.u, e.v, to))) continue;
+    if (!keeps_shape(stars_, piece_.positions, e.u, e.v, to.at) || (old_ && !stays_near(e.u, e.v, to))) continue;
     const double weight = piece_.quadrics[e.u].weight() + piece_.quadrics[e.v].weight();
     if (weight > 0) deviation2_ = std::max(deviation2_, to.cost / weight);
     size_ -= static_cast<std::uint64_t>(contract(e.u, e.v, to.at));
-    if (tracker_) tracker_->accept();
+    if (old_) tracker_->accept();
   }
   return before - size_;
 }
 
-/// Within the bound? Where the root mean square of the planes' distances is far beyond it, nothing is proved any more.
+/// Within the bound, as it seems? Where the root mean square of the planes' distances is far beyond it, nothing is
+/// asked any more.
 bool Contractor::stays_near(std::uint32_t u, std::uint32_t v, const Placed& to) {
   const Vec3 edge = piece_.positions[v] - piece_.positions[u];
   const double of_noise = 16 * kNormalNoise * kNormalNoise * dot(edge, edge);  // counted in the cost, too
@@ -115,6 +125,7 @@ bool Contractor::stays_near(std::uint32_t u, std::uint32_t v, const Placed& to) 
 
 int Contractor::contract(std::uint32_t u, std::uint32_t v, const Vec3& to) {
   const double share = share_along(piece_.positions[u], piece_.positions[v], to);
+  if (old_) note(u, v);
   merges_.push_back({u, v, static_cast<float>(share)});
   piece_.positions[u] = to;
   piece_.quadrics[u] += piece_.quadrics[v];
@@ -123,6 +134,87 @@ int Contractor::contract(std::uint32_t u, std::uint32_t v, const Vec3& to) {
   stars_.neighbours(u, near_);
   for (const std::uint32_t w : near_) offer(u, w);
   return gone;
+}
+
+void Contractor::note(std::uint32_t u, std::uint32_t v) {
+  steps_.push_back({u, v, piece_.positions[u], piece_.quadrics[u], stars_.before(u, v), earlier_.size()});
+  const auto number = static_cast<std::uint32_t>(steps_.size() - 1);
+  stars_.for_touched(steps_.back().before, [&](std::uint32_t triangle) {
+    earlier_.push_back(change_[triangle]);
+    change_[triangle] = number;
+  });
+}
+
+void Contractor::prove() {
+  if (!old_) return;
+  if (!steps_.empty()) {
+    keep_bound();
+  } else {
+    errors_ = std::move(old_->errors);
+  }
+  std::erase_if(merges_, [](const Merge& merge) { return merge.u == kNone; });
+  heap_ = {};
+  later_ = {};
+  old_.reset();
+  tracker_.reset();
+  steps_ = {};
+  change_ = {};
+  earlier_ = {};
+}
+
+void Contractor::keep_bound() {
+  Proof proof(*old_, {stars_, piece_.positions, tracker_->homes(), change_});
+  for (int attempt = 0;; ++attempt) {
+    const std::vector<std::uint32_t>& failures = proof.find_failures();
+    if (failures.empty()) break;
+    for (const std::uint32_t triangle : failures) tracker_->tighten(triangle);
+    std::vector<std::uint32_t> touched;
+    for (const std::uint32_t triangle : failures) {
+      if (stars_.alive(triangle) && change_[triangle] != kNone) take_back(change_[triangle], touched);
+    }
+    if (attempt < kAttempts) go_on(touched);
+    proof.forget(touched);
+  }
+  errors_ = proof.errors();
+}
+
+/// Contractions of what has been taken back are tried again, and what they touch is added.
+void Contractor::go_on(std::vector<std::uint32_t>& touched) {
+  std::vector<std::uint32_t> vertices;
+  for (const std::uint32_t triangle : touched) {
+    if (!stars_.alive(triangle)) continue;
+    for (const std::uint32_t v : stars_.triangles()[triangle]) vertices.push_back(v);
+  }
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  for (const std::uint32_t v : vertices) ++version_[v];
+  for (const std::uint32_t v : vertices) {
+    stars_.neighbours(v, near_);
+    for (const std::uint32_t w : near_) {
+      if (v < w || !std::binary_search(vertices.begin(), vertices.end(), w)) offer(v, w);
+    }
+  }
+  const std::size_t before = steps_.size();
+  run(std::numeric_limits<float>::max(), 0);
+  for (std::size_t step = before; step < steps_.size(); ++step)
+    stars_.for_touched(steps_[step].before, [&](std::uint32_t triangle) { touched.push_back(triangle); });
+}
+
+/// And first those behind it that changed its triangles.
+void Contractor::take_back(std::uint32_t step, std::vector<std::uint32_t>& touched) {
+  const Step& s = steps_[step];
+  std::vector<std::uint32_t> triangles;
+  stars_.for_touched(s.before, [&](std::uint32_t triangle) { triangles.push_back(triangle); });
+  for (const std::uint32_t triangle : triangles) {
+    while (change_[triangle] != step) take_back(change_[triangle], touched);
+  }
+  size_ += static_cast<std::uint64_t>(stars_.revert(s.u, s.v, s.before));
+  piece_.positions[s.u] = s.place;
+  piece_.quadrics[s.u] = s.quadric;
+  merges_[step].u = kNone;
+  for (std::size_t i = triangles.size(); i-- > 0;) change_[triangles[i]] = earlier_[s.changes + i];
+  tracker_->settle(stars_, piece_.positions, triangles);
+  touched.insert(touched.end(), triangles.begin(), triangles.end());
 }
 
 }  // namespace lamina::simplify

@@ -62,6 +62,7 @@ bool Cover::prove(const std::array<Vec3, 3>& triangle, double error, std::span<c
     Cut cut{};
     bool found = false;
     for (std::size_t first = 0; first < polygon.size && !found; ++first) found = choose_cut(polygon, first, cut);
+    if (!found) found = halve(polygon, cut);
     if (!found || cuts-- <= 0 || !split(polygon, cut)) return false;
   }
   error_ += error;
@@ -122,14 +123,21 @@ void Cover::ask(std::size_t facet, Corner& corner) const {
   corner.distance[facet] = float_above(d + f.error);
 }
 
-/// False where it is near no facet.
-bool Cover::add_corner(const Vec3& at) {
+/// Between two others. False where it is near no facet. What both are near, so is it.
+bool Cover::add_corner(std::size_t from, std::size_t to, double share) {
   if (held_ == corners_.size()) corners_.resize(2 * held_);
+  const Corner &a = corners_[from], &b = corners_[to];
   Corner& corner = corners_[held_++];
-  corner.at = at;
-  corner.local = to_float(at - origin_);
-  corner.near = 0;
-  for (std::size_t f = 0; f < facets_.size(); ++f) ask(f, corner);
+  corner.at = a.at + share * (b.at - a.at);
+  corner.local = to_float(corner.at - origin_);
+  corner.near = a.near & b.near;
+  for (std::uint64_t left = corner.near; left != 0; left &= left - 1) {
+    const auto f = static_cast<std::size_t>(std::countr_zero(left));
+    corner.distance[f] = std::max(a.distance[f], b.distance[f]);
+  }
+  for (std::size_t f = 0; f < facets_.size(); ++f) {
+    if ((corner.near >> f & 1U) == 0) ask(f, corner);
+  }
   return corner.near != 0;
 }
 
@@ -188,6 +196,19 @@ bool Cover::choose_cut(const Polygon& polygon, std::size_t first, Cut& cut) cons
   return most_near > 0;
 }
 
+/// Across the longest side, where none of the facets' sides will do.
+bool Cover::halve(const Polygon& polygon, Cut& cut) const {
+  double longest2 = 0;
+  for (std::size_t i = 0; i < polygon.size; ++i) {
+    const Vec3 &a = corners_[polygon.corners[i]].at, &b = corners_[polygon.corners[(i + 1) % polygon.size]].at;
+    const Vec3 side = b - a;
+    if (dot(side, side) <= longest2) continue;
+    longest2 = dot(side, side);
+    cut = {side, 0.5 * dot(side, a + b)};
+  }
+  return longest2 > 0;
+}
+
 bool Cover::split(const Polygon& polygon, const Cut& cut) {
   Polygon below, above;
   const auto add = [](Polygon& p, std::size_t corner) {
@@ -203,9 +224,8 @@ bool Cover::split(const Polygon& polygon, const Cut& cut) {
     if (dx <= 0) add(below, polygon.corners[i]);
     if (dx >= 0) add(above, polygon.corners[i]);
     if ((dx < 0 && dy > 0) || (dx > 0 && dy < 0)) {
-      const Vec3 x = corners_[polygon.corners[i]].at, y = corners_[polygon.corners[next]].at;
-      if (held_ > std::numeric_limits<std::uint16_t>::max() || !add_corner(x + (dx / (dx - dy)) * (y - x)))
-        return false;
+      const std::size_t from = polygon.corners[i], to = polygon.corners[next];
+      if (held_ > std::numeric_limits<std::uint16_t>::max() || !add_corner(from, to, dx / (dx - dy))) return false;
       add(below, held_ - 1);
       add(above, held_ - 1);
     }

@@ -86,10 +86,11 @@ class Cover {
   };
   enum class Answer { near, far, open };
   Answer ask_at_once(const std::array<meshes::Vec3, 3>& triangle);
-  bool add_corner(const meshes::Vec3& at);
+  bool add_corner(std::size_t from, std::size_t to, double share);
   void ask(std::size_t facet, Corner& corner) const;
   bool take(const Polygon& polygon);
   bool choose_cut(const Polygon& polygon, std::size_t first, Cut& cut) const;
+  bool halve(const Polygon& polygon, Cut& cut) const;
   bool split(const Polygon& polygon, const Cut& cut);
   void use(std::size_t facet, float error);
 

@@ -37,6 +37,7 @@ RegionFile::Place RegionFile::append(const RegionMesh& part) {
   write(part.quadrics);
   write(part.mesh.triangles);
   write(part.errors);
+  write(part.tried);
   return place;
 }
 
@@ -51,7 +52,10 @@ RegionMesh RegionFile::read(const Place& place) const {
   from.read(part.ids, place.vertices);
   from.read(part.quadrics, place.vertices);
   from.read(part.mesh.triangles, place.triangles);
-  if (bound_) from.read(part.errors, place.triangles);
+  if (bound_) {
+    from.read(part.errors, place.triangles);
+    from.read(part.tried, place.vertices);
+  }
   return part;
 }
 

@@ -7,8 +7,8 @@
 
 #include "base/spill_file.h"
 #include "lamina/mesh.h"
+#include "simplify/old_mesh.h"
 #include "simplify/quadric.h"
-#include "simplify/tracker.h"
 
 namespace lamina::simplify {
 
@@ -18,6 +18,7 @@ struct RegionMesh {
   std::vector<std::uint32_t> ids;      ///< of the vertices, in the whole mesh
   std::vector<Quadric> quadrics;       ///< of the vertices, about their places; the quadrics of all copies add up
   std::vector<Errors> errors;          ///< of the triangles; empty without a bound
+  std::vector<std::uint8_t> tried{};   ///< WorkMesh::tried; empty without a bound
   std::vector<std::uint8_t> locked{};  ///< vertices that other regions have or may have; not written
 };
 

@@ -177,6 +177,7 @@ class Extract {
     for (const std::uint32_t v : vertices) {
       number_[v] = kNone;
       part.ids.push_back(from_.ids[v]);
+      if (!from_.tried.empty()) part.tried.push_back(from_.tried[v]);
       part.mesh.positions.push_back(from_.mesh.positions[v]);
       if (!from_.mesh.normals.empty()) part.mesh.normals.push_back(from_.mesh.normals[v]);
       for (std::size_t a = 0; a < part.mesh.attributes.size(); ++a)
@@ -243,6 +244,7 @@ class PartRegions final : public Regions {
     add(all.ids, part.ids);
     add(all.quadrics, part.quadrics);
     add(all.errors, part.errors);
+    add(all.tried, part.tried);
     add(all.mesh.positions, part.mesh.positions);
     add(all.mesh.normals, part.mesh.normals);
     all.mesh.layout = part.mesh.layout;
@@ -268,6 +270,7 @@ class PartRegions final : public Regions {
         sorted.quadrics.back() += part.quadrics[v];
       } else {
         sorted.ids.push_back(part.ids[v]);
+        if (!part.tried.empty()) sorted.tried.push_back(part.tried[v]);
         sorted.quadrics.push_back(part.quadrics[v]);
         sorted.mesh.positions.push_back(part.mesh.positions[v]);
         if (!part.mesh.normals.empty()) sorted.mesh.normals.push_back(part.mesh.normals[v]);

@@ -44,8 +44,7 @@ double share_of_round(int round) {
 
 class Round {
  public:
-  /// `stride`: only every so manieth piece is made, for costs() alone.
-  Round(WorkMesh& work, double share, std::size_t stride = 1) : work_(work), size_(work.mesh.triangles.size()) {
+  Round(WorkMesh& work, double share) : work_(work), size_(work.mesh.triangles.size()) {
     std::vector<Centre> centres(size_);
     tbb::parallel_for(std::size_t{0}, size_, [&](std::size_t t) {
       const Triangle& c = work.mesh.triangles[t];
@@ -55,13 +54,16 @@ class Round {
     starts_ = cut_into_boxes(centres, kPieceTriangles, share);
     order_.resize(size_);
     for (std::size_t i = 0; i < size_; ++i) order_[i] = centres[i].triangle;
-    build(stride);
+    pieces_.resize(starts_.size() - 1);
+    vertices_.resize(pieces_.size());
+    find_owners();
   }
 
   [[nodiscard]] std::uint64_t size() const { return size_; }
 
   /// False when no edge can go any more.
   bool reduce(std::uint64_t goal, bool exactly, const RunContext& run) {
+    make_pieces();
     const auto in_parallel = static_cast<std::uint64_t>(kInTurn * static_cast<double>(goal));
     float dearest = 0;
     const std::uint64_t odd = 2 * pieces_.size();  // what rounding up and contractions by two may take beside
@@ -88,6 +90,7 @@ class Round {
 
   /// What costs no more than `limit`; of a piece at least a small share stays.
   void reduce_below(float limit, const RunContext& run) {
+    make_pieces();
     tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
       Contractor& c = *pieces_[p];
       const std::uint64_t keep = c.size() / kPieceKeeps;
@@ -99,11 +102,12 @@ class Round {
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
   }
 
-  /// Of the pieces that were made.
-  CostCurve costs() {
+  /// Of every so manieth piece.
+  CostCurve costs(std::size_t stride) {
     std::vector<CostCurve> curves(pieces_.size());
     tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
-      if (!pieces_[p]) return;
+      if (p % stride != stride / 2 && pieces_.size() > stride / 2) return;
+      make_piece(p);
       Contractor& c = *pieces_[p];
       const auto& fixed = c.piece().fixed;
       curves[p].expect(2 * static_cast<std::uint64_t>(std::count(fixed.begin(), fixed.end(), 0)));
@@ -118,14 +122,17 @@ class Round {
     return all;
   }
 
-  /// As far as pieces go.
+  /// As far as the bound goes. Pieces are made one after the other: proofs take memory.
   void exhaust(const RunContext& run) {
     tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
+      if (run.cancelled()) return;
+      make_piece(p);
       Contractor& c = *pieces_[p];
-      while (!run.cancelled() &&
-             c.run(std::numeric_limits<float>::max(), c.size() - std::max<std::uint64_t>(c.size() / 8, 1)) > 0) {
+      for (float dearest = 0; !run.cancelled() && !std::isinf(c.next_cost());) {
+        dearest = std::max(c.next_cost(), 2 * dearest);
+        c.run(dearest, 0);
       }
-      c.rest();
+      c.prove();
     });
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
   }
@@ -151,56 +158,60 @@ class Round {
   }
 
  private:
+  static constexpr std::uint32_t kSeveral = kNone - 1;
+
   [[nodiscard]] const Vec3& at(std::uint32_t v) const { return work_.mesh.positions[v]; }
   [[nodiscard]] std::span<const std::uint32_t> triangles_of(std::size_t piece) const {
     return {order_.data() + starts_[piece], starts_[piece + 1] - starts_[piece]};
   }
 
-  void build(std::size_t stride) {
-    const auto& triangles = work_.mesh.triangles;
-    constexpr std::uint32_t kSeveral = kNone - 1;
-    std::vector<std::uint32_t> owner(work_.mesh.positions.size(), kNone);
+  /// Which piece has all triangles of a vertex.
+  void find_owners() {
+    owner_.assign(work_.mesh.positions.size(), kNone);
     for (std::uint32_t p = 0; p + 1 < starts_.size(); ++p) {
       for (const std::uint32_t t : triangles_of(p)) {
-        for (const std::uint32_t v : triangles[t]) owner[v] = owner[v] == kNone || owner[v] == p ? p : kSeveral;
+        for (const std::uint32_t v : work_.mesh.triangles[t])
+          owner_[v] = owner_[v] == kNone || owner_[v] == p ? p : kSeveral;
       }
     }
-    pieces_.resize(starts_.size() - 1);
-    vertices_.resize(pieces_.size());
-    tbb::enumerable_thread_specific<std::vector<std::uint32_t>> numbers(
-        [&] { return std::vector<std::uint32_t>(owner.size(), kNone); });
-    tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
-      if (p % stride != stride / 2 && pieces_.size() > stride / 2) return;
-      std::vector<std::uint32_t>& number = numbers.local();
-      std::vector<std::uint32_t>& vertices = vertices_[p];
-      Piece piece;
-      piece.centre = work_.centre;
-      piece.floats = work_.floats;
-      piece.bound = work_.bound;
-      piece.triangles.reserve(triangles_of(p).size());
-      for (const std::uint32_t t : triangles_of(p)) {
-        Triangle local = triangles[t];
-        for (std::uint32_t& v : local) {
-          if (number[v] == kNone) {
-            number[v] = static_cast<std::uint32_t>(vertices.size());
-            vertices.push_back(v);
-          }
-          v = number[v];
+  }
+
+  void make_pieces() {
+    tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) { make_piece(p); });
+  }
+
+  void make_piece(std::size_t p) {
+    std::vector<std::uint32_t>& number = numbers_.local();
+    if (number.empty()) number.resize(owner_.size(), kNone);
+    std::vector<std::uint32_t>& vertices = vertices_[p];
+    Piece piece;
+    piece.centre = work_.centre;
+    piece.floats = work_.floats;
+    piece.bound = work_.bound;
+    piece.triangles.reserve(triangles_of(p).size());
+    for (const std::uint32_t t : triangles_of(p)) {
+      Triangle local = work_.mesh.triangles[t];
+      for (std::uint32_t& v : local) {
+        if (number[v] == kNone) {
+          number[v] = static_cast<std::uint32_t>(vertices.size());
+          vertices.push_back(v);
         }
-        piece.triangles.push_back(local);
-        if (work_.bound > 0) piece.errors.push_back(work_.errors[t]);
+        v = number[v];
       }
-      piece.positions.reserve(vertices.size());
-      piece.quadrics.reserve(vertices.size());
-      piece.fixed.reserve(vertices.size());
-      for (const std::uint32_t v : vertices) {
-        number[v] = kNone;
-        piece.positions.push_back(at(v));
-        piece.quadrics.push_back(work_.quadrics[v]);
-        piece.fixed.push_back(owner[v] == kSeveral || (!work_.locked.empty() && work_.locked[v] != 0) ? 1 : 0);
-      }
-      pieces_[p] = std::make_unique<Contractor>(std::move(piece));
-    });
+      piece.triangles.push_back(local);
+      if (work_.bound > 0) piece.errors.push_back(work_.errors[t]);
+    }
+    piece.positions.reserve(vertices.size());
+    piece.quadrics.reserve(vertices.size());
+    piece.fixed.reserve(vertices.size());
+    for (const std::uint32_t v : vertices) {
+      number[v] = kNone;
+      piece.positions.push_back(at(v));
+      piece.quadrics.push_back(work_.quadrics[v]);
+      if (!work_.tried.empty()) piece.tried.push_back(work_.tried[v]);
+      piece.fixed.push_back(owner_[v] == kSeveral || (!work_.locked.empty() && work_.locked[v] != 0) ? 1 : 0);
+    }
+    pieces_[p] = std::make_unique<Contractor>(std::move(piece));
   }
 
   /// One contraction after the other, the cheapest of all pieces.
@@ -238,6 +249,7 @@ class Round {
       if (c.piece().fixed[v] != 0) continue;
       mesh.positions[vertices[v]] = c.piece().positions[v];
       work_.quadrics[vertices[v]] = c.piece().quadrics[v];
+      if (work_.bound > 0) work_.tried[vertices[v]] = 1;
     }
     const auto where = triangles_of(p);
     if (work_.bound > 0) {
@@ -256,8 +268,10 @@ class Round {
   std::uint64_t size_;
   std::vector<std::size_t> starts_;                   ///< of the pieces in `order_`
   std::vector<std::uint32_t> order_;                  ///< triangles by piece
+  std::vector<std::uint32_t> owner_;                  ///< of vertices, a piece or kSeveral
   std::vector<std::vector<std::uint32_t>> vertices_;  ///< of each piece
   std::vector<std::unique_ptr<Contractor>> pieces_;
+  tbb::enumerable_thread_specific<std::vector<std::uint32_t>> numbers_;  ///< of vertices in a piece; kNone between
 };
 
 }  // namespace
@@ -362,11 +376,12 @@ std::size_t pieces_of(const WorkMesh& work) {
 }
 
 CostCurve sample_costs(WorkMesh& work, std::size_t stride) {
-  return Round(work, share_of_round(0), stride).costs();
+  return Round(work, share_of_round(0)).costs(stride);
 }
 
 std::uint64_t contract_within(WorkMesh& work, const RunContext& run) {
   if (work.errors.empty()) work.errors.assign(work.mesh.triangles.size(), {});
+  if (work.tried.empty()) work.tried.assign(work.mesh.positions.size(), 0);
   std::uint64_t contractions = 0;
   for (int number = 0; number < kBoundRounds; ++number) {
     const std::size_t there = work.mesh.triangles.size();

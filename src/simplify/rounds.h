@@ -23,6 +23,7 @@ struct WorkMesh {
   double bound = 0;                    ///< how far the mesh may get from what it was; 0: as far as it likes
   std::vector<Errors> errors{};        ///< of the triangles; empty without a bound
   std::vector<std::uint8_t> locked{};  ///< vertices that stay where they are, for good; empty: none
+  std::vector<std::uint8_t> tried{};   ///< with a bound: vertices whose edges could not go in a round before
   double deviation = 0;                ///< largest of all contractions (Contractor::deviation())
 };
 

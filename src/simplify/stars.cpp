@@ -55,12 +55,6 @@ void Stars::neighbours(std::uint32_t vertex, std::vector<std::uint32_t>& out) {
   }
 }
 
-bool Stars::spans(std::uint32_t vertex, std::uint32_t c, std::uint32_t d) const {
-  const auto star = around(vertex);
-  return std::any_of(star.begin(), star.end(),
-                     [&](std::uint32_t t) { return names(triangles_[t], c) && names(triangles_[t], d); });
-}
-
 bool Stars::contractible(std::uint32_t u, std::uint32_t v) {
   std::array<std::uint32_t, 2> beside{};  // the third vertices of the triangles that go
   std::size_t shared = 0;
@@ -90,16 +84,17 @@ bool Stars::contractible(std::uint32_t u, std::uint32_t v) {
     const auto star = around(vertex);
     return std::count_if(star.begin(), star.end(), [&](std::uint32_t t) { return names(triangles_[t], beside[0]); });
   };
-  // A triangle alone would vanish; of a tetrahedron two would become one.
+  // A triangle alone would vanish; of a tetrahedron, whose corners have three triangles each, two would become one.
   if (shared == 1) return sides(u) != 1 || sides(v) != 1;
-  return !spans(u, beside[0], beside[1]) || !spans(v, beside[0], beside[1]);
+  return around(u).size() != 3 || around(v).size() != 3 || boundary(u) || boundary(v);
 }
 
 void Stars::drop(std::uint32_t vertex, std::uint32_t triangle) {
   Run& run = star_[vertex];
   std::uint32_t* const begin = runs_.data() + run.begin;
   std::uint32_t* const end = begin + run.size--;
-  std::copy(std::find(begin, end, triangle) + 1, end, std::find(begin, end, triangle));
+  std::uint32_t* const place = std::find(begin, end, triangle);
+  std::copy(place + 1, end, place);
 }
 
 int Stars::contract(std::uint32_t u, std::uint32_t v) {
@@ -127,6 +122,35 @@ int Stars::contract(std::uint32_t u, std::uint32_t v) {
   star_[v] = {};
   boundary_[u] = boundary_[u] | boundary_[v];
   return gone;
+}
+
+Stars::Before Stars::before(std::uint32_t u, std::uint32_t v) const {
+  Before before{star_[u], star_[v], boundary_[u], 0, {}, {}};
+  for (const std::uint32_t triangle : around(u)) {
+    const Triangle& t = triangles_[triangle];
+    if (!names(t, v)) continue;
+    before.triangle[before.dead] = triangle;
+    before.first[before.dead++] = t[0];
+  }
+  return before;
+}
+
+int Stars::revert(std::uint32_t u, std::uint32_t v, const Before& before) {
+  for (std::uint32_t i = before.v.begin; i < before.v.begin + before.v.size; ++i) {
+    Triangle& t = triangles_[runs_[i]];
+    if (t[0] != kNone) t[corner_of(t, u)] = v;
+  }
+  for (std::size_t i = 0; i < before.dead; ++i) {
+    Triangle& t = triangles_[before.triangle[i]];
+    t[0] = before.first[i];
+    for (const std::uint32_t w : t) {  // its place in the run is still there
+      if (w != u && w != v) runs_[star_[w].begin + star_[w].size++] = before.triangle[i];
+    }
+  }
+  star_[u] = before.u;
+  star_[v] = before.v;
+  boundary_[u] = before.boundary;
+  return before.dead;
 }
 
 }  // namespace lamina::simplify

@@ -46,6 +46,14 @@ class Stars {
   [[nodiscard]] bool contractible(std::uint32_t u, std::uint32_t v);
   /// v becomes u. Returns how many triangles go.
   int contract(std::uint32_t u, std::uint32_t v);
+  /// What contracting the edge changes, to be put back by revert().
+  struct Before;
+  [[nodiscard]] Before before(std::uint32_t u, std::uint32_t v) const;
+  /// The triangles of both, those of either twice.
+  template <class Use>
+  void for_touched(const Before& before, const Use& use) const;
+  /// Takes a contraction back, of which every triangle is as it left it. Returns how many triangles there are more.
+  int revert(std::uint32_t u, std::uint32_t v, const Before& before);
   /// Triangles that have gone leave the arrays, and the others get other numbers in the same order.
   void tidy();
 
@@ -55,7 +63,6 @@ class Stars {
   };
   void list_triangles();
   void drop(std::uint32_t vertex, std::uint32_t triangle);
-  [[nodiscard]] bool spans(std::uint32_t vertex, std::uint32_t c, std::uint32_t d) const;
 
   std::vector<Triangle> triangles_;  ///< of dead ones the first vertex is kNone
   std::vector<Run> star_;
@@ -64,5 +71,19 @@ class Stars {
   std::vector<std::uint32_t> mark_;  ///< of vertices: the last question that met them
   std::uint32_t question_ = 0;
 };
+
+struct Stars::Before {
+  Run u, v;
+  std::uint8_t boundary = 0;  ///< of u
+  std::uint8_t dead = 0;
+  std::array<std::uint32_t, 2> triangle{}, first{};  ///< those that go, and their first vertices
+};
+
+template <class Use>
+void Stars::for_touched(const Before& before, const Use& use) const {
+  for (const Run& run : {before.u, before.v}) {
+    for (std::uint32_t i = run.begin; i < run.begin + run.size; ++i) use(runs_[i]);
+  }
+}
 
 }  // namespace lamina::simplify

@@ -219,6 +219,7 @@ class StreamedSimplifier {
         work.quadrics[v] = part.quadrics[v].moved(part.mesh.positions[v] - work.centre);
     }
     work.errors = std::move(part.errors);
+    work.tried = std::move(part.tried);
     return work;
   }
 
@@ -247,12 +248,15 @@ class StreamedSimplifier {
       if (n == kNone) continue;
       part.ids[n] = part.ids[v];
       part.locked[n] = part.locked[v];
+      if (!work.tried.empty()) work.tried[n] = work.tried[v];
       part.quadrics[n] = work.quadrics[v].moved(centre - part.mesh.positions[n]);
     }
     part.ids.resize(part.mesh.positions.size());
     part.locked.resize(part.ids.size());
     part.quadrics.resize(part.ids.size());
     part.errors = std::move(work.errors);
+    part.tried = std::move(work.tried);
+    part.tried.resize(part.errors.empty() ? 0 : part.ids.size());
   }
 
   /// Calls use(region) for those with triangles, simplified.

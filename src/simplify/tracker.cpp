@@ -1,214 +1,255 @@
 #include "simplify/tracker.h"
 
+#include <emmintrin.h>
+
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
-#include <utility>
+
+#include "measure/triangle_bvh.h"
 
 namespace lamina::simplify {
 namespace {
 
 using namespace meshes;
 
-constexpr double kRounding = 1e-6;  ///< of the bound: what arithmetic may cost
+constexpr float kTightened = 0.8F;
+constexpr double kUsed = 0.995;  ///< of the bound, by vertices: between them it is a little farther
 
-float above(double error) {
-  const auto f = static_cast<float>(error);
-  return static_cast<double>(f) >= error ? f : std::nextafter(f, std::numeric_limits<float>::infinity());
-}
-
-constexpr int kCuts = 30;  ///< of a triangle, to prove it near another few
-
-/// How far they lie from a point, at most.
-double size_about(const std::vector<Vec3>& positions, const Vec3& origin) {
-  double size = 0;
-  for (const Vec3& p : positions) size = std::max(size, norm(p - origin));
-  return size;
+float least_of(__m128 values) {
+  alignas(16) std::array<float, 4> out;
+  _mm_store_ps(out.data(), values);
+  return std::min(std::min(out[0], out[1]), std::min(out[2], out[3]));
 }
 
 }  // namespace
 
-Tracker::Tracker(const std::vector<Vec3>& positions, const std::vector<Triangle>& triangles, std::vector<Errors> errors,
-                 double bound)
-    : base_(positions),
-      olds_(triangles.size()),
-      back_(triangles.size()),
-      head_(triangles.size()),
-      links_(triangles.size()),
-      bound_((1 - kRounding) * bound),
-      origin_(positions.empty() ? Vec3{} : positions[positions.size() / 2]),
-      cover_(bound_, origin_, size_about(positions, origin_) + bound) {
-  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-    olds_[t] = {triangles[t], errors[t], errors[t].out, 1, {t}, 0};
-    back_[t] = errors[t].back;
-    head_[t] = t;
-    links_[t] = {t, kEnd};
+Tracker::Tracker(const OldMesh& old)
+    : old_(old),
+      slack_(old.positions.size(), static_cast<float>(kUsed * old.bound)),
+      homes_(old.positions.size(), kEnd),
+      head_(old.triangles.size(), kEnd),
+      next_(old.positions.size(), kEnd),
+      slot_(old.positions.size()) {
+  for (std::uint32_t i = 0; i < old.triangles.size(); ++i) {
+    for (const std::uint32_t v : old.triangles[i]) {
+      slack_[v] = std::min(slack_[v], static_cast<float>(kUsed * old.bound) - old.errors[i].out);
+      if (homes_[v] == kEnd) put_home(v, i);
+    }
   }
 }
 
-void Tracker::prepare(const Stars& stars, std::span<const Vec3> positions) {
-  const auto& triangles = stars.triangles();
-  faces_.resize(triangles.size());
-  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
-    const Triangle& t = triangles[i];
-    if (t[0] == kNone) continue;
-    faces_[i] = make_facet(positions[t[0]], positions[t[1]], positions[t[2]], origin_);
-    faces_[i].id = i;
-  }
-  old_facets_.resize(olds_.size());
-  for (std::uint32_t i = 0; i < olds_.size(); ++i) {
-    const std::array<Vec3, 3> c = old_corners(olds_[i]);
-    old_facets_[i] = make_facet(c[0], c[1], c[2], origin_);
-    old_facets_[i].error = static_cast<double>(olds_[i].errors.back);
-  }
-}
-
-void Tracker::rest() {
-  faces_ = {};
-  old_facets_ = {};
+void Tracker::put_home(std::uint32_t vertex, std::uint32_t triangle) {
+  homes_[vertex] = triangle;
+  next_[vertex] = head_[triangle];
+  head_[triangle] = vertex;
 }
 
 bool Tracker::allows(const Stars& stars, std::span<const Vec3> positions, std::uint32_t u, std::uint32_t v,
                      const Vec3& to) {
-  if (faces_.empty()) prepare(stars, positions);
   gather(stars, u, v);
-  before_.clear();
-  after_.clear();
-  for (const std::uint32_t triangle : star_) {
-    const Triangle& t = stars.triangles()[triangle];
-    std::array<Vec3, 3> c{positions[t[0]], positions[t[1]], positions[t[2]]};
-    before_.push_back(faces_[triangle]);
-    before_.back().error = static_cast<double>(back_[triangle]);
-    if (names(t, u) && names(t, v)) continue;
-    c[corner_of(t, names(t, u) ? u : v)] = to;
-    after_.push_back(make_facet(c[0], c[1], c[2], origin_));
-    after_.back().id = triangle;
+  make_fans(stars, positions, u, v, to);
+  chosen_.resize(points_.size());
+  seen_.resize(points_.size() * fans_.size());
+  double least2 = std::numeric_limits<double>::infinity();
+  std::uint32_t nearest = kEnd;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const Vec3 at = old_.positions[points_[i]] - to;
+    const double d2 = dot(at, at);
+    if (d2 < least2) {
+      least2 = d2;
+      nearest = points_[i];
+    }
+    look(i, to_float(at));
+    if (!find_home(i) && !find_home_exactly(i, at)) return false;
   }
-  return still_covered() && covers();
+  if (nearest == kEnd || !crossings_near(to)) return false;
+  if (near_old(to, nearest)) return true;
+  return std::any_of(points_.begin(), points_.end(), [&](std::uint32_t vertex) {
+    const Vec3 at = old_.positions[vertex] - to;
+    return dot(at, at) < 4 * least2 && near_old(to, vertex);
+  });
 }
 
 void Tracker::gather(const Stars& stars, std::uint32_t u, std::uint32_t v) {
   star_.clear();
-  affected_.clear();
-  ++question_;
+  after_.clear();
+  points_.clear();
   for (const std::uint32_t vertex : {u, v}) {
     for (const std::uint32_t triangle : stars.around(vertex)) {
-      if (vertex == v && names(stars.triangles()[triangle], u)) continue;
+      const bool both = names(stars.triangles()[triangle], vertex == u ? v : u);
+      if (both && vertex == v) continue;
       star_.push_back(triangle);
-      for (std::uint32_t l = head_[triangle]; l != kEnd; l = links_[l].next) {
-        Old& old = olds_[links_[l].old];
-        if (old.seen == question_) continue;
-        old.seen = question_;
-        affected_.push_back(links_[l].old);
-      }
+      if (!both) after_.push_back(triangle);
+      for (std::uint32_t p = head_[triangle]; p != kEnd; p = next_[p]) points_.push_back(p);
     }
   }
 }
 
-/// Are the old triangles near what would be there?
-bool Tracker::still_covered() {
-  proofs_.clear();
-  facets_.clear();
-  for (const Facet& f : after_) facets_.push_back(&f);
-  for (const std::uint32_t number : affected_) {
-    const Old& old = olds_[number];
-    facets_.resize(after_.size());
-    for (std::size_t i = 0; i < old.size; ++i) {
-      const std::uint32_t face = old.faces[i];
-      if (std::find(star_.begin(), star_.end(), face) != star_.end()) continue;
-      facets_.push_back(&faces_[face]);
+void Tracker::make_fans(const Stars& stars, std::span<const Vec3> positions, std::uint32_t u, std::uint32_t v,
+                        const Vec3& to) {
+  fans_.resize((after_.size() + kLanes - 1) / kLanes);
+  corners_.clear();
+  for (std::size_t i = 0; i < kLanes * fans_.size(); ++i) {
+    const std::size_t which = std::min(i, after_.size() - 1);  // the last one fills what is left
+    const Triangle& t = stars.triangles()[after_[which]];
+    const std::size_t k = corner_of(t, names(t, u) ? u : v);
+    const Vec3 p = positions[t[(k + 1) % 3]] - to, q = positions[t[(k + 2) % 3]] - to;
+    if (i < after_.size()) corners_.push_back({Vec3{}, p, q});
+    const Vec3 n = unit(cross(p, q)), first = cross(n, p), second = cross(q, n), far = unit(cross(n, q - p));
+    Fan& fan = fans_[i / kLanes];
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      fan.own[axis][i % kLanes] = static_cast<float>(n[axis]);
+      fan.first[axis][i % kLanes] = static_cast<float>(first[axis]);
+      fan.second[axis][i % kLanes] = static_cast<float>(second[axis]);
+      fan.far[axis][i % kLanes] = static_cast<float>(far[axis]);
     }
-    if (!cover_.prove(old_corners(old), static_cast<double>(old.errors.out), facets_, kCuts) ||
-        cover_.used().size() > kFaces)
-      return false;
-    Proof proof{number, above(cover_.error()), static_cast<std::uint8_t>(cover_.used().size()), {}};
-    std::copy(cover_.used().begin(), cover_.used().end(), proof.faces.begin());
-    proofs_.push_back(proof);
+    fan.far_offset[i % kLanes] = -static_cast<float>(dot(far, p));
+  }
+}
+
+/// The nearest of the triangles that it lies over or under, or beyond the side opposite the new vertex. False where
+/// this is too far, or none.
+bool Tracker::find_home(std::size_t point) {
+  const __m128 zero = _mm_setzero_ps(), infinite = _mm_set1_ps(std::numeric_limits<float>::infinity());
+  float best = slack_[points_[point]];
+  if (best <= 0) return false;
+  best *= best;
+  bool found = false;
+  for (std::size_t f = 0; f < fans_.size(); ++f) {
+    const Seen& seen = seen_[point * fans_.size() + f];
+    const __m128 height = _mm_load_ps(seen.height.data());
+    const __m128 beyond = _mm_min_ps(_mm_load_ps(seen.far.data()), zero);
+    const __m128 over = _mm_and_ps(_mm_cmpge_ps(_mm_load_ps(seen.first.data()), zero),
+                                   _mm_cmpge_ps(_mm_load_ps(seen.second.data()), zero));
+    const __m128 distance2 = _mm_add_ps(_mm_mul_ps(height, height), _mm_mul_ps(beyond, beyond));
+    const __m128 counted = _mm_or_ps(_mm_and_ps(over, distance2), _mm_andnot_ps(over, infinite));
+    if (_mm_movemask_ps(_mm_cmplt_ps(counted, _mm_set1_ps(best))) == 0) continue;
+    const float least = least_of(counted);
+    const auto lane = static_cast<unsigned>(_mm_movemask_ps(_mm_cmpeq_ps(counted, _mm_set1_ps(least))));
+    const std::size_t which = kLanes * f + static_cast<std::size_t>(std::countr_zero(lane));
+    chosen_[point] = after_[std::min(which, after_.size() - 1)];
+    best = least;
+    found = true;
+  }
+  return found;
+}
+
+/// Where sides of old triangles cross those of new ones: between two old vertices with different homes.
+bool Tracker::crossings_near(const Vec3& to) {
+  const std::size_t inside = points_.size();
+  for (std::uint32_t i = 0; i < inside; ++i) slot_[points_[i]] = i;
+  for (std::uint32_t i = 0; i < inside; ++i) {
+    const std::uint32_t vertex = points_[i];
+    for (const std::uint32_t other : old_.neighbours(vertex)) {
+      std::uint32_t j = slot_[other];
+      if (j >= points_.size() || points_[j] != other) {
+        j = slot_[other] = static_cast<std::uint32_t>(points_.size());
+        points_.push_back(other);
+        seen_.resize(points_.size() * fans_.size());
+        look(j, to_float(old_.positions[other] - to));
+      }
+      if (j < inside && (j < i || chosen_[i] == chosen_[j])) continue;
+      if (!crossing_near(i, j, std::min(slack_[vertex], slack_[other]))) return false;
+    }
+  }
+  points_.resize(inside);
+  return true;
+}
+
+bool Tracker::crossing_near(std::size_t from, std::size_t to, float slack) const {
+  for (std::size_t f = 0; f < fans_.size(); ++f) {
+    const Seen &a = seen_[from * fans_.size() + f], &b = seen_[to * fans_.size() + f];
+    const __m128 first = _mm_load_ps(a.first.data()), first_to = _mm_load_ps(b.first.data());
+    const auto apart = static_cast<unsigned>(_mm_movemask_ps(_mm_xor_ps(first, first_to)));
+    for (unsigned left = apart; left != 0; left &= left - 1) {
+      const auto lane = static_cast<std::size_t>(std::countr_zero(left));
+      const float along = a.first[lane] / (a.first[lane] - b.first[lane]);
+      const auto there = [&](const std::array<float, kLanes>& x, const std::array<float, kLanes>& y) {
+        return x[lane] + along * (y[lane] - x[lane]);
+      };
+      if (there(a.second, b.second) < 0 || there(a.far, b.far) < 0) continue;
+      if (std::abs(there(a.height, b.height)) > slack) return false;
+    }
   }
   return true;
 }
 
-/// Would what is there be near the old triangles?
-bool Tracker::covers() {
-  after_back_.clear();
-  before_list_.clear();
-  for (const Facet& f : before_) before_list_.push_back(&f);
-  for (const Facet& f : after_) {
-    if (!cover_.prove(f.corners, 0, before_list_, kCuts)) {
-      // Step by step it is too far. What about the way from the beginning?
-      Vec3 low = f.corners[0], high = low;
-      for (const Vec3& c : f.corners) {
-        for (std::size_t k = 0; k < 3; ++k) {
-          low[k] = std::min(low[k], c[k] - bound_);
-          high[k] = std::max(high[k], c[k] + bound_);
-        }
-      }
-      facets_.clear();
-      for (const std::uint32_t number : affected_) {
-        const std::array<Vec3, 3>& c = old_facets_[number].corners;
-        bool apart = false;
-        for (std::size_t k = 0; k < 3; ++k) {
-          apart = apart || std::max({c[0][k], c[1][k], c[2][k]}) < low[k] ||
-                  std::min({c[0][k], c[1][k], c[2][k]}) > high[k];
-        }
-        if (apart) continue;
-        facets_.push_back(&old_facets_[number]);
-      }
-      if (!cover_.prove(f.corners, 0, facets_, 8 * static_cast<int>(facets_.size()))) return false;
-    }
-    after_back_.push_back(above(cover_.error()));
+/// Where a point lies beside the planes of the fans.
+void Tracker::look(std::size_t point, const std::array<float, 3>& at) {
+  const __m128 x = _mm_set1_ps(at[0]), y = _mm_set1_ps(at[1]), z = _mm_set1_ps(at[2]);
+  const auto times = [&](const std::array<std::array<float, kLanes>, 3>& plane) {
+    return _mm_add_ps(
+        _mm_add_ps(_mm_mul_ps(_mm_load_ps(plane[0].data()), x), _mm_mul_ps(_mm_load_ps(plane[1].data()), y)),
+        _mm_mul_ps(_mm_load_ps(plane[2].data()), z));
+  };
+  for (std::size_t f = 0; f < fans_.size(); ++f) {
+    const Fan& fan = fans_[f];
+    Seen& seen = seen_[point * fans_.size() + f];
+    _mm_store_ps(seen.height.data(), times(fan.own));
+    _mm_store_ps(seen.first.data(), times(fan.first));
+    _mm_store_ps(seen.second.data(), times(fan.second));
+    _mm_store_ps(seen.far.data(), _mm_add_ps(times(fan.far), _mm_load_ps(fan.far_offset.data())));
   }
-  return true;
 }
 
-void Tracker::link(std::uint32_t face, std::uint32_t old) {
-  std::uint32_t l = free_;
-  if (l == kEnd) {
-    l = static_cast<std::uint32_t>(links_.size());
-    links_.emplace_back();
-  } else {
-    free_ = links_[l].next;
+/// `at`: from the new vertex.
+bool Tracker::find_home_exactly(std::size_t point, const Vec3& at) {
+  const auto slack = static_cast<double>(slack_[points_[point]]);
+  double least2 = slack * slack;
+  bool found = false;
+  for (std::size_t i = 0; i < after_.size(); ++i) {
+    const auto& [a, b, c] = corners_[i];
+    const double d2 = measure::squared_distance_to_triangle(at, a, b, c);
+    if (slack < 0 || d2 > least2) continue;
+    least2 = d2;
+    chosen_[point] = after_[i];
+    found = true;
   }
-  links_[l] = {old, head_[face]};
-  head_[face] = l;
+  return found;
+}
+
+/// Is the place near an old triangle at this vertex?
+bool Tracker::near_old(const Vec3& at, std::uint32_t vertex) const {
+  const auto around = old_.around(vertex);
+  return std::any_of(around.begin(), around.end(), [&](std::uint32_t triangle) {
+    const Triangle& t = old_.triangles[triangle];
+    const double most = kUsed * old_.bound - static_cast<double>(old_.errors[triangle].back);
+    return most >= 0 && measure::squared_distance_to_triangle(at, old_.positions[t[0]], old_.positions[t[1]],
+                                                              old_.positions[t[2]]) <= most * most;
+  });
+}
+
+void Tracker::tighten(std::uint32_t triangle) {
+  for (std::uint32_t p = head_[triangle]; p != kEnd; p = next_[p]) slack_[p] *= kTightened;
 }
 
 void Tracker::accept() {
-  for (const std::uint32_t triangle : star_) {
-    for (std::uint32_t l = head_[triangle]; l != kEnd;) {
-      const std::uint32_t next = links_[l].next;
-      links_[l].next = free_;
-      free_ = l;
-      l = next;
-    }
-    head_[triangle] = kEnd;
-  }
-  for (const Proof& proof : proofs_) {
-    Old& old = olds_[proof.old];
-    for (std::size_t i = 0; i < proof.size; ++i) {
-      const std::uint32_t face = proof.faces[i];
-      const bool known =
-          std::find(old.faces.begin(), old.faces.begin() + old.size, face) != old.faces.begin() + old.size;
-      const bool changed = std::find(star_.begin(), star_.end(), face) != star_.end();
-      if (changed || !known) link(face, proof.old);
-    }
-    old.error = proof.error;
-    old.size = proof.size;
-    old.faces = proof.faces;
-  }
-  for (std::size_t i = 0; i < after_.size(); ++i) {
-    back_[after_[i].id] = after_back_[i];
-    faces_[after_[i].id] = after_[i];
-  }
+  for (const std::uint32_t triangle : star_) head_[triangle] = kEnd;
+  for (std::size_t i = 0; i < points_.size(); ++i) put_home(points_[i], chosen_[i]);
 }
 
-std::vector<Errors> Tracker::errors() const {
-  std::vector<Errors> errors(back_.size());
-  for (std::size_t t = 0; t < back_.size(); ++t) errors[t].back = back_[t];
-  for (const Old& old : olds_) {
-    for (std::size_t i = 0; i < old.size; ++i) errors[old.faces[i]].out = std::max(errors[old.faces[i]].out, old.error);
+void Tracker::settle(const Stars& stars, std::span<const Vec3> positions, std::span<const std::uint32_t> triangles) {
+  points_.clear();
+  for (const std::uint32_t triangle : triangles) {
+    for (std::uint32_t p = head_[triangle]; p != kEnd; p = next_[p]) points_.push_back(p);
+    head_[triangle] = kEnd;
   }
-  return errors;
+  for (const std::uint32_t point : points_) {
+    double least2 = std::numeric_limits<double>::infinity();
+    std::uint32_t home = kEnd;
+    for (const std::uint32_t triangle : triangles) {
+      if (!stars.alive(triangle)) continue;
+      const Triangle& t = stars.triangles()[triangle];
+      const double d2 = measure::squared_distance_to_triangle(old_.positions[point], positions[t[0]], positions[t[1]],
+                                                              positions[t[2]]);
+      if (home != kEnd && d2 >= least2) continue;
+      least2 = d2;
+      home = triangle;
+    }
+    put_home(point, home);
+  }
 }
 
 }  // namespace lamina::simplify

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -79,6 +80,35 @@ TEST(SimplifyPart, OneAfterTheOtherAsEachAlone) {
     EXPECT_EQ(a.numbers, b.numbers);
     EXPECT_EQ(first.positions, second.positions);
     EXPECT_EQ(first.triangles, second.triangles);
+  }
+}
+
+TEST(Stars, ContractionsAreTakenBack) {
+  const TriangleMesh mesh = wave(12);
+  Stars stars(mesh.triangles, mesh.positions.size());
+  struct Step {
+    std::uint32_t u, v;
+    Stars::Before before;
+  };
+  std::vector<Step> steps;
+  for (std::uint32_t v = 0; v < mesh.positions.size(); v += 3) {
+    std::vector<std::uint32_t> near;
+    stars.neighbours(v, near);
+    for (const std::uint32_t u : near) {
+      if (!stars.contractible(u, v)) continue;
+      steps.push_back({u, v, stars.before(u, v)});
+      EXPECT_EQ(stars.contract(u, v), static_cast<int>(steps.back().before.dead));
+      break;
+    }
+  }
+  ASSERT_GT(steps.size(), 40U);
+  for (std::size_t i = steps.size(); i-- > 0;) stars.revert(steps[i].u, steps[i].v, steps[i].before);
+  EXPECT_EQ(stars.triangles(), mesh.triangles);
+  Stars fresh(mesh.triangles, mesh.positions.size());
+  for (std::uint32_t v = 0; v < mesh.positions.size(); ++v) {
+    const auto is = stars.around(v), was = fresh.around(v);
+    EXPECT_TRUE(std::is_permutation(is.begin(), is.end(), was.begin(), was.end())) << v;
+    EXPECT_EQ(stars.boundary(v), fresh.boundary(v)) << v;
   }
 }
 
