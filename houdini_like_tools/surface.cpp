@@ -234,6 +234,11 @@ void add_surface_options(CLI::App& tool, SurfaceOptions& o) {
       ->group(samples);
 
   add_clean_options(tool, s.clean, "Cleaning");
+  tool.add_option("--rejected", s.rejected,
+                  "Write the samples left out by these steps, strays above all, to a point file, with their attributes "
+                  "and one more, reason")
+      ->type_name("FILE")
+      ->group("Cleaning");
   add_normals_choice(tool, s.normals, "Normals");
   add_normals_options(tool, s.normal_search, "Normals");
 

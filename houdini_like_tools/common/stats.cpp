@@ -48,6 +48,10 @@ nlohmann::ordered_json holes_json(const HoleStats& h) {
                            {"closed_edges", h.closed_edges},
                            {"added_vertices", h.vertices},
                            {"added_triangles", h.triangles},
+                           {"invented", h.invented},
+                           {"invented_edges", h.invented_edges},
+                           {"invented_vertices", h.invented_vertices},
+                           {"invented_triangles", h.invented_triangles},
                            {"open", h.open},
                            {"open_edges", h.open_edges},
                            {"open_length", h.open_length}};

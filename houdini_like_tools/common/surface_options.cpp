@@ -87,6 +87,14 @@ void add_hole_options(CLI::App& tool, SurfaceSettings& settings, const std::stri
                 "mesh.ply --paint filled'")
       ->group(group);
   tool.add_option_function<std::string>(
+          "--fill", [&settings](const std::string& word) { settings.fill_all = word == "all"; },
+          "all: close everything, for printing and simulation; what nothing in the data tells how to close is invented "
+          "from its rim, and a property invented is 1 at such vertices, else 0; auto: what the data tell")
+      ->check(CLI::IsMember({"auto", "all"}).description(""))
+      ->type_name("auto|all")
+      ->default_str("auto")
+      ->group(group);
+  tool.add_option_function<std::string>(
           "--watertight",
           [&settings](const std::string& word) {
             settings.watertight = word == "auto" ? std::nullopt : std::optional(word == "yes");

@@ -28,12 +28,17 @@ struct HoleSettings {
   static constexpr double kWatertight = 24;
   /// Vertices' last attribute says which of them were added: those that are get 1.
   bool mark = false;
+  /// What stays open then is closed all the same, by surfaces that rest on nothing but the rims (boundary/closure.h).
+  /// Vertices' last attribute says which were added for that (1), the one before it is that of `mark`.
+  bool all = false;
 };
 
 /// Loops closed and left open; edges are boundary edges.
 struct HoleStats {
   std::uint64_t closed = 0, closed_edges = 0;
   std::uint64_t vertices = 0, triangles = 0;  ///< added
+  /// Loops closed by invention (not in `closed`), and what was added for them (also in `vertices` and `triangles`).
+  std::uint64_t invented = 0, invented_edges = 0, invented_vertices = 0, invented_triangles = 0;
   std::uint64_t open = 0, open_edges = 0;
   double open_length = 0;                      ///< output units
   static constexpr std::size_t kListed = 100;  ///< loops in `longest` at most

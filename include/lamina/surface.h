@@ -86,6 +86,9 @@ struct SurfaceSettings {
   /// Close all loops where none longer than 24 R is left: the scanned object is taken to be closed then.
   /// Unset: chosen where `blend` is, else false.
   std::optional<bool> watertight;
+  /// Close everything: what `close_holes` and `watertight` leave open gets surfaces that rest on nothing but its rim.
+  /// Vertices get an attribute `invented`: 1 where one was added for that, else 0. Not with ClusterMode::free.
+  bool fill_all = false;
   /// R, 0 <= trim < 1: the mesh is cut along the curve where it reaches so far beyond the samples that carry it (where
   /// their weighted mean lies so far to one side); 0.235 is the straight edge of evenly spread samples. 0: nowhere,
   /// whole triangles are kept or left out. Unset: chosen where `blend` is, else 0.
@@ -101,7 +104,12 @@ struct SurfaceSettings {
   Length prune_size;   ///< so are parts whose box has a shorter diagonal; `r`, `R`: of the median sample; 0: none
   bool local = false;  ///< subtract a shift (SurfaceStats::shift) from coordinates, so that floats hold them
   int window = 1;      ///< >= 1: slabs that each stage advances at once; more is faster on many cores and takes memory
-  bool dry_run = false;       ///< only plan: read the input, write nothing
+  bool dry_run = false;  ///< only plan: read the input, write nothing
+  /// A point file for the samples that `clean` leaves out by looking around, in the input's coordinates (as exact as
+  /// the store keeps them), with their attributes and one called `reason`: 1 merged, 2 outlier, 3 stray far from its
+  /// neighbours, 4 stray on no surface of theirs, 5 thinned out. Empty: none. Not for jobs of several runs, nor for
+  /// stores, which were cleaned when they were made.
+  std::string rejected;
   SimplifySettings simplify;  ///< how far the finished mesh is simplified, before it appears; nothing: it is not
   VolumeExport volume;        ///< grids to write beside the mesh
   TileSettings tiles;         ///< 3D Tiles to write beside the mesh; their coordinate system is the input's

@@ -35,11 +35,13 @@ void include(LoopExtent& all, const LoopExtent& more) {
 
 }  // namespace
 
-BoundaryPaths::BoundaryPaths(double longest, std::size_t attributes,
+BoundaryPaths::BoundaryPaths(const Bounds& bounds, std::size_t attributes,
                              std::function<void(Loop&&, const LoopExtent&)> closed,
                              std::function<void(const LoopExtent&)> left)
-    // Lengths are summed up in the order of coming: what is just about too long is for the closer to decide.
-    : longest_(longest * 1.001), attributes_(attributes), closed_(std::move(closed)), left_(std::move(left)) {}
+    : bounds_{bounds.longest * kRoundedUp, bounds.edges},
+      attributes_(attributes),
+      closed_(std::move(closed)),
+      left_(std::move(left)) {}
 
 void BoundaryPaths::add(const BoundaryBatch& batch, Number first) {
   for (std::size_t i = 0; i < batch.vertices.size(); ++i) {
@@ -96,7 +98,7 @@ void BoundaryPaths::join(const BoundaryEdge& edge) {
   }
   if (lower) path.first = lower->first;
   if (upper) path.last = upper->last;
-  path.dropped = path.dropped || path.extent.radii > longest_ || path.extent.edges > kMostEdges;
+  path.dropped = path.dropped || path.extent.radii > bounds_.longest || path.extent.edges > bounds_.edges;
   if (path.dropped) {
     for (const auto& part : {lower, upper}) {
       if (part && !part->dropped) erase_between(part->first, part->last);

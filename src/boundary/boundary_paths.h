@@ -27,11 +27,15 @@ struct LoopExtent {
 /// the ends.
 class BoundaryPaths {
  public:
-  /// `closed` gets loops of at most about `longest` radii and kMostEdges edges, `left` all others in the end.
-  /// `attributes`: of each vertex.
-  BoundaryPaths(double longest, std::size_t attributes, std::function<void(Loop&&, const LoopExtent&)> closed,
+  struct Bounds {
+    double longest = 0;       ///< radii, about
+    std::uint64_t edges = 0;  ///< at most
+  };
+  /// `closed` gets loops within the bounds, `left` all others in the end. `attributes`: of each vertex.
+  BoundaryPaths(const Bounds& bounds, std::size_t attributes, std::function<void(Loop&&, const LoopExtent&)> closed,
                 std::function<void(const LoopExtent&)> left);
-  static constexpr std::uint64_t kMostEdges = 4096;
+  /// Lengths are summed up in the order of coming: what is just about too long is for the closer to decide.
+  static constexpr double kRoundedUp = 1.001;
 
   /// `first`: what the batch's numbers count from. Loose edges are not looked at.
   void add(const BoundaryBatch& batch, Number first);
@@ -61,7 +65,7 @@ class BoundaryPaths {
   void erase_between(Number first, Number last);
   Loop take_loop(const Path& path);
 
-  double longest_;
+  Bounds bounds_;
   std::size_t attributes_;
   std::function<void(Loop&&, const LoopExtent&)> closed_;
   std::function<void(const LoopExtent&)> left_;

@@ -178,6 +178,8 @@ const char* describe(Verdict verdict) {
       return "occupied";
     case Verdict::joined:
       return "joined";
+    case Verdict::invented:
+      return "invented";
   }
   return "";
 }

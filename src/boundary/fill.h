@@ -35,6 +35,7 @@ enum class Verdict : std::uint8_t {
   bent,            ///< normals around it do not agree, or do not belong to one quadric: nothing says what lies between
   occupied,        ///< other boundary loops run through the gap
   joined,          ///< an island's outer boundary: the filling around it goes on to it
+  invented,        ///< by a closure that rests on nothing but the rim (closure.h)
 };
 
 /// For stats and messages.

@@ -4,17 +4,24 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <set>
 
+#include "boundary/closure.h"
 #include "lamina/error.h"
 
 namespace lamina {
 
 std::string describe(const HoleStats& s) {
   std::string text;
-  if (s.closed > 0) text = fmt::format("{} holes closed with {} triangles", s.closed, s.triangles);
+  if (s.closed > 0)
+    text = fmt::format("{} holes closed with {} triangles", s.closed, s.triangles - s.invented_triangles);
+  if (s.invented > 0) {
+    text += fmt::format("{}{} open ends of {} edges closed by invention with {} triangles", text.empty() ? "" : ", ",
+                        s.invented, s.invented_edges, s.invented_triangles);
+  }
   if (s.open > 0) {
     text += fmt::format("{}{} boundary loops of {} edges left open", text.empty() ? "" : ", ", s.open, s.open_edges);
   } else if (!text.empty()) {
@@ -30,9 +37,20 @@ HoleCloser::HoleCloser(const HoleSettings& settings, std::size_t attributes, boo
       attributes_(attributes),
       distinct_(double_positions),
       paths_(
-          settings.watertight ? std::max(settings.longest, HoleSettings::kWatertight) : settings.longest, attributes,
-          [this](Loop&& loop, const LoopExtent& extent) { loops_.emplace_back(std::move(loop), extent); },
+          settings.all ? BoundaryPaths::Bounds{std::numeric_limits<double>::infinity(),
+                                               std::numeric_limits<std::uint64_t>::max()}
+                       : BoundaryPaths::Bounds{bound(), kMostEdges},
+          attributes, [this](Loop&& loop, const LoopExtent& extent) { take(std::move(loop), extent); },
           [this](const LoopExtent& extent) { leave(extent, Verdict::too_long); }) {}
+
+double HoleCloser::bound() const {
+  return settings_.watertight ? std::max(settings_.longest, HoleSettings::kWatertight) : settings_.longest;
+}
+
+void HoleCloser::take(Loop&& loop, const LoopExtent& extent) {
+  const bool is_long = extent.radii > bound() * BoundaryPaths::kRoundedUp || extent.edges > kMostEdges;
+  (is_long ? long_ : loops_).emplace_back(std::move(loop), extent);
+}
 
 void HoleCloser::leave(const LoopExtent& extent, Verdict why) {
   ++stats_.open;
@@ -181,13 +199,33 @@ bool HoleCloser::is_closed_thing(std::uint64_t vertices, const std::vector<Closi
     if (loops_[l].second.radii > HoleSettings::kWatertight) return false;
     edges += loops_[l].second.edges;
   }
-  return settings_.watertight && stats_.open == 0 && edges * kLeastVerticesPerEdge <= vertices;
+  return settings_.watertight && stats_.open == 0 && long_.empty() && edges * kLeastVerticesPerEdge <= vertices;
 }
 
 void HoleCloser::fill_rest(std::vector<Closing>& closings) const {
   tbb::parallel_for(std::size_t{0}, loops_.size(), [&](std::size_t i) {
     if (!closings[i].is_closed()) closings[i].filling = fill_any(loops_[i].first);
   });
+}
+
+/// What nothing tells how to close, behind the loops that were closed otherwise.
+void HoleCloser::invent_rest(std::vector<Closing>& closings) {
+  std::move(long_.begin(), long_.end(), std::back_inserter(loops_));
+  long_.clear();
+  closings.resize(loops_.size());
+  tbb::parallel_for(std::size_t{0}, loops_.size(), [&](std::size_t i) {
+    if (!closings[i].is_closed()) closings[i].filling = invent_closure(loops_[i].first);
+  });
+}
+
+void HoleCloser::require_all_closed() const {
+  if (stats_.open == 0) return;
+  const std::array<double, 3>& at = stats_.longest.front().position;
+  throw Error(
+      ExitCode::internal,
+      fmt::format("fill all: {} boundary loops cannot be closed, since several meet in a vertex; the longest is "
+                  "at {:g}, {:g}, {:g}; --fill auto leaves them open",
+                  stats_.open, at[0], at[1], at[2]));
 }
 
 void HoleCloser::append(std::size_t l, const Closing& closing, std::uint64_t vertices, Addition& out) {
@@ -208,8 +246,13 @@ void HoleCloser::append(std::size_t l, const Closing& closing, std::uint64_t ver
       rim.push_back(static_cast<std::uint32_t>(v.number));
       distinct_.occupy(v.position[0], v.position[1], v.position[2]);
     }
-    ++stats_.closed;
-    stats_.closed_edges += loops_[one].second.edges;
+    const bool invented = filling.verdict == Verdict::invented;
+    ++(invented ? stats_.invented : stats_.closed);
+    (invented ? stats_.invented_edges : stats_.closed_edges) += loops_[one].second.edges;
+  }
+  if (filling.verdict == Verdict::invented) {
+    stats_.invented_vertices += filling.positions.size();
+    stats_.invented_triangles += filling.triangles.size();
   }
   const std::size_t n = rim.size();
   for (const auto& t : filling.triangles) {
@@ -227,7 +270,12 @@ void HoleCloser::append(std::size_t l, const Closing& closing, std::uint64_t ver
     v.ny.push_back(filling.normals[i][1]);
     v.nz.push_back(filling.normals[i][2]);
     for (std::size_t a = 0; a < attributes_; ++a) v.attributes[a].push_back(filling.attributes[i * attributes_ + a]);
-    if (settings_.mark) v.attributes.back().back() = 1;
+    if (settings_.all) {
+      v.attributes.back().back() = filling.verdict == Verdict::invented ? 1 : 0;
+      if (settings_.mark) v.attributes[attributes_ - 2].back() = filling.verdict == Verdict::invented ? 0 : 1;
+    } else if (settings_.mark) {
+      v.attributes.back().back() = 1;
+    }
   }
 }
 
@@ -237,23 +285,31 @@ Addition HoleCloser::finish(std::uint64_t vertices) {
   loose_.clear();
   paths_.add(last, 0);
   paths_.finish();
-  std::sort(loops_.begin(), loops_.end(), [](const auto& a, const auto& b) {
-    return a.first.vertices.front().number < b.first.vertices.front().number;
-  });
+  const auto sort_loops = [](auto& loops) {
+    std::sort(loops.begin(), loops.end(), [](const auto& a, const auto& b) {
+      return a.first.vertices.front().number < b.first.vertices.front().number;
+    });
+  };
+  sort_loops(loops_);
   std::vector<Closing> closings(loops_.size());
   fill_all(closings);
   settle_occupied(closings);
   if (is_closed_thing(vertices, closings)) fill_rest(closings);
+  if (settings_.all) {
+    sort_loops(long_);
+    invent_rest(closings);
+  }
   Addition out;
   out.vertices.attributes.resize(attributes_);
   for (std::size_t l = 0; l < loops_.size(); ++l) {
     const Verdict verdict = closings[l].filling.verdict;
-    if (verdict == Verdict::filled) {
+    if (verdict == Verdict::filled || verdict == Verdict::invented) {
       append(l, closings[l], vertices, out);
     } else if (verdict != Verdict::joined) {
       leave(loops_[l].second, verdict);
     }
   }
+  if (settings_.all) require_all_closed();
   distinct_.separate(out.vertices);
   stats_.vertices = out.vertices.size();
   stats_.triangles = out.triangles.size();

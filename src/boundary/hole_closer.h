@@ -17,6 +17,8 @@ namespace lamina::boundary {
 /// surface has one long boundary loop at least, unless it is so small that the loop is a good part of it. The dragon's,
 /// whose whiskers leave many loops, has one for four hundred.
 inline constexpr std::uint64_t kLeastVerticesPerEdge = 100;
+/// Loops of more edges are not looked at, whatever their length, but where all are to be closed.
+inline constexpr std::uint64_t kMostEdges = 4096;
 
 /// What comes behind a mesh: its triangles name the mesh's vertices, and the new ones behind them.
 struct Addition {
@@ -25,7 +27,8 @@ struct Addition {
 };
 
 /// Takes the boundary loops as they are found. Memory: boundary loops that are not closed yet, and closed loops that
-/// may be filled. What comes out depends on the mesh alone, not on the order of the batches.
+/// may be filled; of all loops where all are to be. What comes out depends on the mesh alone, not on the order of the
+/// batches.
 class HoleCloser {
  public:
   /// `attributes`: of a vertex; `double_positions`: as they are written.
@@ -42,6 +45,8 @@ class HoleCloser {
   [[nodiscard]] const HoleStats& stats() const { return stats_; }
 
  private:
+  [[nodiscard]] double bound() const;  ///< of loops that are looked at, radii
+  void take(Loop&& loop, const LoopExtent& extent);
   void leave(const LoopExtent& extent, Verdict why);
   /// What becomes of a loop.
   struct Closing {
@@ -61,12 +66,15 @@ class HoleCloser {
   [[nodiscard]] bool is_closed_thing(std::uint64_t vertices, const std::vector<Closing>& closings) const;
   void fill_rest(std::vector<Closing>& closings) const;
   void append(std::size_t l, const Closing& closing, std::uint64_t vertices, Addition& out);
+  void invent_rest(std::vector<Closing>& closings);
+  void require_all_closed() const;
 
   HoleSettings settings_;
   std::size_t attributes_;
   DistinctPositions distinct_;
   HoleStats stats_;
   std::vector<std::pair<Loop, LoopExtent>> loops_;
+  std::vector<std::pair<Loop, LoopExtent>> long_;  ///< beyond the bounds, where all are to be closed
   BoundaryPaths paths_;
   std::vector<BoundaryEdge> loose_;  ///< of the last part, numbers of the mesh
 };

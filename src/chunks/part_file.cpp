@@ -19,7 +19,7 @@
 namespace lamina {
 namespace {
 
-constexpr std::string_view kMagic("lamina part 3\n\0\0", 16);
+constexpr std::string_view kMagic("lamina part 4\n\0\0", 16);
 constexpr std::string_view kEnd = "complete";
 static_assert(kMagic.size() == 16 && kEnd.size() == 8);
 constexpr std::size_t kMagicName = 12;  ///< without the version
@@ -66,6 +66,7 @@ nlohmann::json to_json(const PartInfo& info) {
           {"close_holes", info.holes.longest},
           {"watertight", info.holes.watertight},
           {"mark_filled", info.holes.mark},
+          {"fill_all", info.holes.all},
           {"vertices", info.vertices},
           {"triangles", info.triangles},
           {"below", to_json(info.below)},
@@ -85,7 +86,8 @@ PartInfo info_from(const nlohmann::json& j) {
     info.attributes.push_back({a.at("name").get<std::string>(), *type});
   }
   info.comments = j.at("comments").get<std::vector<std::string>>();
-  info.holes = {j.at("close_holes").get<double>(), j.at("watertight").get<bool>(), j.at("mark_filled").get<bool>()};
+  info.holes = {j.at("close_holes").get<double>(), j.at("watertight").get<bool>(), j.at("mark_filled").get<bool>(),
+                j.at("fill_all").get<bool>()};
   info.vertices = j.at("vertices").get<std::uint64_t>();
   info.triangles = j.at("triangles").get<std::uint64_t>();
   info.below = mark_from(j.at("below"));

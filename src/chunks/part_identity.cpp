@@ -15,10 +15,10 @@ std::string mesh_settings(const SurfaceSettings& settings) {
   const auto& [input, more_inputs, open, reading, output, more_outputs, receiver, frame, bad_samples, normals,
                normal_search, guess_trade, radius_scale, density, clean, max_radius, blend, refit, steps,
                step_tolerance, fit, diffuse, cell, levels, boundary, cluster, chord, vertex_levels, vertex_curvature,
-               vertex_filled, close_holes, watertight, trim, features, prune_triangles, prune_size, local, window,
-               dry_run, simplify, volume, tiles] = settings;
+               vertex_filled, close_holes, watertight, fill_all, trim, features, prune_triangles, prune_size, local,
+               window, dry_run, rejected, simplify, volume, tiles] = settings;
   // Jobs of several runs refuse these: require_mesh_alone().
-  (void)prune_triangles, (void)prune_size, (void)local, (void)tiles, (void)open, (void)receiver;
+  (void)prune_triangles, (void)prune_size, (void)local, (void)tiles, (void)open, (void)receiver, (void)rejected;
   (void)input, (void)more_inputs, (void)output, (void)more_outputs, (void)normals, (void)normal_search,
       (void)guess_trade, (void)window, (void)dry_run;
   (void)simplify;  // is for what joins the parts
@@ -33,12 +33,12 @@ std::string mesh_settings(const SurfaceSettings& settings) {
       "{}\nmax_radius {}\n"
       "blend {}\nrefit {}\nsteps {}\nstep_tolerance {}\nfit {}\ndiffuse {}\ncell {}\nlevels {}\nboundary {}\ncluster "
       "{}\n"
-      "chord {}\nlevel {}\ncurvature {}\nfilled {}\nclose_holes {}\nwatertight {}\ntrim {}\nfeatures {}\n",
+      "chord {}\nlevel {}\ncurvature {}\nfilled {}\nclose_holes {}\nwatertight {}\nfill_all {}\ntrim {}\nfeatures {}\n",
       reading.columns, reading.project_degrees, to_string(reading.select), frame_word, static_cast<int>(bad_samples),
       normals_words(settings), cleaning_words(clean), radius_scale, density, to_string(max_radius), number(blend),
       number(refit), steps, step_tolerance, static_cast<int>(fit), diffuse, cell ? to_string(*cell) : "auto", levels,
       boundary, static_cast<int>(cluster), chord, vertex_levels, vertex_curvature, vertex_filled, number(close_holes),
-      word(watertight), number(trim), word(features));
+      word(watertight), fill_all, number(trim), word(features));
 }
 
 std::uint64_t job_hash(const SurfaceSettings& settings, const std::string& input_id, const ReconstructionPlan& plan) {
@@ -62,6 +62,8 @@ void require_mesh_alone(const SurfaceSettings& settings, const std::string& opti
   if (settings.prune_triangles.value_or(0) > 0 || settings.prune_size.value > 0 || settings.local)
     throw Error(ExitCode::usage,
                 fmt::format("{}: --prune, --prune-size and --local want the mesh from one run", option));
+  if (!settings.rejected.empty())
+    throw Error(ExitCode::usage, fmt::format("{}: --rejected wants the whole cloud in one run", option));
   if (settings.open || settings.receiver)
     throw Error(ExitCode::usage, fmt::format("{} wants files: what is in memory is gone with the run", option));
   if (settings.dry_run) throw Error(ExitCode::usage, fmt::format("{} and --dry-run contradict each other", option));

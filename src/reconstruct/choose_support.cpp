@@ -64,6 +64,7 @@ StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& surve
   // Free clustering joins sheets: a boundary loop may pass through a vertex several times.
   out.holes.longest = s.cluster == ClusterMode::free ? 0 : s.close_holes.value_or(kLongestRim);
   out.holes.mark = s.vertex_filled;
+  out.holes.all = s.fill_all;
   out.holes.watertight = s.watertight.value_or(out.holes.watertight) && out.holes.longest > 0;
   out.feed.radius_scale = static_cast<float>(s.radius_scale);
   out.projection.fit = s.fit == FitMode::sphere ? Fit::sphere : Fit::plane;

@@ -128,6 +128,7 @@ void place_vertices(const ClusteredSlab& slab, const Frame& frame, const VertexS
   if (settings.levels) place_levels(slab, settings.finest_cell, out);
   if (settings.curvature) place_curvatures(slab, frame.step, out);
   if (settings.filled) out.attributes.emplace_back(out.size(), 0.0F);
+  if (settings.invented) out.attributes.emplace_back(out.size(), 0.0F);
   if (settings.trim > 0) place_overhangs(slab, out);
   place_radii(slab, settings.radii, out);
 }

@@ -19,7 +19,8 @@ struct VertexSettings {
   bool levels = false;     ///< an attribute behind the samples' own: the octree level of the finest cell around, 0 the
                            ///< finest
   bool curvature = false;  ///< another: mean curvature of the fit, 1 / input unit
-  bool filled = false;     ///< another, the last: 0, for those that close holes get 1
+  bool filled = false;     ///< another: 0, for those that close holes get 1
+  bool invented = false;   ///< another, the last: 0, for those that close what nothing tells how to close get 1
   double finest_cell = 1;  ///< of the lattice, steps
   double trim = 0;         ///< > 0: the mesh is cut where its overhang is this (boundary/rim_trimmer.h)
   bool double_positions = false;  ///< as they are written

@@ -4,10 +4,12 @@
 #include <chrono>
 #include <ctime>
 #include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "lamina/points_writer.h"
 #include "lamina/run.h"
 #include "lamina/surface.h"
 #include "reconstruct/mesh_output.h"
@@ -64,6 +66,7 @@ struct Job {
   Stopwatch watch;
   Stopwatch::Moment began = Stopwatch::now();
   SurfaceStats stats;
+  std::unique_ptr<PointsWriter> rejected;  ///< has the samples left out, where these are wanted; not committed
 
   /// Wall seconds since the job began.
   [[nodiscard]] double elapsed() const { return Stopwatch::now().wall - began.wall; }

@@ -162,9 +162,10 @@ bool needs_double(const Census& census, double finest_cell) {
 void refuse_two_alike(const SurfaceSettings& settings, const ReconstructionPlan& plan) {
   for (const AttributeSpec& a : plan.attributes) {
     if ((settings.vertex_levels && a.name == "level") || (settings.vertex_curvature && a.name == "curvature") ||
-        (settings.vertex_filled && a.name == "filled")) {
-      throw Error(ExitCode::usage, fmt::format("{}: the points have an attribute called {} already; leave out --{}",
-                                               plan.input, a.name, a.name));
+        (settings.vertex_filled && a.name == "filled") || (settings.fill_all && a.name == "invented")) {
+      throw Error(ExitCode::usage,
+                  fmt::format("{}: the points have an attribute called {} already; leave out {}", plan.input, a.name,
+                              a.name == "invented" ? "--fill all" : "--" + a.name));
     }
   }
 }
@@ -178,6 +179,7 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
   plan.vertices.levels = s.vertex_levels;
   plan.vertices.curvature = s.vertex_curvature;
   plan.vertices.filled = s.vertex_filled;
+  plan.vertices.invented = s.fill_all;
   plan.vertices.finest_cell = plan.lattice.cell_size(0);
   // Cells follow the radii, so most cells tell the median radius and larger ones as much more. Cells that are smaller
   // between sheets tell nothing.
@@ -189,6 +191,7 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
   if (s.vertex_levels) plan.mesh_attributes.push_back({"level", ScalarType::uint8});
   if (s.vertex_curvature) plan.mesh_attributes.push_back({"curvature", ScalarType::float32});
   if (s.vertex_filled) plan.mesh_attributes.push_back({"filled", ScalarType::uint8});
+  if (s.fill_all) plan.mesh_attributes.push_back({"invented", ScalarType::uint8});
   plan.double_positions = needs_double(cloud.ingested.census, plan.lattice.cell * plan.frame.step);
   plan.vertices.double_positions = plan.double_positions;
   const std::vector<std::string> outputs = output_names(s);
@@ -230,6 +233,8 @@ void check_settings(const SurfaceSettings& s) {
   require(s.close_holes.value_or(0) >= 0, "--close-holes", "0 (none) or positive, in influence radii");
   require(!s.watertight.value_or(false) || (s.close_holes.value_or(1) > 0 && s.cluster != ClusterMode::free),
           "--watertight", "left out with --close-holes 0 and with --cluster free, which close no holes");
+  require(!s.fill_all || s.cluster != ClusterMode::free, "--fill all",
+          "left out with --cluster free, which lets boundary loops meet");
   require(!s.trim || (*s.trim >= 0 && *s.trim < 1), "--trim", "auto or in [0, 1), in influence radii");
   require(s.chord >= 0 && s.chord <= 1, "--chord", "in 0..1");
   require(s.window >= 1 && s.window <= 1024, "--window", "in 1..1024");

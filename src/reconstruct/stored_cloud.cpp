@@ -12,6 +12,7 @@
 #include "lamina/trade.h"
 #include "reconstruct/job.h"
 #include "reconstruct/kept_input.h"
+#include "reconstruct/rejected_samples.h"
 #include "samples/cleaning.h"
 #include "store/input_survey.h"
 
@@ -95,10 +96,13 @@ void clean_cloud(StoredCloud& cloud, const SurfaceSettings& settings, const std:
   CleanCounts& counts = job.stats.cleaned;
   counts.clipped = in.census.clipped;
   counts.skipped = in.census.skipped;
+  Cleaning cleaning{settings.clean, cloud.frame.step, tmp};
+  if (!settings.rejected.empty() && !settings.dry_run) {
+    job.rejected = open_rejected(cloud, settings);
+    cleaning.rejected = [&](const Reasons& reasons) { write_rejected(cloud, reasons, *job.rejected); };
+  }
   if (settings.clean.looks_around()) {
-    job.watch.time("clean", [&] {
-      clean_ingested(in, {settings.clean, cloud.frame.step, tmp}, input_name(settings), counts, job.run);
-    });
+    job.watch.time("clean", [&] { clean_ingested(in, cleaning, input_name(settings), counts, job.run); });
   }
   if (const std::string said = describe(counts); !said.empty())
     job.run.info(fmt::format("{} of {} samples left: {}", in.store.total(), cloud.info.count, said));
@@ -146,11 +150,13 @@ void require_two_files(const SurfaceSettings& settings) {
                        [&](const PointInput& input) { return std::filesystem::equivalent(input.path, name, ignored); });
   };
   const std::vector<std::string> outputs = output_names(settings);
-  for (const std::string& grids : {settings.volume.path, settings.volume.points}) {
-    if (grids.empty()) continue;
-    if (std::find(outputs.begin(), outputs.end(), grids) != outputs.end() || is_input(grids))
-      throw Error(ExitCode::usage, fmt::format("{}: is named twice; give the grids a file of their own", grids));
-  }
+  const auto require_own = [&](const std::string& name, const char* what) {
+    if (!name.empty() && (std::find(outputs.begin(), outputs.end(), name) != outputs.end() || is_input(name)))
+      throw Error(ExitCode::usage, fmt::format("{}: is named twice; give {} a file of their own", name, what));
+  };
+  require_own(settings.volume.path, "the grids");
+  require_own(settings.volume.points, "the grids");
+  require_own(settings.rejected, "the samples left out");
   if (std::find(outputs.begin(), outputs.end(), settings.tiles.folder) != outputs.end() &&
       !settings.tiles.folder.empty())
     throw Error(ExitCode::usage,
@@ -226,7 +232,13 @@ std::string normals_words(const SurfaceSettings& settings) {
 }
 
 StoredCloud read_cloud(const SurfaceSettings& settings, const StorePlace& place, Job& job) {
-  if (names_kept_input(settings) && !place.keep) return open_kept_input(settings.input, settings);
+  if (names_kept_input(settings) && !place.keep) {
+    if (!settings.rejected.empty()) {
+      throw Error(ExitCode::usage,
+                  fmt::format("{}: --rejected wants points; a store was cleaned when it was made", settings.input));
+    }
+    return open_kept_input(settings.input, settings);
+  }
   const std::string scratch = place.keep ? temporary_directory(settings, job.run) : place.directory;
   std::unique_ptr<PointSource> source = open_inputs(settings, scratch, job.run);
   if (settings.normals != NormalsChoice::file) {

@@ -16,6 +16,7 @@
 #include "reconstruct/mesh_output.h"
 #include "reconstruct/plan.h"
 #include "reconstruct/pruner.h"
+#include "reconstruct/rejected_samples.h"
 #include "reconstruct/stored_cloud.h"
 #include "simplify/streamed.h"
 #include "tiles/write_tiles.h"
@@ -130,6 +131,7 @@ void reconstruct(const SurfaceSettings& settings, Job& job) {
     const MeshSink trial(out);
     if (!settings.tiles.folder.empty()) const StagedFolder folder(settings.tiles.folder);
   }
+  if (!settings.dry_run) try_rejected(settings);
   StoredCloud cloud = read_cloud(settings, out.tmp_dir, job);
   if (settings.local) {
     shift_to_origin(cloud);
@@ -143,6 +145,7 @@ void reconstruct(const SurfaceSettings& settings, Job& job) {
     layout.more_paths = out.more_paths;
     layout.tmp_dir = out.tmp_dir;
     write_surface(plan, cloud, layout, settings.receiver.get(), job);
+    if (job.rejected) job.rejected->commit();
   }
   job.finish();
 }

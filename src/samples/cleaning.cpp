@@ -66,6 +66,34 @@ std::uint64_t thin_store(const SlabStore& store, double distance, KeepMasks& mas
   return dropped;
 }
 
+/// Notes the samples whose masks a step has cleared.
+class Noted {
+ public:
+  Noted(const KeepMasks& masks, bool wanted) : masks_(masks), wanted_(wanted) {
+    if (!wanted) return;
+    reasons_.resize(masks.size());
+    before_ = masks;
+  }
+  void step(Reason reason) {
+    if (!wanted_) return;
+    for (std::size_t b = 0; b < masks_.size(); ++b) {
+      if (masks_[b] == before_[b]) continue;
+      reasons_[b].resize(masks_[b].size(), 0);
+      for (std::size_t i = 0; i < masks_[b].size(); ++i) {
+        if (before_[b][i] && !masks_[b][i] && reasons_[b][i] == 0) reasons_[b][i] = reason;
+      }
+    }
+    before_ = masks_;
+  }
+  [[nodiscard]] Reasons* reasons() { return wanted_ ? &reasons_ : nullptr; }
+
+ private:
+  const KeepMasks& masks_;
+  bool wanted_;
+  KeepMasks before_;
+  Reasons reasons_;
+};
+
 Extent extent_of(const SlabStore& store) {
   constexpr std::int32_t kMax = std::numeric_limits<std::int32_t>::max();
   constexpr std::int32_t kMin = std::numeric_limits<std::int32_t>::min();
@@ -92,19 +120,25 @@ KeepMasks choose_samples(const SlabStore& store, const Cleaning& cleaning, Clean
   const CleanSettings& settings = cleaning.settings;
   KeepMasks masks(store.buckets());
   for (std::size_t b = 0; b < masks.size(); ++b) masks[b].assign(store.count(b), true);
+  Noted noted(masks, static_cast<bool>(cleaning.rejected));
   if (settings.merge) counts.merged = thin_store(store, *settings.merge / cleaning.step, masks, run);
+  noted.step(kReasonMerged);
   if (settings.sigma > 0) {
     const Outliers outliers =
         drop_outliers(store, {settings.neighbours, settings.sigma}, cleaning.directory, masks, run);
     counts.outliers = outliers.count;
     counts.outlier_distance = outliers.limit * cleaning.step;
   }
+  noted.step(kReasonOutlier);
   if (settings.strays) {
-    const StrayCounts strays = drop_strays(store, masks, run);
+    const StrayCounts strays = drop_strays(store, masks, run, noted.reasons());
     counts.lonely = strays.lonely;
     counts.off_surface = strays.off_surface;
   }
+  noted.step(kReasonOffSurface);
   if (settings.spacing > 0) counts.thinned = thin_store(store, settings.spacing / cleaning.step, masks, run);
+  noted.step(kReasonThinned);
+  if (cleaning.rejected) cleaning.rejected(*noted.reasons());
   return masks;
 }
 

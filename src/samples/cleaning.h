@@ -1,5 +1,6 @@
 // Cleaning between reading and reconstructing: duplicates, outliers and samples too close together leave a slab store.
 #pragma once
+#include <functional>
 #include <string>
 
 #include "lamina/clean.h"
@@ -14,6 +15,8 @@ struct Cleaning {
   CleanSettings settings;
   double step = 1;        ///< input units per fixed-point step
   std::string directory;  ///< of temporary files
+  /// Where given, is told what is left out while the store still has it.
+  std::function<void(const Reasons&)> rejected{};
 };
 
 /// Carries out the steps that look around; counts go to `counts`. Memory: a bit for each sample and what the steps

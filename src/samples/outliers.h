@@ -30,6 +30,17 @@ std::int32_t counting_cell(const Positions& positions, double wanted);
 /// Which samples of each bucket stay.
 using KeepMasks = std::vector<std::vector<bool>>;
 
+/// Why samples of each bucket do not stay: the number of a reason, 0 where they do. A bucket that loses none may have
+/// no list.
+using Reasons = std::vector<std::vector<std::uint8_t>>;
+enum Reason : std::uint8_t {
+  kReasonMerged = 1,
+  kReasonOutlier = 2,
+  kReasonLonely = 3,      ///< a stray far from its neighbours
+  kReasonOffSurface = 4,  ///< a stray on no surface of its neighbours
+  kReasonThinned = 5,
+};
+
 struct OutlierRule {
   std::uint32_t neighbours = 16;
   double sigma = 2;

@@ -367,7 +367,7 @@ void judge_places(const Neighbourhoods& around, float reach, float margin, Surro
 
 }  // namespace
 
-StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, const RunContext& run) {
+StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, const RunContext& run, Reasons* reasons) {
   const RadiusSurvey radii = survey_radii(store, kSurveyed);
   constexpr double kMostReach = 1 << 27;
   const auto reach = static_cast<float>(std::clamp(kStrayReach * double{radii.median}, 1.0, kMostReach));
@@ -384,7 +384,12 @@ StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, const RunConte
     for (std::size_t p = 0; p < around.tree().size(); ++p) {
       if (!around.is_own(p) || known.stray[p] == kStays) continue;
       masks[around.bucket(p)][around.samples().number[p]] = false;
-      ++(known.stray[p] == kIsLonely ? counts.lonely : counts.off_surface);
+      const bool lonely = known.stray[p] == kIsLonely;
+      ++(lonely ? counts.lonely : counts.off_surface);
+      if (reasons == nullptr) continue;
+      std::vector<std::uint8_t>& bucket = (*reasons)[around.bucket(p)];
+      bucket.resize(store.count(around.bucket(p)), 0);
+      bucket[around.samples().number[p]] = lonely ? kReasonLonely : kReasonOffSurface;
     }
   }
   return counts;
