@@ -24,6 +24,10 @@ SlabIndex seen_from(SlabIndex vertex, SlabIndex corner) {
   return {corner.bits | (vertex.bits & SlabIndex::kNextSlab)};
 }
 
+bool any_crease(const std::vector<LoopSeat>& seats) {
+  return std::any_of(seats.begin(), seats.end(), [](const LoopSeat& s) { return s.crease; });
+}
+
 float squared_distance(const std::array<float, 3>& a, const std::array<float, 3>& b) {
   const float x = a[0] - b[0];
   const float y = a[1] - b[1];
@@ -208,10 +212,10 @@ IsoVertex CellEmitter::centre(const std::array<std::int32_t, 3>& origin) const {
   return out;
 }
 
-/// Where a vertex of the loop goes with its cluster.
-LoopSeat CellEmitter::seat(const Point& p, const std::array<std::int32_t, 3>& origin) const {
-  const IsoVertex& v = vertex(p.vertex);
-  const IsoSlab& slab = p.vertex.next() ? *next_ : *here_;
+/// Where a vertex goes with its cluster.
+LoopSeat CellEmitter::seat(SlabIndex at, const std::array<std::int32_t, 3>& origin) const {
+  const IsoVertex& v = vertex(at);
+  const IsoSlab& slab = at.next() ? *next_ : *here_;
   const SlabIndex i = v.near_high ? v.high : v.low;
   const SurfaceCorner& c = i.next() ? next_->corners[i.index()] : slab.corners[i.index()];
   LoopSeat out;
@@ -228,10 +232,9 @@ bool CellEmitter::cut(const std::array<std::int32_t, 3>& origin) {
   cut_.clear();
   for (const Point& p : loop_) {
     outline_.push_back(p.geometry);
-    seats_.push_back(seat(p, origin));
+    seats_.push_back(seat(p.vertex, origin));
   }
-  const bool creased = std::any_of(seats_.begin(), seats_.end(), [](const LoopSeat& s) { return s.crease; });
-  return creased ? cut_loop_along_creases(outline_, seats_, cut_) : cut_loop(outline_, cut_);
+  return any_crease(seats_) ? cut_loop_along_creases(outline_, seats_, cut_) : cut_loop(outline_, cut_);
 }
 
 /// The triangles of `loop_`.
@@ -245,6 +248,17 @@ void CellEmitter::emit_loop(const std::array<std::int32_t, 3>& origin, TriangleR
   for (std::size_t i = 0; i < loop_.size(); ++i) {
     run.triangles.push_back({middle, loop_[i].vertex, loop_[(i + 1) % loop_.size()].vertex});
   }
+}
+
+bool CellEmitter::emit_creased(const PlainLoop& loop, TriangleRun& run) {
+  if (loop.vertices.size() == 3) return false;  // one triangle either way
+  const std::array<std::int32_t, 3> origin = cache_->window().lattice().position(loop.level, loop.cell);
+  seats_.clear();
+  for (const SlabIndex v : loop.vertices) seats_.push_back(seat(v, origin));
+  cut_.clear();
+  if (!any_crease(seats_) || !cut_loop_along_creases(loop.outline, seats_, cut_)) return false;
+  for (const auto& t : cut_) run.triangles.push_back({loop.vertices[t[0]], loop.vertices[t[1]], loop.vertices[t[2]]});
+  return true;
 }
 
 bool CellEmitter::emit(int level, const Cell& cell, TriangleRun& run) {

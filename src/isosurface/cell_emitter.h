@@ -1,6 +1,9 @@
 // Cells that need more than the case table: the loops of any leaf cell, whatever its neighbours' levels, and their
 // triangles (docs/method.md, "Extraction across levels"). Plain cells at the surface's boundary come here, too.
 #pragma once
+#include <array>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "isosurface/loops.h"
@@ -61,6 +64,16 @@ class CellEmitter {
   /// Appends the cell's triangles and notes at its isovertices where it has none. False when no surface passes.
   bool emit(int level, const Cell& cell, TriangleRun& run);
 
+  /// A loop of the case table in a cell of a level: its isovertices and the middles of their edges.
+  struct PlainLoop {
+    int level = 0;
+    Cell cell;
+    std::span<const SlabIndex> vertices;
+    std::span<const LoopPoint> outline;
+  };
+  /// Appends the loop's triangles along the sharp edges that pass it; false where none does, and the table's will do.
+  bool emit_creased(const PlainLoop& loop, TriangleRun& run);
+
  private:
   struct Point {
     SlabIndex vertex;
@@ -72,7 +85,7 @@ class CellEmitter {
   }
   [[nodiscard]] Point locate(const CellCrossing& c, const std::array<std::int32_t, 3>& origin);
   void emit_loop(const std::array<std::int32_t, 3>& origin, TriangleRun& run);
-  [[nodiscard]] LoopSeat seat(const Point& p, const std::array<std::int32_t, 3>& origin) const;
+  [[nodiscard]] LoopSeat seat(SlabIndex at, const std::array<std::int32_t, 3>& origin) const;
   bool cut(const std::array<std::int32_t, 3>& origin);
   [[nodiscard]] IsoVertex centre(const std::array<std::int32_t, 3>& origin) const;
   void note_quadrants(int level, const Cell& cell, const CellCrossing& c, SlabIndex i, bool covered) const;

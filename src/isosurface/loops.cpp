@@ -82,17 +82,6 @@ std::uint64_t edge_key(int edge) {
   return loop_key(middle[0], middle[1], middle[2]);
 }
 
-LoopPoint edge_middle(int edge) {
-  const std::array<int, 3> low = edge_low_corner(edge);
-  LoopPoint p;
-  for (int i = 0; i < 3; ++i) {
-    p.position[i] = static_cast<float>(low[i]);
-    if (i != edge / 4) p.faces |= static_cast<std::uint8_t>(1 << (2 * i + low[i]));
-  }
-  p.position[edge / 4] = 0.5F;
-  return p;
-}
-
 /// Edge of a cell by axis and the low corner's coordinates.
 int edge_index(int axis, const std::array<int, 3>& low) {
   return axis * 4 + low[(axis + 1) % 3] + 2 * low[(axis + 2) % 3];
@@ -120,6 +109,7 @@ CaseTriangles make_case(int outside) {
   }
   tracer.trace();
   CaseTriangles out;
+  std::ptrdiff_t first = 0;
   for (const LoopTracer::Loop& loop : tracer.loops()) {
     std::vector<LoopPoint> points;
     std::vector<int> edges;
@@ -129,6 +119,9 @@ CaseTriangles make_case(int outside) {
       edges.push_back(edge);
       points.push_back(edge_middle(edge));
     }
+    std::copy(edges.begin(), edges.end(), out.loop_edges.begin() + first);
+    first += static_cast<std::ptrdiff_t>(edges.size());
+    out.loop_size.at(out.loops++) = static_cast<std::uint8_t>(edges.size());
     std::vector<std::array<std::uint8_t, 3>> triangles;
     cut_loop(points, triangles);  // always possible here
     for (const auto& t : triangles) {
@@ -140,6 +133,17 @@ CaseTriangles make_case(int outside) {
 }
 
 }  // namespace
+
+LoopPoint edge_middle(int edge) {
+  const std::array<int, 3> low = edge_low_corner(edge);
+  LoopPoint p;
+  for (int i = 0; i < 3; ++i) {
+    p.position[i] = static_cast<float>(low[i]);
+    if (i != edge / 4) p.faces |= static_cast<std::uint8_t>(1 << (2 * i + low[i]));
+  }
+  p.position[edge / 4] = 0.5F;
+  return p;
+}
 
 void LoopTracer::clear() {
   keys_.clear();

@@ -93,6 +93,10 @@ struct CaseTriangles {
   static constexpr int kMost = 5;
   std::uint8_t count = 0;                       ///< triangles
   std::array<std::uint8_t, 3 * kMost> edges{};  ///< three a triangle, counter-clockwise seen from outside
+  /// The loops that the triangles fill, in their order: a loop of n edges has n - 2 of them.
+  std::uint8_t loops = 0;
+  std::array<std::uint8_t, 4> loop_size{};
+  std::array<std::uint8_t, 12> loop_edges{};  ///< one loop after the other
 };
 
 constexpr std::array<int, 3> edge_low_corner(int edge) {
@@ -102,6 +106,9 @@ constexpr std::array<int, 3> edge_low_corner(int edge) {
   low[(axis + 2) % 3] = (edge >> 1) & 1;
   return low;
 }
+
+/// The middle of an edge, lengths in cells.
+LoopPoint edge_middle(int edge);
 
 /// Indexed by the mask of outside corners; made from the same face rule as every other cell (LoopTracer).
 const std::array<CaseTriangles, 256>& case_table();

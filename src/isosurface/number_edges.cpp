@@ -105,7 +105,7 @@ void put_on_crease(const float* record, float cell, SurfaceCorner& c) {
 
 /// Fills in the tile's surface corners. Trusted corners are read here, which is what corner_value() answers for them in
 /// the finest level that holds them, without its search.
-void fill_corners(const Window& window, const TileView& tile, DoubtfulPoints points, IsoSlab& out) {
+void fill_corners(const Window& window, const TileView& tile, const CornerRule& rule, IsoSlab& out) {
   const CornerBlock& leaf = tile.leaf();
   const int attributes = window.attributes();
   const int slab_layers = window.slab_layers(tile.level);
@@ -138,14 +138,15 @@ void fill_corners(const Window& window, const TileView& tile, DoubtfulPoints poi
         corner_value(window, tile.level, cell, value, extra.data());  // there is one: both ends of the edge are defined
       }
       for (int i = 0; i < 3; ++i) c.offset[i] = -value.distance * value.normal[i];
-      if ((doubtful & one) != 0 && points == DoubtfulPoints::near_samples) clamp_to_samples(record(), size, c.offset);
+      if ((doubtful & one) != 0 && rule.doubtful == DoubtfulPoints::near_samples)
+        clamp_to_samples(record(), size, c.offset);
       c.normal = value.normal;
       c.distance = value.distance;
       c.curvature = value.curvature;
       if (leaf.creased.test(z * 64 + bit) &&
           takes_crease(window, tile.level, cell, static_cast<std::int32_t>(out.slab), record()))
         put_on_crease(record(), cell_of_value(window, tile.level, cell), c);
-      c.overhang = overhang(window, tile.level, cell, value.normal);
+      if (rule.trim > 0) c.overhang = overhang(window, tile.level, cell, value.normal, rule.trim);
       for (int a = 0; a < attributes; ++a) out.corner_attributes[a][id] = extra[a];
       out.corners[id++] = c;
     });
@@ -238,7 +239,7 @@ class Numbering {
 
 }  // namespace
 
-void number_edges(Window& window, std::int32_t slab, DoubtfulPoints doubtful, IsoSlab* previous, IsoSlab& out) {
+void number_edges(Window& window, std::int32_t slab, const CornerRule& rule, IsoSlab* previous, IsoSlab& out) {
   out.slab = slab;
   out.triangles.clear();
   const std::vector<TileView> views = slab_tiles(window, slab);
@@ -250,7 +251,7 @@ void number_edges(Window& window, std::int32_t slab, DoubtfulPoints doubtful, Is
   // Again: a corner that a finer level holds may have been marked in a tile without edges.
   const std::vector<TileView> surface = at_surface(views);
   assign_numbers(window, surface, out);
-  for_views(window, surface, [&](const TileView& tile, BlockCache&) { fill_corners(window, tile, doubtful, out); });
+  for_views(window, surface, [&](const TileView& tile, BlockCache&) { fill_corners(window, tile, rule, out); });
   for_views(window, surface, [&](const TileView& tile, BlockCache& cache) {
     Numbering numbering(out, cache);
     const std::int32_t first = window.lattice().first_layer(tile.level, slab);

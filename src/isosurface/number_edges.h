@@ -21,6 +21,12 @@ enum class DoubtfulPoints : std::uint8_t {
   as_extended,   ///< where the planes of their neighbours lead: for rims that are cut where the samples end
 };
 
+/// What is wanted of the corners at the surface.
+struct CornerRule {
+  DoubtfulPoints doubtful = DoubtfulPoints::near_samples;
+  float trim = 0;  ///< overhang at which rims are going to be cut, support radii; 0: nobody asks for it
+};
+
 /// Calls for consecutive slabs go: number_edges(0), number_edges(1), triangulate(0), separate_fans(0), number_edges(2),
 /// triangulate(1), separate_fans(1), ...; one empty slab beyond the last is numbered too. Slab s - 1 may leave the
 /// window after triangulate(s), and its IsoSlab the hands of the caller after separate_fans(s). Results are the same
@@ -33,6 +39,6 @@ enum class DoubtfulPoints : std::uint8_t {
 /// `previous` (null before the first slab) is the slab below: its vertical edges that end in this slab are completed
 /// now (`high`, `t`). Order of vertices: level, tile (z, y, x), layer, axis, place in the layer; of corners: level,
 /// tile, layer, place. A corner that several levels hold is listed once, with the finest.
-void number_edges(Window& window, std::int32_t slab, DoubtfulPoints doubtful, IsoSlab* previous, IsoSlab& out);
+void number_edges(Window& window, std::int32_t slab, const CornerRule& rule, IsoSlab* previous, IsoSlab& out);
 
 }  // namespace lamina

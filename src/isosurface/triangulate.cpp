@@ -3,7 +3,10 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
 #include <numeric>
+#include <span>
 
 #include "base/resize_anew.h"
 #include "isosurface/cell_emitter.h"
@@ -21,16 +24,24 @@ constexpr std::size_t kRunTiles = 16;
 struct PlainCase {
   int count = 0;
   std::array<std::uint16_t, 3 * CaseTriangles::kMost> edges{};
+  std::array<std::uint16_t, 12> loop_edges{};
+  std::array<LoopPoint, 12> loop_points{};
 };
+
+std::uint16_t edge_offset(int edge) {
+  const std::array<int, 3> low = edge_low_corner(edge);
+  return static_cast<std::uint16_t>(EdgeNumbers::offset(edge / 4, low[0], low[1], low[2]));
+}
 
 std::array<PlainCase, 256> plain_cases() {
   std::array<PlainCase, 256> out;
   for (int i = 0; i < 256; ++i) {
     const CaseTriangles& c = case_table()[i];
     out[i].count = c.count;
-    for (int k = 0; k < 3 * c.count; ++k) {
-      const std::array<int, 3> low = edge_low_corner(c.edges[k]);
-      out[i].edges[k] = static_cast<std::uint16_t>(EdgeNumbers::offset(c.edges[k] / 4, low[0], low[1], low[2]));
+    for (int k = 0; k < 3 * c.count; ++k) out[i].edges[k] = edge_offset(c.edges[k]);
+    for (std::size_t k = 0; k < c.loop_edges.size(); ++k) {
+      out[i].loop_edges[k] = edge_offset(c.loop_edges[k]);
+      out[i].loop_points[k] = edge_middle(c.loop_edges[k]);
     }
   }
   return out;
@@ -162,11 +173,11 @@ class TilePass {
         mixed &= ~partial | cells_with(tile, z, valid_edges);
         partial &= mixed;
       }
-      if (mixed != 0) partial |= mixed & beside_creased(tile, z);
+      const std::uint64_t creased = (mixed & ~partial) == 0 ? 0 : mixed & ~partial & beside_creased(tile, z);
       if ((mixed & ~partial) != 0) {
         for (loaded = std::max(loaded, z); loaded <= z + 1; ++loaded) load_edges(tile, loaded);
       }
-      emit_layer(tile, z, below, above, {general, mixed, partial}, out);
+      emit_layer(tile, z, below, above, {general, mixed, partial, creased}, out);
       below = above;
     }
   }
@@ -175,6 +186,7 @@ class TilePass {
   struct Kinds {
     std::uint64_t general, mixed;
     std::uint64_t partial;  ///< of the mixed ones those that the table does not serve
+    std::uint64_t creased;  ///< and those whose loops it serves, but a sharp edge may pass them
   };
 
   void load_edges(const TileView& tile, int z) {
@@ -205,6 +217,11 @@ class TilePass {
       }
       const PlainCase& c = (*cases_)[signs];
       const int base = EdgeNumbers::offset(0, bit & 7, bit >> 3, z);
+      if (((kinds.creased >> bit) & 1U) != 0) {
+        flush();
+        emit_creased(tile, z * 64 + bit, signs, out);
+        return;
+      }
       for (int t = 0; t < 3 * c.count; t += 3) {
         *end++ = {SlabIndex{numbers_.at(base + c.edges[t])}, SlabIndex{numbers_.at(base + c.edges[t + 1])},
                   SlabIndex{numbers_.at(base + c.edges[t + 2])}};
@@ -212,6 +229,30 @@ class TilePass {
     });
     out.counts.crossing_cells += static_cast<unsigned>(std::popcount(kinds.mixed & ~special));
     flush();
+  }
+
+  /// A cell that the table serves, loop by loop: along the sharp edge where one passes.
+  void emit_creased(const TileView& tile, int offset, unsigned signs, TriangleRun& out) {
+    const CaseTriangles& of = case_table()[signs];
+    const PlainCase& c = (*cases_)[signs];
+    const int base = EdgeNumbers::offset(0, offset & 7, (offset >> 3) & 7, offset >> 6);
+    const auto vertex = [&](std::uint16_t edge) { return SlabIndex{numbers_.at(base + edge)}; };
+    std::array<SlabIndex, 12> vertices;
+    std::size_t first = 0;  // edge of the loop
+    std::size_t done = 0;   // indices of its triangles
+    for (std::size_t k = 0; k < of.loops; ++k) {
+      const std::size_t n = of.loop_size[k];
+      for (std::size_t i = 0; i < n; ++i) vertices[i] = vertex(c.loop_edges[first + i]);
+      const std::span<const LoopPoint> outline(&c.loop_points[first], n);
+      const std::size_t end = done + 3 * (n - 2);
+      if (emitter_.emit_creased({tile.level, tile.cell(offset), {vertices.data(), n}, outline}, out)) {
+        done = end;
+      } else {
+        for (; done < end; done += 3)
+          out.triangles.push_back({vertex(c.edges[done]), vertex(c.edges[done + 1]), vertex(c.edges[done + 2])});
+      }
+      first += n;
+    }
   }
 
   const Lattice& lattice_;

@@ -18,6 +18,18 @@ float dot(const std::array<float, 3>& a, const float* b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
+/// A neighbouring corner and its weight, in the order of for_neighbours().
+struct Beside {
+  int x, y, z;
+  float weight;
+};
+constexpr std::array<Beside, 26> kAround = [] {
+  std::array<Beside, 26> out{};
+  std::size_t n = 0;
+  for_neighbours([&](int dx, int dy, int dz) { out[n++] = {dx, dy, dz, neighbour_weight(dx, dy, dz)}; });
+  return out;
+}();
+
 /// The length of a vector's part across a normal.
 float across(const std::array<float, 3>& v, const std::array<float, 3>& normal) {
   const float along = dot(normal, v.data());
@@ -46,13 +58,15 @@ std::array<float, 3> unpacked_lean(float packed) {
   return lean;
 }
 
-float overhang(const Window& window, int level, const Cell& corner, const std::array<float, 3>& normal) {
+float overhang(const Window& window, int level, const Cell& corner, const std::array<float, 3>& normal, float trim) {
   const CornerBlock* const block = window.probe(level, block_of(corner));
   const int here = offset_in_block(corner);
+  const int slab_layers = window.slab_layers(level);
+  const int layer_shift = std::countr_zero(static_cast<unsigned>(slab_layers));
   const auto record_at = [&](const CornerBlock* b, int offset) -> const float* {
     if (b == nullptr || !b->seen.test(offset)) return nullptr;
-    const CornerValues& values = b->values[window.slab_in_leaf(level, offset >> 6)];
-    return values.count == 0 ? nullptr : values.of(b->value_index(offset, window.slab_layers(level)));
+    const CornerValues& values = b->values[static_cast<std::size_t>((offset >> 6) >> layer_shift)];
+    return values.count == 0 ? nullptr : values.of(b->value_index(offset, slab_layers));
   };
   const float* const own = record_at(block, here);
   std::array<float, 3> sum{};
@@ -61,21 +75,24 @@ float overhang(const Window& window, int level, const Cell& corner, const std::a
     sum = unpacked_lean(own[kLean]);
     total = 1;
     const float alone = across(sum, normal);
-    if (alone < kUpright && block->trusted.test(here)) return alone;
+    if (alone < kUpright * trim && block->trusted.test(here)) return alone;
   }
-  for_neighbours([&](int dx, int dy, int dz) {
-    const int x = (here & 7) + dx;
-    const int y = ((here >> 3) & 7) + dy;
-    const int z = (here >> 6) + dz;
+  for (const Beside& to : kAround) {
+    const int x = (here & 7) + to.x;
+    const int y = ((here >> 3) & 7) + to.y;
+    const int z = (here >> 6) + to.z;
     const float* const v =
         record_at(block->around[CornerBlock::towards(x >> 3, y >> 3, z >> 3)], BlockMask::offset(x & 7, y & 7, z & 7));
-    if (v == nullptr || dot(normal, v + kNormalX) < kSameSheet) return;
-    const float w = neighbour_weight(dx, dy, dz);
-    const std::array<float, 3> lean = unpacked_lean(v[kLean]);
-    const std::array<float, 3> to{static_cast<float>(dx), static_cast<float>(dy), static_cast<float>(dz)};
-    for (std::size_t k = 0; k < 3; ++k) sum[k] += w * (lean[k] + (own == nullptr ? kLeanPerCell * to[k] : 0.0F));
-    total += w;
-  });
+    if (v == nullptr || dot(normal, v + kNormalX) < kSameSheet) continue;
+    std::array<float, 3> lean = unpacked_lean(v[kLean]);
+    if (own == nullptr) {
+      lean[0] += kLeanPerCell * static_cast<float>(to.x);
+      lean[1] += kLeanPerCell * static_cast<float>(to.y);
+      lean[2] += kLeanPerCell * static_cast<float>(to.z);
+    }
+    for (std::size_t k = 0; k < 3; ++k) sum[k] += to.weight * lean[k];
+    total += to.weight;
+  }
   if (total <= 0) return 1;
   for (float& s : sum) s /= total;
   return across(sum, normal);

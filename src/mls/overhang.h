@@ -11,8 +11,9 @@
 
 namespace lamina {
 
-/// A corner that leans by less than this (support radii) and is trusted has samples on all sides without asking others.
-inline constexpr float kUpright = 0.1F;
+/// A corner that leans by less than this share of the overhang at which rims are cut, and is trusted, has samples on
+/// all sides without asking others.
+inline constexpr float kUpright = 0.55F;
 /// Neighbours belong to the same sheet while the cosine between their normals is more than this (60 degrees).
 inline constexpr float kSameSheet = 0.5F;
 /// A corner that has no samples of its own leans towards those neighbours that do, by so much for each cell: the mean
@@ -26,7 +27,7 @@ std::array<float, 3> unpacked_lean(float packed);
 
 /// The length, along the surface, of the mean lean of a corner and its neighbours on the same sheet (support radii); 1
 /// where there are none. `corner` is the finest level's that holds it, `normal` its own. The slabs around must be
-/// projected.
-float overhang(const Window& window, int level, const Cell& corner, const std::array<float, 3>& normal);
+/// projected. That of a corner that is upright for a cut at `trim` is its own lean.
+float overhang(const Window& window, int level, const Cell& corner, const std::array<float, 3>& normal, float trim);
 
 }  // namespace lamina

@@ -55,8 +55,7 @@ StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& surve
   if (out.trim > 0 && survey.noise > kNoisy) out.doubtful = DoubtfulPoints::as_extended;
   if (s.cell) out.feed.cell = *s.cell;
   if (s.refit) out.refit.support = *s.refit;
-  const bool clean = survey.noise <= kNoisy;
-  out.projection.creases = s.features.value_or(!s.blend && clean) && !s.diffuse;
+  out.projection.creases = s.features.value_or(!s.blend && survey.noise <= kSharp) && !s.diffuse;
   if (out.projection.creases && !s.refit && survey.noise <= kExact && survey.blurred > kBlurred) {
     out.refit.support = double{kConsensusReach};
     out.refit.only_blurred = true;

@@ -2,7 +2,11 @@
 
 #include <tbb/parallel_invoke.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <limits>
+#include <utility>
+#include <vector>
 
 namespace lamina {
 namespace {
@@ -11,11 +15,6 @@ constexpr std::size_t kLeaf = 12;            ///< samples a leaf has at most
 constexpr std::size_t kParallel = 1u << 14;  ///< smaller ranges are built by one thread
 
 }  // namespace
-
-struct SampleTree::Item {
-  std::array<std::int32_t, 3> at;
-  std::uint32_t number;
-};
 
 struct SampleTree::Query {
   std::array<std::int32_t, 3> at;
@@ -49,46 +48,105 @@ struct SampleTree::LeafQuery {
   float bound = 0;                            ///< the largest of their own
 };
 
-SampleTree::SampleTree(std::span<const std::int32_t> x, std::span<const std::int32_t> y,
-                       std::span<const std::int32_t> z) {
+/// Brings the item that sorting along an axis would put at `nth` there, and the smaller ones before it. Where
+/// coordinates are as good as random every second branch of std::nth_element is guessed wrong; this partition has none.
+class SampleTree::Median {
+ public:
+  Median(std::vector<Item>& items, std::size_t axis) : items_(items), axis_(axis) {}
+
+  void select(std::size_t begin, std::size_t nth, std::size_t end) {
+    constexpr std::size_t kFew = 24;
+    constexpr int kMostRounds = 64;  // far more than any but made-up coordinates take
+    for (int round = 0; end - begin > kFew && round < kMostRounds; ++round) {
+      const std::size_t middle = partition(begin, end);
+      if (nth < middle) {
+        end = middle;
+      } else if (nth > middle) {
+        begin = middle + 1;
+      } else {
+        return;
+      }
+    }
+    std::nth_element(at(begin), at(nth), at(end), [this](const Item& a, const Item& b) { return key(a) < key(b); });
+  }
+
+ private:
+  /// Distinct, in the order of coordinates.
+  [[nodiscard]] std::int64_t key(const Item& item) const {
+    return std::int64_t{item.at[axis_]} * kNumbers + item.number;
+  }
+  [[nodiscard]] std::vector<Item>::iterator at(std::size_t i) const {
+    return items_.begin() + static_cast<std::ptrdiff_t>(i);
+  }
+  /// About an item from near the middle; returns its place.
+  std::size_t partition(std::size_t begin, std::size_t end) {
+    const std::size_t last = end - 1;
+    std::swap(items_[ninther(begin, end)], items_[last]);
+    const std::int64_t pivot = key(items_[last]);
+    std::size_t middle = begin;
+    for (std::size_t i = begin; i < last; ++i) {
+      const Item item = items_[i];
+      items_[i] = items_[middle];
+      items_[middle] = item;
+      middle += key(item) < pivot ? 1 : 0;
+    }
+    std::swap(items_[middle], items_[last]);
+    return middle;
+  }
+  [[nodiscard]] std::size_t ninther(std::size_t begin, std::size_t end) const {
+    const std::size_t step = (end - begin) / 9;
+    const auto of_three = [this](std::size_t a, std::size_t b, std::size_t c) {
+      if (key(items_[a]) > key(items_[b])) std::swap(a, b);
+      if (key(items_[b]) > key(items_[c])) b = key(items_[a]) > key(items_[c]) ? a : c;
+      return b;
+    };
+    const auto triple = [&](std::size_t first) { return of_three(first, first + step, first + 2 * step); };
+    return of_three(triple(begin), triple(begin + 3 * step), triple(begin + 6 * step));
+  }
+
+  static constexpr std::int64_t kNumbers = std::int64_t{1} << 32;
+  std::vector<Item>& items_;
+  std::size_t axis_;
+};
+
+void SampleTree::assign(std::span<const std::int32_t> x, std::span<const std::int32_t> y,
+                        std::span<const std::int32_t> z) {
   const std::size_t n = x.size();
-  std::vector<Item> items(n);
-  for (std::size_t i = 0; i < n; ++i) items[i] = {{x[i], y[i], z[i]}, static_cast<std::uint32_t>(i)};
+  items_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) items_[i] = {{x[i], y[i], z[i]}, static_cast<std::uint32_t>(i)};
+  depth_ = 0;
   while ((n >> depth_) > kLeaf) ++depth_;
   nodes_.resize((std::size_t{1} << depth_) - 1);
-  if (n > 0) build(items, {0, 0, n, 0});
+  if (n > 0) build({0, 0, n, 0});
   order_.resize(n);
   for (auto& axis : at_) axis.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    order_[i] = items[i].number;
-    for (std::size_t a = 0; a < 3; ++a) at_[a][i] = items[i].at[a];
+    order_[i] = items_[i].number;
+    for (std::size_t a = 0; a < 3; ++a) at_[a][i] = items_[i].at[a];
   }
 }
 
-void SampleTree::build(std::vector<Item>& items, const Subtree& tree) {
+void SampleTree::build(const Subtree& tree) {
   if (tree.depth == depth_) return;
-  std::array<std::int32_t, 3> low = items[tree.begin].at;
+  std::array<std::int32_t, 3> low = items_[tree.begin].at;
   std::array<std::int32_t, 3> high = low;
   for (std::size_t i = tree.begin + 1; i < tree.end; ++i) {
     for (std::size_t a = 0; a < 3; ++a) {
-      low[a] = std::min(low[a], items[i].at[a]);
-      high[a] = std::max(high[a], items[i].at[a]);
+      low[a] = std::min(low[a], items_[i].at[a]);
+      high[a] = std::max(high[a], items_[i].at[a]);
     }
   }
   std::size_t axis = 0;
   for (std::size_t a = 1; a < 3; ++a) {
     if (high[a] - low[a] > high[axis] - low[axis]) axis = a;
   }
-  const auto at = [&](std::size_t i) { return items.begin() + static_cast<std::ptrdiff_t>(i); };
-  std::nth_element(at(tree.begin), at(tree.middle()), at(tree.end), [axis](const Item& a, const Item& b) {
-    return a.at[axis] < b.at[axis] || (a.at[axis] == b.at[axis] && a.number < b.number);
-  });
-  nodes_[tree.node] = {items[tree.middle()].at[axis], static_cast<int>(axis)};
+  Median(items_, axis).select(tree.begin, tree.middle(), tree.end);
+  nodes_[tree.node] = {items_[tree.middle()].at[axis], static_cast<int>(axis)};
   if (tree.end - tree.begin > kParallel) {
-    tbb::parallel_invoke([&] { build(items, tree.lower()); }, [&] { build(items, tree.upper()); });
+    tbb::parallel_invoke([&] { build(tree.lower()); }, [&] { build(tree.upper()); });
   } else {
-    build(items, tree.lower());
-    build(items, tree.upper());
+    build(tree.lower());
+    build(tree.upper());
   }
 }
 

@@ -26,8 +26,14 @@ class SampleTree {
  public:
   static constexpr std::size_t kMostNeighbours = 256;
 
-  /// Wants three arrays of one length below 2^32, coordinates within +-(2^30 - 1).
-  SampleTree(std::span<const std::int32_t> x, std::span<const std::int32_t> y, std::span<const std::int32_t> z);
+  SampleTree() = default;
+  SampleTree(std::span<const std::int32_t> x, std::span<const std::int32_t> y, std::span<const std::int32_t> z) {
+    assign(x, y, z);
+    items_ = {};
+  }
+  /// Other samples instead, in the memory there is. Wants three arrays of one length below 2^32, coordinates within
+  /// +-(2^30 - 1).
+  void assign(std::span<const std::int32_t> x, std::span<const std::int32_t> y, std::span<const std::int32_t> z);
 
   [[nodiscard]] std::size_t size() const { return order_.size(); }
   /// Number, in the arrays given, of the sample at each place.
@@ -65,13 +71,17 @@ class SampleTree {
   [[nodiscard]] const std::vector<std::int32_t>& axis(int a) const { return at_[static_cast<std::size_t>(a)]; }
 
  private:
-  struct Item;
+  struct Item {
+    std::array<std::int32_t, 3> at;
+    std::uint32_t number;
+  };
   struct Node {
     std::int32_t split = 0;  ///< samples before the middle are not above it, the others not below
     int axis = 0;
   };
   struct Query;
   struct LeafQuery;
+  class Median;
 
   /// What lies below a node: places [begin, end).
   struct Subtree {
@@ -83,7 +93,7 @@ class SampleTree {
   };
   [[nodiscard]] Subtree whole() const { return {0, 0, order_.size(), 0}; }
 
-  void build(std::vector<Item>& items, const Subtree& tree);
+  void build(const Subtree& tree);
   void search(Query& q, const Subtree& tree, float squared) const;
   void search(LeafQuery& q, const Subtree& tree, float squared) const;
 
@@ -103,6 +113,7 @@ class SampleTree {
     if (side >= 0 || side * side <= squared) within(place, squared, visit, tree.upper());
   }
 
+  std::vector<Item> items_;                      ///< being built
   std::array<std::vector<std::int32_t>, 3> at_;  ///< by place
   std::vector<std::uint32_t> order_;
   std::vector<Node> nodes_;  ///< a heap: the children of i are 2 i + 1 and 2 i + 2; all leaves are at one depth

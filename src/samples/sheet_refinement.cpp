@@ -14,11 +14,11 @@
 namespace lamina {
 namespace {
 
-/// Normals are summed in units of 1 / kUnit: finer than they are measured, and a cell may hold 2^43 of them.
-constexpr double kUnit = 1 << 20;
+/// Normals are summed in units of 1 / kUnit: far finer than what is asked of the sums.
+constexpr double kUnit = 1 << 9;
 
-std::int64_t in_units(float v) {
-  return std::llrint(static_cast<double>(v) * kUnit);
+std::uint32_t in_units(float v) {
+  return static_cast<std::uint32_t>(std::lrint(v * static_cast<float>(kUnit)));
 }
 
 std::int64_t cell_row(std::int64_t z, std::int64_t side) {
@@ -66,7 +66,7 @@ void SheetRefinement::rehash() {
     if (index == kNone) continue;
     const Block& b = blocks_[index];
     const std::int64_t first_needed = cell_row(needed_from_, lattice_.cell_size(b.level)) - 1;
-    (2 * std::int64_t{b.at.z} + 1 < first_needed ? free_ : kept).push_back(index);
+    (kSide * (std::int64_t{b.at.z} + 1) <= first_needed ? free_ : kept).push_back(index);
   }
   std::size_t size = slots_.size();
   while (4 * (kept.size() + 1) > size) size *= 2;
@@ -78,21 +78,23 @@ void SheetRefinement::push(const LocalSamples& samples, const std::vector<std::u
                            const std::vector<float>& support) {
   WaitingBucket& bucket = waiting_.emplace_back();
   bucket.cell_of.assign(samples.size(), kNone);
-  std::uint32_t index = kNone;  // of the last sample's block: successive samples lie close to each other
+  // Of the last sample's block, by level: successive samples lie close to each other.
+  std::vector<std::uint32_t> last(to_cell_.size(), kNone);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     if (!(support[i] > 0) || level[i] == 0) continue;
     const FloorDivider& to_cell = to_cell_[level[i]];
     const Cell cell{to_cell(samples.x[i]), to_cell(samples.y[i]), to_cell(samples.z[i])};
-    const Cell block{cell.x >> 1, cell.y >> 1, cell.z >> 1};
-    if (index == kNone || blocks_[index].level != level[i] || blocks_[index].at != block)
-      index = touch(block, level[i]);
-    const auto in_block = static_cast<std::uint32_t>((cell.z & 1) << 2 | (cell.y & 1) << 1 | (cell.x & 1));
+    const Cell block{cell.x >> kSideBits, cell.y >> kSideBits, cell.z >> kSideBits};
+    std::uint32_t& index = last[level[i]];
+    if (index == kNone || blocks_[index].at != block) index = touch(block, level[i]);
+    constexpr int kLast = kSide - 1;
+    const std::uint32_t in_block = index_in_block(cell.x & kLast, cell.y & kLast, cell.z & kLast);
     CellNormals& c = blocks_[index].cells[in_block];
     ++c.samples;
     c.x += in_units(samples.nx[i]);
     c.y += in_units(samples.ny[i]);
     c.z += in_units(samples.nz[i]);
-    bucket.cell_of[i] = index * 8 + in_block;
+    bucket.cell_of[i] = index * kCells + in_block;
     bucket.low = std::min(bucket.low, std::int64_t{samples.z[i]});
     bucket.high = std::max(bucket.high, (std::int64_t{cell.z} + 2) * lattice_.cell_size(level[i]));
   }
@@ -100,29 +102,56 @@ void SheetRefinement::push(const LocalSamples& samples, const std::vector<std::u
 
 /// Of the cells wanted.
 void SheetRefinement::decide(Block& block) const {
-  static constexpr std::array<CellNormals, 8> kEmpty{};
-  std::array<const CellNormals*, 27> around{};
+  // The block and one cell around it, dense.
+  constexpr int kRow = kSide + 2;
+  std::array<CellNormals, static_cast<std::size_t>(kRow * kRow * kRow)> field{};
+  const auto in_field = [](int x, int y, int z) {
+    return static_cast<std::size_t>(((z + 1) * kRow + y + 1) * kRow + x + 1);
+  };
+  /// Cells of the block `d` blocks away, along one axis, that are in the field.
+  const auto range = [](int d) {
+    return d < 0 ? std::pair{kSide - 1, kSide} : d > 0 ? std::pair{0, 1} : std::pair{0, kSide};
+  };
   for (int k = 0; k < 27; ++k) {
-    const std::uint32_t index = slots_[slot_of(block.at + Cell{k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1}, block.level)];
-    around[static_cast<std::size_t>(k)] = index == kNone ? kEmpty.data() : blocks_[index].cells.data();
-  }
-  for (unsigned bits = block.wanted; bits != 0; bits &= bits - 1) {
-    const int cell = std::countr_zero(bits);
-    CellNormals sum;
-    for (int k = 0; k < 27; ++k) {
-      // Counted from the lower end of the block below.
-      const int x = (cell & 1) + k % 3 + 1, y = (cell >> 1 & 1) + k / 3 % 3 + 1, z = (cell >> 2) + k / 9 + 1;
-      const CellNormals& c = around[static_cast<std::size_t>((z >> 1) * 9 + (y >> 1) * 3 + (x >> 1))]
-                                   [(z & 1) << 2 | (y & 1) << 1 | (x & 1)];
-      sum.x += c.x;
-      sum.y += c.y;
-      sum.z += c.z;
-      sum.samples += c.samples;
+    const int dx = k % 3 - 1;
+    const int dy = k / 3 % 3 - 1;
+    const int dz = k / 9 - 1;
+    const std::uint32_t index = slots_[slot_of(block.at + Cell{dx, dy, dz}, block.level)];
+    if (index == kNone) continue;
+    const std::array<CellNormals, kCells>& cells = blocks_[index].cells;
+    const auto [x_begin, x_end] = range(dx);
+    const auto [y_begin, y_end] = range(dy);
+    const auto [z_begin, z_end] = range(dz);
+    for (int z = z_begin; z < z_end; ++z) {
+      for (int y = y_begin; y < y_end; ++y) {
+        std::copy(&cells[index_in_block(x_begin, y, z)], &cells[index_in_block(x_begin, y, z)] + (x_end - x_begin),
+                  &field[in_field(dx * kSide + x_begin, dy * kSide + y, dz * kSide + z)]);
+      }
     }
-    const auto square = [](std::int64_t v) { return static_cast<double>(v) * static_cast<double>(v); };
+  }
+  for (std::uint64_t bits = block.wanted; bits != 0; bits &= bits - 1) {
+    const int cell = std::countr_zero(bits);
+    const int x = cell % kSide;
+    const int y = cell / kSide % kSide;
+    const int z = cell / (kSide * kSide);
+    CellNormals sum;
+    for (int dz = -1; dz <= 1; ++dz) {
+      for (int dy = -1; dy <= 1; ++dy) {
+        const CellNormals* const row = &field[in_field(x - 1, y + dy, z + dz)];
+        for (int i = 0; i < 3; ++i) {
+          sum.x += row[i].x;
+          sum.y += row[i].y;
+          sum.z += row[i].z;
+          sum.samples += row[i].samples;
+        }
+      }
+    }
+    const auto square = [](std::uint32_t v) {
+      const auto whole = static_cast<double>(static_cast<std::int32_t>(v));
+      return whole * whole;
+    };
     const double limit = kCancelledShare * kUnit * static_cast<double>(sum.samples);
-    if (square(sum.x) + square(sum.y) + square(sum.z) < limit * limit)
-      block.finer = static_cast<std::uint8_t>(block.finer | 1U << cell);
+    if (square(sum.x) + square(sum.y) + square(sum.z) < limit * limit) block.finer |= std::uint64_t{1} << cell;
   }
   block.decided |= block.wanted;
   block.wanted = 0;
@@ -135,19 +164,19 @@ bool SheetRefinement::pop(std::int64_t pushed_below, std::vector<bool>& finer) {
   std::vector<std::uint32_t> undecided;
   for (const std::uint32_t cell : bucket.cell_of) {
     if (cell == kNone) continue;
-    Block& block = blocks_[cell / 8];
-    const unsigned bit = 1U << cell % 8;
+    Block& block = blocks_[cell / kCells];
+    const std::uint64_t bit = std::uint64_t{1} << cell % kCells;
     if (((block.decided | block.wanted) & bit) != 0) continue;
-    if (block.wanted == 0) undecided.push_back(cell / 8);
-    block.wanted = static_cast<std::uint8_t>(block.wanted | bit);
+    if (block.wanted == 0) undecided.push_back(cell / kCells);
+    block.wanted |= bit;
   }
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, undecided.size(), 256), [&](const auto& range) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, undecided.size(), 64), [&](const auto& range) {
     for (std::size_t k = range.begin(); k < range.end(); ++k) decide(blocks_[undecided[k]]);
   });
   finer.assign(bucket.cell_of.size(), false);
   for (std::size_t i = 0; i < finer.size(); ++i) {
     const std::uint32_t cell = bucket.cell_of[i];
-    finer[i] = cell != kNone && (blocks_[cell / 8].finer >> cell % 8 & 1U) != 0;
+    finer[i] = cell != kNone && (blocks_[cell / kCells].finer >> cell % kCells & 1U) != 0;
   }
   needed_from_ = pushed_below;
   for (const WaitingBucket& w : waiting_) needed_from_ = std::min(needed_from_, w.low);

@@ -34,21 +34,28 @@ class SheetRefinement {
 
  private:
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
-  /// The samples in a cell. Sums of integers do not depend on their order.
+  /// The samples in a cell. Sums of integers do not depend on their order; of more than 2^22 samples they wrap, and say
+  /// nothing.
   struct CellNormals {
-    std::int64_t x = 0, y = 0, z = 0;  ///< sum of the normals, in units of 1 / kUnit
+    std::uint32_t x = 0, y = 0, z = 0;  ///< sum of the normals, in units of 1 / kUnit, two's complement
     std::uint32_t samples = 0;
   };
-  /// 2^3 cells of a level: what surrounds all of them is found by 27 look-ups instead of by 27 for each. A bit per
-  /// cell.
+  /// Cells along a side of a block: what surrounds all of its cells is found by 27 look-ups.
+  static constexpr int kSide = 4;
+  static constexpr int kSideBits = 2;
+  static constexpr int kCells = kSide * kSide * kSide;
+  static constexpr std::uint32_t index_in_block(int x, int y, int z) {
+    return static_cast<std::uint32_t>((z * kSide + y) * kSide + x);
+  }
+  /// Cells of a level; a bit per cell.
   struct Block {
-    Cell at;  ///< coordinates of its cells, halved
+    Cell at;  ///< coordinates of its cells, divided by kSide
     std::uint8_t level = 0;
-    std::uint8_t wanted = 0, decided = 0, finer = 0;
-    std::array<CellNormals, 8> cells{};
+    std::uint64_t wanted = 0, decided = 0, finer = 0;
+    std::array<CellNormals, kCells> cells{};
   };
   struct WaitingBucket {
-    std::vector<std::uint32_t> cell_of;  ///< of each sample: index of its block * 8 + cell; kNone: does not count
+    std::vector<std::uint32_t> cell_of;  ///< of each sample: index of its block * kCells + cell; kNone: does not count
     std::int64_t low = std::numeric_limits<std::int64_t>::max();   ///< least z of the samples that count
     std::int64_t high = std::numeric_limits<std::int64_t>::min();  ///< upper end of the cells around them
   };

@@ -7,19 +7,19 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
-#include <memory>
 #include <utility>
+#include <vector>
 
+#include "base/resize_anew.h"
 #include "lamina/error.h"
+#include "samples/neighbourhoods.h"
 #include "samples/sample_tree.h"
 #include "samples/sampling_survey.h"
 
 namespace lamina {
 namespace {
 
-constexpr std::uint64_t kSurveyed = 1u << 16;   ///< samples the spacing is taken from
-constexpr std::uint64_t kStraySlab = 1u << 17;  ///< samples tested together, at least
+constexpr std::uint64_t kSurveyed = 1u << 16;  ///< samples the spacing is taken from
 /// How far neighbours are looked for, in median density radii (two spacings each).
 constexpr double kStrayReach = 6;
 /// Neighbours looked for, so that enough are left when some of them are strays.
@@ -32,120 +32,6 @@ constexpr float kPlainCosine = 0.6F;
 constexpr float kPlainSpread = 4;
 constexpr float kPlainThickness = 0.25F;
 
-struct Oriented {
-  std::vector<std::int32_t> x, y, z;
-  std::vector<float> nx, ny, nz;
-  std::vector<std::size_t> number;  ///< in its bucket
-  [[nodiscard]] std::size_t size() const { return x.size(); }
-};
-
-/// The samples of a slab of buckets and of what lies around them, in a tree.
-class Neighbourhoods {
- public:
-  Neighbourhoods(const SlabStore& store, const KeepMasks& masks, std::int64_t halo)
-      : store_(store), masks_(masks), halo_(halo) {}
-
-  /// Goes on to the next slab; false behind the last one.
-  bool advance() {
-    first_ = end_;
-    low_ = std::numeric_limits<std::int64_t>::max();
-    high_ = std::numeric_limits<std::int64_t>::min();
-    std::uint64_t samples = 0;
-    // Tall enough that few samples are looked at for two slabs.
-    for (; end_ < store_.buckets() && (samples < kStraySlab || high_ - low_ < 2 * halo_); ++end_) {
-      if (store_.count(end_) == 0) continue;
-      samples += store_.count(end_);
-      low_ = std::min<std::int64_t>(low_, store_.z_lower(end_));
-      high_ = std::max<std::int64_t>(high_, store_.z_upper(end_));
-    }
-    if (samples == 0) return false;
-    gather();
-    return true;
-  }
-
-  [[nodiscard]] const SampleTree& tree() const { return *tree_; }
-  [[nodiscard]] const Oriented& samples() const { return samples_; }  ///< by place of the tree
-  /// Of the slab itself and not of its surroundings.
-  [[nodiscard]] bool is_own(std::size_t place) const { return bucket_[place] >= first_ && bucket_[place] < end_; }
-  [[nodiscard]] std::size_t bucket(std::size_t place) const { return bucket_[place]; }
-  /// Within `margin` of the slab's samples along z.
-  [[nodiscard]] bool is_near(std::size_t place, float margin) const {
-    const auto by = static_cast<std::int64_t>(margin);
-    return samples_.z[place] >= low_ - by && samples_.z[place] <= high_ + by;
-  }
-
- private:
-  void gather() {
-    std::size_t from = first_;
-    while (from > 0 && (store_.count(from - 1) == 0 || store_.z_upper(from - 1) >= low_ - halo_)) --from;
-    held_.erase(held_.begin(), held_.lower_bound(from));
-    Oriented all;
-    std::vector<std::size_t> buckets;
-    for (std::size_t b = from; b < store_.buckets(); ++b) {
-      if (store_.count(b) == 0) continue;
-      if (b >= end_ && store_.z_lower(b) > high_ + halo_) break;
-      const Oriented& bucket = read(b);
-      for (std::size_t i = 0; i < bucket.size(); ++i) {
-        if (bucket.z[i] < low_ - halo_ || bucket.z[i] > high_ + halo_ || !masks_[b][bucket.number[i]]) continue;
-        all.x.push_back(bucket.x[i]);
-        all.y.push_back(bucket.y[i]);
-        all.z.push_back(bucket.z[i]);
-        all.nx.push_back(bucket.nx[i]);
-        all.ny.push_back(bucket.ny[i]);
-        all.nz.push_back(bucket.nz[i]);
-        all.number.push_back(bucket.number[i]);
-        buckets.push_back(b);
-      }
-    }
-    tree_ = std::make_unique<SampleTree>(all.x, all.y, all.z);
-    sort(all, buckets);
-  }
-
-  /// By place of the tree.
-  void sort(const Oriented& all, const std::vector<std::size_t>& buckets) {
-    const std::vector<std::uint32_t>& order = tree_->order();
-    const auto take = [&](const auto& from, auto& to) {
-      to.resize(order.size());
-      for (std::size_t i = 0; i < order.size(); ++i) to[i] = from[order[i]];
-    };
-    take(all.x, samples_.x);
-    take(all.y, samples_.y);
-    take(all.z, samples_.z);
-    take(all.nx, samples_.nx);
-    take(all.ny, samples_.ny);
-    take(all.nz, samples_.nz);
-    take(all.number, samples_.number);
-    take(buckets, bucket_);
-  }
-
-  const Oriented& read(std::size_t b) {
-    const auto [at, is_new] = held_.try_emplace(b);
-    Oriented& to = at->second;
-    if (!is_new) return to;
-    store_.read(b, local_);
-    to.number.resize(local_.size());
-    for (std::size_t i = 0; i < local_.size(); ++i) to.number[i] = i;
-    to.x = local_.x;
-    to.y = local_.y;
-    to.z = local_.z;
-    to.nx = local_.nx;
-    to.ny = local_.ny;
-    to.nz = local_.nz;
-    return to;
-  }
-
-  const SlabStore& store_;
-  const KeepMasks& masks_;
-  std::int64_t halo_;
-  std::size_t first_ = 0, end_ = 0;       ///< buckets of the slab
-  std::int64_t low_ = 0, high_ = 0;       ///< z of its samples
-  std::map<std::size_t, Oriented> held_;  ///< buckets read, while they are wanted
-  LocalSamples local_;
-  Oriented samples_;
-  std::vector<std::size_t> bucket_;
-  std::unique_ptr<SampleTree> tree_;
-};
-
 /// What is known of the places of a slab's tree.
 struct Surroundings {
   std::vector<float> distance;            ///< mean distance to the neighbours; negative: not looked at
@@ -154,6 +40,7 @@ struct Surroundings {
   std::vector<std::uint8_t> stray;        ///< Verdict
   std::vector<std::uint8_t> suspect;      ///< 1: may be one
   std::vector<std::uint8_t> beside;       ///< 1: few neighbours, but many samples not much farther away
+  std::vector<std::uint32_t> leaf;        ///< of the tree
 };
 
 enum Verdict : std::uint8_t { kStays, kIsLonely, kIsOffSurface };
@@ -173,7 +60,7 @@ Company company_of(const Surroundings& known, std::size_t place) {
   return out;
 }
 
-float mean_distance(const Oriented& s, std::size_t place, const Company& company, float reach) {
+float mean_distance(const Placed& s, std::size_t place, const Company& company, float reach) {
   float sum = static_cast<float>(kStrayNeighbours - company.count) * reach;  // those not found are at least there
   for (std::size_t k = 0; k < company.count; ++k) {
     const std::size_t n = company.places[k];
@@ -186,7 +73,7 @@ float mean_distance(const Oriented& s, std::size_t place, const Company& company
 }
 
 /// Whether fewer than `least` of the company lie on the surface of a sample, and too few exactly.
-bool is_off_surface(const Oriented& s, std::size_t place, const Company& company, float least) {
+bool is_off_surface(const Placed& s, std::size_t place, const Company& company, float least) {
   if (company.count == 0) return true;
   std::array<float, kStrayNeighbours> off;
   float farthest2 = 0;
@@ -222,7 +109,7 @@ bool is_off_surface(const Oriented& s, std::size_t place, const Company& company
 }
 
 /// Whether the samples of a leaf lie close together on one plane and face its way: none of them can be a stray.
-bool is_plain(const Oriented& s, const SampleTree::Places& places) {
+bool is_plain(const Placed& s, const SampleTree::Places& places) {
   const auto count = static_cast<float>(places.size());
   std::array<float, 3> middle{};
   std::array<float, 3> normal{};
@@ -264,12 +151,12 @@ bool is_plain(const Oriented& s, const SampleTree::Places& places) {
 /// Finds the neighbours of places that may be strays, and of those neighbours.
 void find_neighbours(const Neighbourhoods& around, float reach, Surroundings& out) {
   const SampleTree& tree = around.tree();
-  const Oriented& samples = around.samples();
-  out.neighbours.resize(tree.size() * kLookedAt);
+  const Placed& samples = around.samples();
+  resize_anew(out.neighbours, tree.size() * kLookedAt);
   out.count.assign(tree.size(), 0);
   out.stray.assign(tree.size(), kStays);
   out.suspect.assign(tree.size(), 0);
-  std::vector<std::uint32_t> leaf_of(tree.size());
+  resize_anew(out.leaf, tree.size());
   enum Look : std::uint8_t { kNot, kAsNeighbour, kWanted };
   std::vector<std::uint8_t> looks(tree.leaves(), kNot);
   const auto for_leaves = [&](const auto& each) {
@@ -293,7 +180,7 @@ void find_neighbours(const Neighbourhoods& around, float reach, Surroundings& ou
   for_leaves([&](std::size_t leaf, const SampleTree::Places& places) {
     bool near = false;
     for (std::size_t p = places.begin; p < places.end; ++p) {
-      leaf_of[p] = static_cast<std::uint32_t>(leaf);
+      out.leaf[p] = static_cast<std::uint32_t>(leaf);
       near = near || around.is_near(p, reach);
     }
     if (!near || is_plain(samples, places)) return;
@@ -314,7 +201,7 @@ void find_neighbours(const Neighbourhoods& around, float reach, Surroundings& ou
   for (std::size_t p = 0; p < tree.size(); ++p) {
     if (out.suspect[p] == 0) continue;
     for (std::size_t k = 0; k < out.count[p]; ++k) {
-      std::uint8_t& look = looks[leaf_of[out.neighbours[p * kLookedAt + k]]];
+      std::uint8_t& look = looks[out.leaf[out.neighbours[p * kLookedAt + k]]];
       if (look == kNot) look = kAsNeighbour;
     }
   }
@@ -337,7 +224,7 @@ float usual_distance(const Surroundings& known, const Company& company) {
 
 /// Judges the suspects within `margin` of the slab by what stays around them.
 void judge_places(const Neighbourhoods& around, float reach, float margin, Surroundings& known) {
-  const Oriented& samples = around.samples();
+  const Placed& samples = around.samples();
   const auto for_places = [&](const auto& each) {
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, samples.size(), 4096), [&](const auto& range) {
       for (std::size_t p = range.begin(); p < range.end(); ++p) {
@@ -383,13 +270,15 @@ StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, const RunConte
     judge_places(around, reach, 0, known);
     for (std::size_t p = 0; p < around.tree().size(); ++p) {
       if (!around.is_own(p) || known.stray[p] == kStays) continue;
-      masks[around.bucket(p)][around.samples().number[p]] = false;
+      const std::uint32_t b = around.samples().bucket[p];
+      const std::uint32_t number = around.samples().number[p];
+      masks[b][number] = false;
       const bool lonely = known.stray[p] == kIsLonely;
       ++(lonely ? counts.lonely : counts.off_surface);
       if (reasons == nullptr) continue;
-      std::vector<std::uint8_t>& bucket = (*reasons)[around.bucket(p)];
-      bucket.resize(store.count(around.bucket(p)), 0);
-      bucket[around.samples().number[p]] = lonely ? kReasonLonely : kReasonOffSurface;
+      std::vector<std::uint8_t>& bucket = (*reasons)[b];
+      bucket.resize(store.count(b), 0);
+      bucket[number] = lonely ? kReasonLonely : kReasonOffSurface;
     }
   }
   return counts;

@@ -51,7 +51,7 @@ void Replay::mark(const ActiveBucket& bucket) {
 void Replay::number() {
   for (std::int32_t s = first_; s <= last_; ++s) {
     auto here = std::make_shared<IsoSlab>();
-    number_edges(window_, s, DoubtfulPoints::near_samples, iso_.empty() ? nullptr : iso_.back().get(), *here);
+    number_edges(window_, s, {}, iso_.empty() ? nullptr : iso_.back().get(), *here);
     iso_.push_back(std::move(here));
   }
 }

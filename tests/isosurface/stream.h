@@ -45,7 +45,7 @@ inline WholeMesh extract_all(Window& window, std::int32_t first, std::int32_t en
   if (prepare) std::for_each(mesh.slabs.begin(), mesh.slabs.end(), prepare);
   for (std::int32_t s = first; s <= end; ++s) {
     const std::size_t i = static_cast<std::size_t>(s - first);
-    number_edges(window, s, DoubtfulPoints::near_samples, i > 0 ? &mesh.slabs[i - 1] : nullptr, mesh.slabs[i]);
+    number_edges(window, s, {}, i > 0 ? &mesh.slabs[i - 1] : nullptr, mesh.slabs[i]);
     if (i == 0) continue;
     triangulate(window, s - 1, mesh.slabs[i - 1], mesh.slabs[i], mesh.counts);
     separate_fans(i > 1 ? &mesh.slabs[i - 2] : nullptr, mesh.slabs[i - 1], &mesh.slabs[i], mesh.counts);
