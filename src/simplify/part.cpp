@@ -6,23 +6,30 @@
 
 namespace lamina::simplify {
 
+void keep_vertices(TriangleMesh& mesh, std::span<const std::uint8_t> stays) {
+  const auto keep = [&](auto& values) {
+    std::size_t kept = 0;
+    for (std::size_t v = 0; v < values.size(); ++v) {
+      if (stays[v] != 0) values[kept++] = values[v];
+    }
+    values.resize(kept);
+  };
+  keep(mesh.positions);
+  keep(mesh.normals);
+  for (auto& values : mesh.attributes) keep(values);
+}
+
 std::vector<std::uint32_t> drop_unused(TriangleMesh& mesh) {
-  std::vector<std::uint32_t> number(mesh.positions.size(), kNone);
+  std::vector<std::uint8_t> used(mesh.positions.size());
   for (const auto& t : mesh.triangles) {
-    for (const std::uint32_t v : t) number[v] = 0;
+    for (const std::uint32_t v : t) used[v] = 1;
   }
+  std::vector<std::uint32_t> number(used.size(), kNone);
   std::uint32_t kept = 0;
-  for (std::uint32_t v = 0; v < number.size(); ++v) {
-    if (number[v] == kNone) continue;
-    number[v] = kept;
-    mesh.positions[kept] = mesh.positions[v];
-    if (!mesh.normals.empty()) mesh.normals[kept] = mesh.normals[v];
-    for (auto& values : mesh.attributes) values[kept] = values[v];
-    ++kept;
+  for (std::size_t v = 0; v < used.size(); ++v) {
+    if (used[v] != 0) number[v] = kept++;
   }
-  mesh.positions.resize(kept);
-  if (!mesh.normals.empty()) mesh.normals.resize(kept);
-  for (auto& values : mesh.attributes) values.resize(kept);
+  keep_vertices(mesh, used);
   for (auto& t : mesh.triangles) {
     for (std::uint32_t& v : t) v = number[v];
   }

@@ -12,6 +12,9 @@
 
 namespace lamina::simplify {
 
+/// Vertices whose `stays` is 0 leave the arrays; triangles are not looked at.
+void keep_vertices(TriangleMesh& mesh, std::span<const std::uint8_t> stays);
+
 /// Vertices without triangles go; the others keep their order. Returns the new number of each, kNone of those that
 /// went.
 std::vector<std::uint32_t> drop_unused(TriangleMesh& mesh);

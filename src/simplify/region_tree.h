@@ -1,6 +1,5 @@
 // Where a mesh is cut into regions, each of which fits memory.
 #pragma once
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -37,13 +36,5 @@ class RegionTree {
   std::vector<Node> nodes_;
   std::uint32_t regions_ = 1;
 };
-
-/// The region of a triangle, whose corners lie in these: the one with most of them, else the first.
-inline std::uint32_t region_of(const std::array<std::uint32_t, 3>& homes) {
-  if (homes[0] == homes[1] || homes[0] == homes[2]) return homes[0];
-  if (homes[1] == homes[2]) return homes[1];
-  return homes[0] < homes[1] ? (homes[0] < homes[2] ? homes[0] : homes[2])
-                             : (homes[1] < homes[2] ? homes[1] : homes[2]);
-}
 
 }  // namespace lamina::simplify

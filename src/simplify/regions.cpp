@@ -8,10 +8,10 @@
 #include <span>
 #include <utility>
 
-#include "base/spill_file.h"
 #include "lamina/error.h"
 #include "measure/edge_table.h"
 #include "meshes/block_passes.h"
+#include "meshes/triangle_bins.h"
 #include "meshes/vertex_homes.h"
 #include "meshes/vertex_rows.h"
 #include "simplify/stars.h"
@@ -54,11 +54,7 @@ class Visitors {
 class MeshRegions final : public Regions {
  public:
   MeshRegions(meshes::MeshBlocks& mesh, RegionTree tree, const std::string& tmp_dir, const RunContext& run)
-      : mesh_(mesh),
-        tree_(std::move(tree)),
-        file_(tmp_dir),
-        regions_(tree_.regions()),
-        most_held_(std::clamp<std::size_t>((std::size_t{48} << 20) / (sizeof(Triangle) * regions_.size()), 32, 4096)) {
+      : mesh_(mesh), tree_(std::move(tree)), triangles_(tree_.regions(), tmp_dir) {
     sort_triangles(run);
   }
 
@@ -66,7 +62,7 @@ class MeshRegions final : public Regions {
 
   [[nodiscard]] RegionMesh load(std::uint32_t region) override {
     RegionMesh part;
-    part.mesh.triangles = triangles_of(regions_[region]);
+    part.mesh.triangles = triangles_.read(region);
     meshes::VertexNumbers numbers(part.mesh.triangles);
     for (Triangle& t : part.mesh.triangles) {
       for (std::uint32_t& v : t) v = numbers.of(v);
@@ -91,15 +87,6 @@ class MeshRegions final : public Regions {
   }
 
  private:
-  struct Chunk {
-    std::uint64_t offset;
-    std::size_t count;
-  };
-  struct Waiting {
-    std::vector<Triangle> held;
-    std::vector<Chunk> chunks;
-  };
-
   void sort_triangles(const RunContext& run) {
     meshes::VertexHomes homes(mesh_, [this](const meshes::Vec3& at) { return tree_.at(at); });
     std::uint64_t seen = 0;
@@ -115,40 +102,19 @@ class MeshRegions final : public Regions {
                                                       seen - 1, t[0] == t[1] ? t[0] : t[2]));
       }
       const Triangle at{homes.of(t[0]), homes.of(t[1]), homes.of(t[2])};
-      const std::uint32_t region = region_of(at);
+      const std::uint32_t region = meshes::bin_of_triangle(at);
       for (std::size_t k = 0; k < 3; ++k) {
         if (at[k] != region) visitors_.add(t[k]);
       }
-      regions_[region].held.push_back(t);
-      if (regions_[region].held.size() >= most_held_) spill(regions_[region]);
+      triangles_.add(region, t);
     });
-    for (Waiting& region : regions_) spill(region);
-    file_.flush();
+    triangles_.finish();
     visitors_.forget_repeated();
-  }
-
-  void spill(Waiting& region) {
-    if (region.held.empty()) return;
-    region.chunks.push_back({file_.append(std::as_bytes(std::span(region.held))), region.held.size()});
-    region.held.clear();
-  }
-
-  [[nodiscard]] std::vector<Triangle> triangles_of(const Waiting& region) const {
-    std::size_t all = 0, done = 0;
-    for (const Chunk& chunk : region.chunks) all += chunk.count;
-    std::vector<Triangle> triangles(all);
-    for (const Chunk& chunk : region.chunks) {
-      file_.read(chunk.offset, std::as_writable_bytes(std::span(triangles).subspan(done, chunk.count)));
-      done += chunk.count;
-    }
-    return triangles;
   }
 
   meshes::MeshBlocks& mesh_;
   RegionTree tree_;
-  SpillFile file_;
-  std::vector<Waiting> regions_;
-  std::size_t most_held_;
+  meshes::TriangleBins triangles_;  ///< by region
   Visitors visitors_;
 };
 
@@ -226,7 +192,7 @@ class PartRegions final : public Regions {
     for (std::uint32_t i = 0; i < part.mesh.triangles.size(); ++i) {
       const Triangle& t = part.mesh.triangles[i];
       const Triangle at{home[t[0]], home[t[1]], home[t[2]]};
-      const std::uint32_t region = region_of(at);
+      const std::uint32_t region = meshes::bin_of_triangle(at);
       for (std::size_t k = 0; k < 3; ++k) {
         if (at[k] != region) visitors_.add(part.ids[t[k]]);
       }

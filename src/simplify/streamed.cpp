@@ -306,24 +306,18 @@ class StreamedSimplifier {
     std::unordered_map<std::uint32_t, std::uint32_t> written;  // vertices that other regions may have, by their ids
     for_regions(regions, pass, [&](RegionMesh& part) {
       std::vector<std::uint32_t> number(part.ids.size());
-      std::size_t kept = 0;
+      std::vector<std::uint8_t> stays(part.ids.size(), 1);
       TriangleMesh& mesh = part.mesh;
       for (std::size_t v = 0; v < number.size(); ++v) {
         number[v] = written_vertices_;
         if (part.locked[v] != 0) {
           const auto [place, is_new] = written.emplace(part.ids[v], written_vertices_);
           number[v] = place->second;
-          if (!is_new) continue;
+          stays[v] = is_new ? 1 : 0;
         }
-        ++written_vertices_;
-        mesh.positions[kept] = mesh.positions[v];
-        if (!mesh.normals.empty()) mesh.normals[kept] = mesh.normals[v];
-        for (auto& values : mesh.attributes) values[kept] = values[v];
-        ++kept;
+        written_vertices_ += stays[v];
       }
-      mesh.positions.resize(kept);
-      if (!mesh.normals.empty()) mesh.normals.resize(kept);
-      for (auto& values : mesh.attributes) values.resize(kept);
+      keep_vertices(mesh, stays);
       for (auto& t : mesh.triangles) {
         for (std::uint32_t& v : t) v = number[v];
       }

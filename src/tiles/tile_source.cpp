@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <span>
 
 #include "lamina/error.h"
 #include "measure/edge_table.h"
@@ -12,24 +11,10 @@
 #include "meshes/vertex_rows.h"
 
 namespace lamina::tiles {
-namespace {
-
-/// The one that most corners are in, else the first.
-std::uint32_t leaf_of_triangle(const std::array<std::uint32_t, 3>& homes) {
-  if (homes[0] == homes[1] || homes[0] == homes[2]) return homes[0];
-  if (homes[1] == homes[2]) return homes[1];
-  return *std::min_element(homes.begin(), homes.end());
-}
-
-}  // namespace
 
 TileSource::TileSource(meshes::MeshBlocks& mesh, const TileOctree& octree, const std::string& tmp_dir,
                        const RunContext& run)
-    : mesh_(mesh),
-      octree_(octree),
-      file_(tmp_dir),
-      leaves_(octree.nodes().size()),
-      most_held_(std::clamp<std::size_t>((std::size_t{48} << 20) / (sizeof(Corners) * leaves_.size()), 32, 1024)) {
+    : mesh_(mesh), octree_(octree), leaves_(octree.nodes().size(), tmp_dir) {
   read(run);
 }
 
@@ -48,16 +33,13 @@ void TileSource::read(const RunContext& run) {
     }
     add(t, {leaves.of(t[0]), leaves.of(t[1]), leaves.of(t[2])});
   });
-  for (Leaf& leaf : leaves_) spill(leaf);
-  file_.flush();
+  leaves_.finish();
   settle_shared();
 }
 
 void TileSource::add(const Corners& corners, const std::array<std::uint32_t, 3>& homes) {
-  const std::uint32_t node = leaf_of_triangle(homes);
-  Leaf& leaf = leaves_[node];
-  leaf.held.push_back(corners);
-  if (leaf.held.size() >= most_held_) spill(leaf);
+  const std::uint32_t node = meshes::bin_of_triangle(homes);
+  leaves_.add(node, corners);
   ++triangles_;
   for (std::size_t k = 0; k < 3; ++k) {
     if (homes[k] == node) continue;
@@ -66,12 +48,6 @@ void TileSource::add(const Corners& corners, const std::array<std::uint32_t, 3>&
     uses_.push_back({corners[k], homes[k]});
   }
   if (uses_.size() >= most_uses_) forget_repeated();
-}
-
-void TileSource::spill(Leaf& leaf) {
-  if (leaf.held.empty()) return;
-  leaf.chunks.push_back({file_.append(std::as_bytes(std::span(leaf.held))), leaf.held.size()});
-  leaf.held.clear();
 }
 
 void TileSource::forget_repeated() {
@@ -91,21 +67,9 @@ void TileSource::settle_shared() {
   uses_ = {};
 }
 
-std::vector<TileSource::Corners> TileSource::corners_of(const Leaf& leaf) const {
-  std::size_t count = 0;
-  for (const Chunk& chunk : leaf.chunks) count += chunk.count;
-  std::vector<Corners> corners(count);
-  std::size_t done = 0;
-  for (const Chunk& chunk : leaf.chunks) {
-    file_.read(chunk.offset, std::as_writable_bytes(std::span(corners).subspan(done, chunk.count)));
-    done += chunk.count;
-  }
-  return corners;
-}
-
 TileMesh TileSource::leaf(std::uint32_t node, const TileLattice& lattice) {
   TileMesh tile;
-  tile.mesh.triangles = corners_of(leaves_[node]);
+  tile.mesh.triangles = leaves_.read(node);
   meshes::VertexNumbers numbers(tile.mesh.triangles);
   for (Corners& t : tile.mesh.triangles) {
     for (std::uint32_t& v : t) v = numbers.of(v);

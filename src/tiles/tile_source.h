@@ -8,8 +8,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/spill_file.h"
 #include "lamina/run.h"
+#include "meshes/triangle_bins.h"
 #include "meshes/writers.h"
 #include "tiles/tile_mesh.h"
 #include "tiles/tile_octree.h"
@@ -29,14 +29,6 @@ class TileSource {
 
  private:
   using Corners = std::array<std::uint32_t, 3>;
-  struct Chunk {
-    std::uint64_t offset;
-    std::size_t count;
-  };
-  struct Leaf {
-    std::vector<Corners> held;
-    std::vector<Chunk> chunks;
-  };
   struct Use {
     std::uint32_t vertex, leaf;
     auto operator<=>(const Use&) const = default;
@@ -44,18 +36,14 @@ class TileSource {
 
   void read(const RunContext& run);
   void add(const Corners& corners, const std::array<std::uint32_t, 3>& homes);
-  void spill(Leaf& leaf);
   void forget_repeated();
   void settle_shared();
-  [[nodiscard]] std::vector<Corners> corners_of(const Leaf& leaf) const;
   void read_vertices(const std::vector<std::uint32_t>& ids, const TileLattice& lattice, TriangleMesh& out);
 
   meshes::MeshBlocks& mesh_;
   const TileOctree& octree_;
-  SpillFile file_;
-  std::vector<Leaf> leaves_;  ///< by node
-  std::size_t most_held_;
-  std::vector<Use> uses_;  ///< of vertices in leaves other than their own
+  meshes::TriangleBins leaves_;  ///< by node
+  std::vector<Use> uses_;        ///< of vertices in leaves other than their own
   std::size_t most_uses_ = 1U << 20;
   std::vector<std::pair<std::uint32_t, int>> shared_;  ///< vertices, ascending, with SharedVertex::depth
   std::uint64_t triangles_ = 0, left_out_ = 0;
