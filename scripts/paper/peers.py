@@ -109,6 +109,22 @@ def _meshlab_poisson(depth, folder, limit):
     return peer
 
 
+def meshlab_decimation(folder, limit):
+    """Its quadric edge collapse with optimal placement: a function (mesh, fewer, triangles) -> cost."""
+    script = os.path.join(folder, "filter.mlx")
+
+    def decimate(mesh, fewer, triangles):
+        _filter_script(script, "Simplification: Quadric Edge Collapse Decimation", {
+            "TargetFaceNum": ("Int", triangles), "TargetPerc": ("Float", 0), "QualityThr": ("Float", 0.3),
+            "PreserveBoundary": ("Bool", "false"), "BoundaryWeight": ("Float", 1), "PreserveNormal": ("Bool", "false"),
+            "PreserveTopology": ("Bool", "false"), "OptimalPlacement": ("Bool", "true"), "PlanarQuadric": ("Bool", "false"),
+            "PlanarWeight": ("Float", 0.001), "QualityWeight": ("Bool", "false"), "AutoClean": ("Bool", "true"),
+            "Selected": ("Bool", "false")})
+        return _meshlab(mesh, fewer, script, limit)
+
+    return decimate
+
+
 def _open3d(depth, limit, *trim):
     def peer(samples, mesh, noisy, resolution):
         return runs.run([sys.executable, os.path.join(HERE, "open3d_poisson.py"), samples, mesh, *map(str, (depth, *trim))],

@@ -2,9 +2,9 @@
 
 # What tells the rows of a table apart.
 KEYS = {"1": ("diffuse", "cluster"), "2": ("blend",), "3": ("model", "noisy", "name"), "peers": ("model", "noisy", "name"),
-        "cells": ("model", "blend", "cell"), "edges": ("model", "name"), "scans": ("scene", "name"), "scenes": ("scene", "name")}
+        "cells": ("model", "blend", "cell"), "edges": ("model", "name"), "fewer": ("name", "wanted"), "scans": ("scene", "name"), "scenes": ("scene", "name")}
 # What all rows of a table must have in common, or the older ones go.
-COUNTED = {"1": "large", "2": "large", "3": "count", "peers": "count", "cells": "count", "edges": "count"}
+COUNTED = {"1": "large", "2": "large", "3": "count", "peers": "count", "cells": "count", "edges": "count", "fewer": "count"}
 
 
 def merge(table, old, new, order):

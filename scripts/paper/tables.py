@@ -118,6 +118,12 @@ def edges(results):
     return table(["", "", "s", "CPU s", "MB"] + QUALITY, rows)
 
 
+def fewer(results):
+    return table(["", "", "s", "CPU s", "MB"] + QUALITY,
+                 [[c["name"], c["wanted"], *(cost_cells(c["cost"]) + quality_cells(c) if "cost" in c else [c["failed"]] + ["-"] * 10)]
+                  for c in results])
+
+
 SHAPE = {"k triangles": lambda c: f"{c['triangles'] / 1e3:.0f}", "parts": lambda c: c["parts"], "loops": lambda c: c["loops"],
          "ragged": lambda c: f"{c['ragged']:.2f}", "turn": lambda c: f"{c['turn']:.0f}"}
 SURVEY = {"CD": lambda c: f"{c['chamfer']:.1f}", "accuracy": lambda c: f"{c['accuracy']:.1f}",
