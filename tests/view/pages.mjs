@@ -1,8 +1,8 @@
 // Opens pages of lamina view in a headless Chromium and looks at what they show: a coloured mesh, a cloud at
-// georeferenced coordinates, a tile set. Whatever a page writes to the console fails it, and so does any request.
+// georeferenced coordinates, tile sets in every mode. Whatever a page writes to the console fails it, and so does any request.
 // Usage: node pages.mjs LAMINA WORK_FOLDER [PICTURES]
 import { execFileSync } from 'node:child_process';
-import { mkdirSync, rmSync, writeFileSync } from 'node:fs';
+import { mkdirSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { Chromium, decodePng } from './chromium.mjs';
 
@@ -73,6 +73,32 @@ async function look(name, url, act) {
   await page.close();
 }
 
+const drawn = "/[1-9].* triangles/.test(document.querySelector('.drawn').textContent)";
+
+/** What the button for it would save, decoded. */
+async function savedPicture(page, name) {
+  const png = Buffer.from(await page.evaluate(`new Promise((done) => {
+    const make = URL.createObjectURL;
+    URL.createObjectURL = (blob) => {
+      const reader = new FileReader();
+      reader.onload = () => done(reader.result.split(',')[1]);
+      reader.readAsDataURL(blob);
+      return make(blob);
+    };
+    [...document.querySelectorAll('button')].find((button) => button.textContent === 'Picture').click();
+  })`), 'base64');
+  if (pictures) writeFileSync(join(pictures, `${name}_saved.png`), png);
+  return decodePng(png);
+}
+
+function count({ width, height, channels, pixels }, wanted) {
+  let found = 0;
+  for (let at = 0; at < width * height; ++at) {
+    if (wanted(pixels.subarray(channels * at, channels * at + 3), at % width, Math.floor(at / width))) ++found;
+  }
+  return found;
+}
+
 const near = (value, wanted, within) => Math.abs(value - wanted) < within;
 
 async function lookAtMesh() {
@@ -132,11 +158,56 @@ async function lookAtTiles() {
     return;
   }
   run('view', join(folder, 'tiles'), '-o', join(folder, 'tiles.html'));
-  await look('tiles', `file://${join(folder, 'tiles.html')}`, async (page, see) => {
-    await page.until("/[1-9].* triangles/.test(document.querySelector('.drawn').textContent)");
+  await look('tiles', `file://${join(folder, 'tiles.html')}`, async (page, see, choose) => {
+    await page.until(drawn);
     const seen = await see('colours');
     expect(near(seen.share, 0.66, 0.12), `tiles: fill their part of the picture (${seen.share.toFixed(2)})`);
     expect(Math.min(seen.red, seen.green, seen.blue) > 0.03, `tiles: have all three colours (${JSON.stringify(seen)})`);
+    await choose('Show', '_height');
+    const painted = await see('height');
+    expect(painted.red < 0.01 && painted.green > 0.2, `tiles: are painted anew (${JSON.stringify(painted)})`);
+    await page.press('m');
+    await page.click(594, 220);
+    await page.click(594, 380);
+    const length = Number(await page.evaluate("document.querySelector('.value.large').textContent"));
+    expect(length > 0.3 && length < 1.2, `tiles: a distance on the ball (${length})`);
+    const saved = await savedPicture(page, 'tiles');
+    const orange = count(saved, ([r, g, b]) => r > 230 && Math.abs(g - 176) < 12 && b < 60);
+    expect(saved.width === size.width && orange > 300, `tiles: the saved picture has the distance (${orange} pixels)`);
+    const ramp = count(saved, ([r, g, b], x, y) => x < 270 && y > 540 && Math.max(r, g, b) - Math.min(r, g, b) > 40);
+    expect(ramp > 2000, `tiles: the saved picture has the scale (${ramp} pixels)`);
+    await page.press('m');
+    await page.press('x');
+    const cut = await see('cut');
+    expect(cut.share < 0.95 * painted.share, `tiles: the plane cuts something off (${cut.share.toFixed(2)})`);
+    await page.press('l');
+    await page.press('g');
+    await see('edges_flat');
+  });
+}
+
+/** All leaves side by side have the boundary of the mesh, and no more where they meet. */
+async function lookAtBoundary() {
+  const file = (name) => join(folder, name);
+  run('scatter', '--shape', 'amphora', '--scan', '12', '--count', '60000', '-o', file('amphora.ply'));
+  try {
+    run('surface', file('amphora.ply'), '-o', file('amphora_mesh.ply'), '--tiles', file('amphora'));
+  } catch {
+    return;
+  }
+  run('view', file('amphora_mesh.ply'), '-o', file('amphora_mesh.html'));
+  const [, wanted] = readFileSync(file('amphora_mesh.html'), 'latin1').match(/"boundaryEdges":(\d+)/);
+  const tileset = JSON.parse(readFileSync(join(folder, 'amphora', 'tileset.json')));
+  tileset.root.geometricError = 1e6;  // never good enough: its children are shown
+  writeFileSync(join(folder, 'amphora', 'tileset.json'), JSON.stringify(tileset));
+  run('view', file('amphora'), '-o', file('amphora.html'));
+  await look('boundary', `file://${file('amphora.html')}`, async (page, see) => {
+    await page.press('b');
+    await page.until(`${drawn} && /boundary/.test(document.querySelector('.drawn').textContent)`);
+    await see('loops');
+    const text = (await page.evaluate("document.querySelector('.drawn').textContent")).replaceAll('\u202f', '');
+    const [, tiles, edges] = text.match(/in (\d+) tiles.* (\d+) boundary edges/) ?? [];
+    expect(Number(tiles) > 1 && Number(edges) > 0 && edges === wanted, `boundary: that of the mesh, ${wanted} edges (${text})`);
   });
 }
 
@@ -167,6 +238,7 @@ try {
   await lookAtMesh();
   await lookAtPoints();
   await lookAtTiles();
+  await lookAtBoundary();
   await lookAtEarth();
 } finally {
   await browser.close();

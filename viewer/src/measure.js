@@ -61,15 +61,27 @@ export class Measure {
 
   /** Marks and label stay where the places are on the screen. */
   place() {
-    this.marks.forEach((mark, index) => this.put(mark, this.places[index]));
-    this.put(this.label, this.places.length === 2 ? this.places[0].clone().lerp(this.places[1], 0.5) : null);
+    this.marks.forEach((mark, index) => this.put(mark, this.onScreen(this.places[index])));
+    this.put(this.label, this.labelOnScreen());
   }
 
-  put(element, place) {
+  marksOnScreen() {
+    return this.places.map((place) => this.onScreen(place)).filter(Boolean);
+  }
+
+  labelOnScreen() {
+    return this.places.length === 2 ? this.onScreen(this.places[0].clone().lerp(this.places[1], 0.5)) : null;
+  }
+
+  /** In the window's pixels; nothing of what is no place, or behind the viewer. */
+  onScreen(place) {
     const at = place && new Vector3().copy(place).project(this.stage.camera);
-    element.hidden = !at || at.z > 1 || at.z < -1;
-    if (element.hidden) return;
-    const x = (0.5 + 0.5 * at.x) * window.innerWidth, y = (0.5 - 0.5 * at.y) * window.innerHeight;
-    element.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px) translate(-50%, -50%)`;
+    if (!at || at.z > 1 || at.z < -1) return null;
+    return { x: (0.5 + 0.5 * at.x) * window.innerWidth, y: (0.5 - 0.5 * at.y) * window.innerHeight };
+  }
+
+  put(element, at) {
+    element.hidden = !at;
+    if (at) element.style.transform = `translate(${at.x.toFixed(1)}px, ${at.y.toFixed(1)}px) translate(-50%, -50%)`;
   }
 }

@@ -1,9 +1,7 @@
 // A mesh or a cloud out of the page: its drawables, where it lies, and what can be painted on it.
 import { Box3, Group, Mesh, ShaderMaterial, Vector3 } from 'three';
-import { LineMaterial } from 'three/addons/lines/LineMaterial.js';
-import { LineSegments2 } from 'three/addons/lines/LineSegments2.js';
-import { LineSegmentsGeometry } from 'three/addons/lines/LineSegmentsGeometry.js';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
+import { boundaryLines } from './boundary.js';
 import { readBlock } from './data.js';
 import { makeMaterial, shared } from './surface_material.js';
 
@@ -135,26 +133,20 @@ export class Model {
     if (boundary) this.addBoundary(drawable, new Uint32Array(boundary));
   }
 
-  /** Strong where it is seen, faint where the surface hides it. */
   addBoundary(drawable, ends) {
     const positions = drawable.geometry.getAttribute('position');
     const places = new Float32Array(3 * ends.length);
     for (let i = 0; i < ends.length; ++i) {
       places.set([positions.getX(ends[i]), positions.getY(ends[i]), positions.getZ(ends[i])], 3 * i);
     }
-    const geometry = new LineSegmentsGeometry().setPositions(places);
-    this.boundary = new Group();
-    for (const [opacity, depthTest] of [[0.3, false], [1, true]]) {
-      const material = new LineMaterial({ color: '#ff4a3d', linewidth: 2.5, opacity, depthTest, transparent: true, clipping: true });
-      const lines = new LineSegments2(geometry, material);
-      lines.frustumCulled = false;
-      lines.renderOrder = 2;
-      lines.userData.isOverlay = true;
-      this.boundary.add(lines);
-    }
+    this.boundary = boundaryLines(places);
     this.boundary.position.copy(drawable.position);
     this.boundary.visible = false;
     this.group.add(this.boundary);
+  }
+
+  get hasBoundary() {
+    return Boolean(this.boundary);
   }
 
   setLook(look) {

@@ -64,7 +64,7 @@ export class Panel {
     this.light = check('Light', true, (on) => viewer.setLit(on));
     const checks = make('div', { className: 'checks' }, this.light.row);
     if (this.mesh) checks.append(this.edges.row);
-    if (model.boundary) checks.append(this.boundary.row);
+    if (model.hasBoundary) checks.append(this.boundary.row);
     const rows = [this.shows.row, this.makeScale()];
     if (this.mesh) rows.push(this.shading.row);
     if (!this.mesh) {
@@ -181,11 +181,11 @@ export class Panel {
   }
 
   showTiles() {
-    const { tiles, triangles, levels } = this.viewer.model.shown();
+    const { tiles, triangles, levels, boundaryEdges } = this.viewer.model.shown();
     const sorted = [...levels.keys()].sort((a, b) => a - b);
     const span = sorted.length > 1 ? `levels ${sorted[0]} to ${sorted.at(-1)}` : `level ${sorted[0] ?? '–'}`;
     const text = `${countText(triangles)} triangles in ${countText(tiles)} ${tiles === 1 ? 'tile' : 'tiles'}, ${span}` +
-      (this.viewer.model.loading ? ' …' : '');
+      (boundaryEdges === null ? '' : `, ${countText(boundaryEdges)} boundary edges`) + (this.viewer.model.loading ? ' …' : '');
     if (this.shown.textContent !== text) this.shown.textContent = text;
   }
 
@@ -237,6 +237,9 @@ export class Panel {
     } else if (description.kind === 'points') {
       const { points, pointsThere } = description;
       lines.push(points < pointsThere ? `${countText(points)} of ${countText(pointsThere)} points` : `${countText(points)} points`);
+    } else if (model.all.triangles) {
+      const { triangles, tiles, levels } = model.all;
+      lines.push(`${countText(triangles)} triangles`, `${countText(tiles)} tiles in ${levels} ${levels === 1 ? 'level' : 'levels'}`);
     }
     const size = ['x', 'y', 'z'].map((axis) => numberText(model.box.max[axis] - model.box.min[axis], model.radius));
     lines.push(size.join(' × '));

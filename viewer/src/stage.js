@@ -87,8 +87,7 @@ export class Stage {
     for (const step of this.beforeDraw) step(time);
     if (!this.drawing) return;
     this.drawing = false;
-    this.adjustDepth();
-    this.renderer.render(this.scene, this.camera);
+    this.render();
     this.clock(time);
     for (const step of this.afterDraw) step();
     this.endedAt = performance.now();
@@ -122,10 +121,9 @@ export class Stage {
     return height / (2 * Math.tan((this.camera.fov * Math.PI) / 360));
   }
 
-  /** The picture as it stands, as a PNG. */
-  async picture() {
+  /** At once, so that the canvas can be copied: a browser may clear it after its frame. */
+  render() {
     this.adjustDepth();
     this.renderer.render(this.scene, this.camera);
-    return new Promise((resolve) => this.canvas.toBlob(resolve, 'image/png'));
   }
 }

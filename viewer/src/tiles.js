@@ -1,8 +1,9 @@
 // A tile set: drawn in the detail that the view wants, out of the page or from the server that served it.
-import { Box3, Group, Matrix4, Vector3 } from 'three';
+import { Box3, Frustum, Group, Matrix4, Vector3 } from 'three';
 import { MeshoptDecoder } from 'three/addons/libs/meshopt_decoder.module.js';
 import { TilesRenderer } from '3d-tiles-renderer';
 import { GLTFExtensionsPlugin } from '3d-tiles-renderer/plugins';
+import { boundaryLines, disposeLines, TileBoundary } from './boundary.js';
 import { blockNames, readBlock } from './data.js';
 import { attributesOf, dress, someOf } from './model.js';
 
@@ -39,6 +40,10 @@ export class TileModel {
     this.attributes = new Map();
     this.hasColours = false;
     this.look = { show: 'plain' };
+    this.rims = new TileBoundary();
+    this.boundary = null;
+    this.boundaryEdges = 0;
+    this.boundaryIsOld = true;
     this.group = new Group();
     this.origin = new Vector3();
     this.box = new Box3();
@@ -60,6 +65,7 @@ export class TileModel {
     for (const event of ['needs-update', 'needs-render', 'tile-visibility-change', 'tiles-load-end']) {
       tiles.addEventListener(event, () => this.stage.draw());
     }
+    tiles.addEventListener('tile-visibility-change', () => (this.boundaryIsOld = true));
     tiles.addEventListener('load-error', ({ url, error }) => console.error(`${url}: ${error.message}`));
     this.ready = new Promise((resolve, reject) => {
       tiles.addEventListener('load-root-tileset', () => {
@@ -85,6 +91,9 @@ export class TileModel {
     const middle = this.origin.clone();
     const said = tiles.rootTileset?.asset?.extras;
     if (turned && said?.origin) this.origin.add(new Vector3(...said.origin));
+    // Only of these it is known that neighbouring tiles have the same positions where they meet.
+    this.hasBoundary = /^lamina\b/.test(said?.generator ?? '');
+    this.countAll();
     // Well-known text begins with the system's name.
     if (said?.crs) this.crs = said.crs.match(/"([^"]+)"/)?.[1] ?? said.crs;
     this.radius = 0.5 * corners.getSize(new Vector3()).length() || 1;
@@ -96,6 +105,19 @@ export class TileModel {
     tiles.group.matrix.makeTranslation(-middle.x, -middle.y, -middle.z).multiply(toRoot);
     tiles.group.matrixWorldNeedsUpdate = true;
     tiles.group.updateMatrixWorld(true);
+  }
+
+  /** What the leaves hold, where the tile set says so. */
+  countAll() {
+    const all = { triangles: 0, tiles: 0, levels: 0 };
+    const visit = (tile, level) => {
+      ++all.tiles;
+      all.levels = Math.max(all.levels, level);
+      if (!tile.children?.length) all.triangles += tile.extras?.triangles ?? NaN;
+      tile.children?.forEach((child) => visit(child, level + 1));
+    };
+    visit(this.tiles.root, 1);
+    this.all = all;
   }
 
   addTile(scene) {
@@ -134,6 +156,7 @@ export class TileModel {
   }
 
   setLook(look) {
+    this.boundaryIsOld ||= look.boundary !== this.look.boundary;
     this.look = look;
     this.tiles.forEachLoadedModel((scene) => {
       const drawables = [];
@@ -155,6 +178,26 @@ export class TileModel {
     this.stage.camera.updateMatrixWorld();
     this.tiles.setResolutionFromRenderer(this.stage.camera, this.stage.renderer);
     this.tiles.update();
+    if (this.boundaryIsOld) this.drawBoundary();
+  }
+
+  /** The boundary of what is drawn: tiles out of sight have theirs out of sight, too. */
+  drawBoundary() {
+    this.boundaryIsOld = false;
+    this.boundary?.removeFromParent();
+    if (this.boundary) disposeLines(this.boundary);
+    this.boundary = null;
+    this.boundaryEdges = 0;
+    if (!this.look.boundary) return;
+    const scenes = [...this.tiles.visibleTiles].map((tile) => tile.engineData?.scene).filter(Boolean);
+    const places = this.rims.placesOf(scenes);
+    this.boundaryEdges = places.length / 6;
+    if (places.length === 0) return;
+    this.boundary = boundaryLines(places);
+    this.boundary.matrixAutoUpdate = false;
+    this.boundary.matrix.multiplyMatrices(this.tiles.group.matrixWorld, scenes[0].matrix);
+    this.group.add(this.boundary);
+    this.stage.draw();
   }
 
   get loading() {
@@ -175,8 +218,16 @@ export class TileModel {
         }
       });
     }
-    return { tiles: this.tiles.visibleTiles.size, triangles, levels };
+    return { tiles: this.tiles.visibleTiles.size, triangles, levels, boundaryEdges: this.look.boundary && this.seesAll() ? this.boundaryEdges : null };
+  }
+
+  /** Whether the picture has all of it. Else tiles out of it are not drawn, and tiles end where those begin. */
+  seesAll() {
+    const { camera } = this.stage;
+    sight.setFromProjectionMatrix(product.multiplyMatrices(camera.projectionMatrix, camera.matrixWorldInverse));
+    return this.outline.every((place) => sight.containsPoint(place));
   }
 }
 
-const placement = new Matrix4();
+const placement = new Matrix4(), product = new Matrix4();
+const sight = new Frustum();

@@ -4,6 +4,7 @@ import { clampedRange, rampTexture, sortedValues } from './colour_scale.js';
 import { Controls } from './controls.js';
 import { Measure } from './measure.js';
 import { Picker } from './picking.js';
+import { composePicture } from './picture.js';
 import { Stage } from './stage.js';
 import { shared } from './surface_material.js';
 
@@ -157,7 +158,8 @@ export class Viewer {
   }
 
   async savePicture() {
-    const picture = await this.stage.picture();
+    this.stage.render();
+    const picture = await composePicture(this);
     const link = document.createElement('a');
     link.href = URL.createObjectURL(picture);
     link.download = `${this.description.title.replace(/\.[^.]*$/, '')}.png`;
