@@ -26,7 +26,8 @@ namespace fs = std::filesystem;
 /// What a link stands for, without a slash at the end.
 fs::path folder_path(const std::string& name) {
   std::error_code error;
-  fs::path path = fs::weakly_canonical(name, error);
+  // Absolute first: of a name that is not there yet the rest stays as it is, and its folder would have no name.
+  fs::path path = fs::weakly_canonical(fs::absolute(name, error), error);
   if (error || path.empty()) path = fs::path(name).lexically_normal();
   return path.has_filename() ? path : path.parent_path();
 }

@@ -6,9 +6,11 @@
 #include <tbb/partitioner.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <filesystem>
 #include <mutex>
 #include <optional>
@@ -81,21 +83,14 @@ class TileBuilder {
 
   /// The tile of a node and all below it, written.
   TileMesh build(std::uint32_t node, const RunContext& run) {
-    if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+    if (run.cancelled() || failed_) throw Error(ExitCode::internal, "cancelled");
     const TileNode& place = octree_.nodes()[node];
     if (place.leaf()) {
       TileMesh tile = source_.leaf(node, lattice_);
       write(node, tile, run);
       return tile;
     }
-    std::vector<TileMesh> parts(place.children.size());
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, parts.size(), 1),
-        [&](const tbb::blocked_range<std::size_t>& range) {
-          for (std::size_t c = range.begin(); c != range.end(); ++c) parts[c] = build(place.children[c], run);
-        },
-        tbb::simple_partitioner());
-    TileMesh tile = merge_tiles(std::move(parts), place.depth);
+    TileMesh tile = merge_tiles(build_all(place.children, run), place.depth);
     const auto there = static_cast<double>(tile.mesh.triangles.size());
     const double wanted = std::clamp(kShrinks * there, sizes_.least, sizes_.most);
     if (there > wanted) coarsen_tile(tile, static_cast<std::uint64_t>(wanted), simplifier_, run);
@@ -106,6 +101,36 @@ class TileBuilder {
   [[nodiscard]] const std::vector<TileEntry>& entries() const { return entries_; }
 
  private:
+  /// An error does not leave the loop before its end: TBB would cancel what goes on inside the other turns, and loops
+  /// within them would return with half of their work done.
+  std::vector<TileMesh> build_all(const std::vector<std::uint32_t>& nodes, const RunContext& run) {
+    std::vector<TileMesh> parts(nodes.size());
+    tbb::parallel_for(
+        tbb::blocked_range<std::size_t>(0, parts.size(), 1),
+        [&](const tbb::blocked_range<std::size_t>& range) {
+          for (std::size_t c = range.begin(); c != range.end(); ++c) {
+            try {
+              parts[c] = build(nodes[c], run);
+            } catch (...) {
+              keep_failure();
+            }
+          }
+        },
+        tbb::simple_partitioner());
+    if (failed_) {
+      const std::lock_guard lock(failing_);
+      std::rethrow_exception(failure_);
+    }
+    return parts;
+  }
+
+  /// The first one is what the run ends with; the tiles that are being built end for it.
+  void keep_failure() {
+    const std::lock_guard lock(failing_);
+    if (!failure_) failure_ = std::current_exception();
+    failed_ = true;
+  }
+
   void write(std::uint32_t node, const TileMesh& tile, const RunContext& run) {
     TileEntry& entry = entries_[node];
     entry.triangles = tile.mesh.triangles.size();
@@ -135,6 +160,9 @@ class TileBuilder {
   simplify::PartSimplifier simplifier_;
   std::mutex telling_;
   std::int64_t done_ = 0;  ///< tiles
+  std::mutex failing_;
+  std::exception_ptr failure_;
+  std::atomic<bool> failed_ = false;
 };
 
 /// Normals of vertices by the areas of the triangles around them.

@@ -330,10 +330,33 @@ TEST(Tiles, AFullDiskLeavesNothing) {
   EXPECT_EQ(folder.entries(), 0U);
 }
 
+/// Wherever it comes from, among tiles that are built side by side.
+TEST(Tiles, AnErrorInATileEndsTheRunAndLeavesNothing) {
+  const ScratchFolder folder;
+  const TriangleMesh mesh = bumpy_ball(90, false);
+  for (int last = 1; last < 12; ++last) {
+    RunContext run;
+    run.threads = 4;
+    int told = 0;
+    run.progress = [&](const Progress&) {
+      if (++told == last) throw Error(ExitCode::budget, "the disk is full");
+    };
+    expect_error(ExitCode::budget, [&] { write_small_tiles(mesh, into(folder.file("set")), run); }, {"is full"});
+    EXPECT_EQ(folder.entries(), 0U);
+  }
+}
+
 TEST(Tiles, WhatAKilledRunLeftIsRemoved) {
   const ScratchFolder folder;
   fs::create_directories(folder.file(".set.partial-1-0/tiles"));
   write_tiles(bumpy_ball(20, true), into(folder.file("set")));
+  EXPECT_EQ(folder.entries(), 1U);
+  fs::remove_all(folder.file("set"));
+  fs::create_directories(folder.file(".set.partial-1-0/tiles"));
+  const fs::path before = fs::current_path();
+  fs::current_path(fs::path(folder.file("set")).parent_path());
+  write_tiles(bumpy_ball(20, true), into("set"));
+  fs::current_path(before);
   EXPECT_EQ(folder.entries(), 1U);
 }
 
