@@ -72,8 +72,15 @@ void main() {
 #else
   bool back = !gl_FrontFacing;
 #endif
-  // Lit from the side it is seen from.
-  vec3 n = dot(outside, view) < 0.0 ? -outside : outside;
+  // Lit from the side it is seen from: the triangle's, since where a surface is seen at an angle its smooth normal may
+  // point away already.
+#if defined(POINTS)
+  vec3 seen = view;
+#else
+  vec3 seen = cross(dFdx(vView), dFdy(vView));
+  if (dot(seen, view) < 0.0) seen = -seen;
+#endif
+  vec3 n = dot(outside, seen) < 0.0 ? -outside : outside;
 
   vec3 albedo = plain;
 #if defined(SHOW_COLOUR) && defined(HAS_COLOUR)
