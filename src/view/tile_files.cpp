@@ -6,6 +6,8 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -28,12 +30,25 @@ bool is_tile_file(const fs::path& file) {
   return std::find(kTileEndings.begin(), kTileEndings.end(), ending) != kTileEndings.end();
 }
 
+/// A page of anything else would only say in the browser that it shows nothing.
+void require_tileset(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  constexpr bool kThrows = false;
+  const nlohmann::json tileset = nlohmann::json::parse(stream, nullptr, kThrows);
+  if (tileset.is_discarded())
+    throw Error(ExitCode::unreadable, fmt::format("{}: is no JSON, or only a part of it", file.string()));
+  if (!tileset.is_object() || !tileset.contains("asset") || !tileset.contains("root") || !tileset["root"].is_object())
+    throw Error(ExitCode::unreadable, fmt::format("{}: is no tile set: it names no asset or no root", file.string()));
+}
+
 }  // namespace
 
 std::vector<TileFile> tile_files(const std::string& folder) {
   std::error_code failed;
-  if (!fs::is_regular_file(fs::path(folder) / "tileset.json", failed))
+  const fs::path tileset = fs::path(folder) / "tileset.json";
+  if (!fs::is_regular_file(tileset, failed))
     throw Error(ExitCode::unreadable, fmt::format("{}: a folder without a tileset.json", folder));
+  require_tileset(tileset);
   std::vector<TileFile> files;
   fs::recursive_directory_iterator entry(folder, failed);
   for (; !failed && entry != fs::recursive_directory_iterator(); entry.increment(failed)) {

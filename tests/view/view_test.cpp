@@ -130,7 +130,7 @@ class View : public ::testing::Test {
     settings_.title = "a <model> & more.ply";
     write_file(settings_.bundle, "/* the viewer's code */");
     std::filesystem::create_directories(folder_ / "tiles/1");
-    write_file(folder_ / "tiles/tileset.json", R"({"asset":{"version":"1.1"}})");
+    write_file(folder_ / "tiles/tileset.json", R"({"asset":{"version":"1.1"},"root":{}})");
     write_file(folder_ / "tiles/1/0.glb", std::string(100000, 'g'));
     write_file(folder_ / "tiles/notes.txt", "not a tile");
     write_file(folder_ / "secret.json", "secret");
@@ -237,7 +237,7 @@ TEST_F(View, TilesAreInThePage) {
   EXPECT_EQ(stats.tiles, 2U) << "the link and the text are none";
   const std::string page = read_text(page_);
   EXPECT_EQ(block_of(page, "file:1/0.glb"), std::string(100000, 'g'));
-  EXPECT_EQ(block_of(page, "file:tileset.json"), R"({"asset":{"version":"1.1"}})");
+  EXPECT_EQ(block_of(page, "file:tileset.json"), R"({"asset":{"version":"1.1"},"root":{}})");
   EXPECT_EQ(description_of(page)["embedded"], true);
   EXPECT_LT(page.size(), 10000U) << "is packed";
 }
@@ -254,6 +254,11 @@ TEST_F(View, RefusesWhatItCannotShow) {
   settings_.most_bytes = 1000000;
   expect_refused(ExitCode::unreadable, "without a tileset.json",
                  [&] { write_tiles_page(folder_ / "tiles/1", settings_, page_); });
+  for (const char* text : {"{\"asset\": {", "[]", R"({"asset":{"version":"1.1"}})", ""}) {
+    write_file(folder_ / "tiles/tileset.json", text);
+    expect_refused(ExitCode::unreadable, "tileset.json: is no",
+                   [&] { write_tiles_page(folder_ / "tiles", settings_, page_); });
+  }
   expect_refused(ExitCode::budget, "nowhere", [&] { write_mesh_page(mesh, settings_, folder_ / "nowhere/page.html"); });
   settings_.bundle = folder_ / "none.js";
   expect_refused(ExitCode::unreadable, "none.js", [&] { write_mesh_page(mesh, settings_, page_); });
