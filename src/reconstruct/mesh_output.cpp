@@ -13,7 +13,8 @@ MeshOutput::MeshOutput(ClusterMode mode, const VertexSettings& vertices, const F
       sink_(sink),
       clusterer_(ClusterSettings{mode}),
       distinct_(vertices.double_positions) {
-  if (vertices.trim > 0) trimmer_.emplace(static_cast<float>(vertices.trim));
+  const auto level = static_cast<float>(vertices.trim);
+  if (level > 0) rims_ = Rims{RimSmoother(level), RimTrimmer(level)};
 }
 
 MeshOutput::~MeshOutput() {
@@ -67,9 +68,8 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
     mesh_.slab = done_.slab;
     place_vertices({done_, *clustered_.front(), next}, frame_, settings_, mesh_.vertices);
     std::swap(mesh_.triangles, done_.triangles);
-    if (trimmer_) {
-      trimmer_->push(std::move(mesh_));
-      mesh_ = {};
+    if (rims_) {
+      rims_->smoother.push(std::exchange(mesh_, {}));
     } else {
       pass_on(mesh_);
     }
@@ -79,9 +79,14 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
     }
     clustered_.pop_front();
   }
-  if (!trimmer_) return;
-  if (last) trimmer_->finish();
-  while (trimmer_->pop(mesh_)) pass_on(mesh_);
+  if (rims_) trim(last);
+}
+
+void MeshOutput::trim(bool last) {
+  if (last) rims_->smoother.finish();
+  while (rims_->smoother.pop(mesh_)) rims_->trimmer.push(std::exchange(mesh_, {}));
+  if (last) rims_->trimmer.finish();
+  while (rims_->trimmer.pop(mesh_)) pass_on(mesh_);
 }
 
 void MeshOutput::pass_on(MeshSlab& slab) {

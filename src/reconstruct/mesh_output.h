@@ -12,6 +12,7 @@
 
 #include "boundary/boundary.h"
 #include "boundary/hole_closer.h"
+#include "boundary/rim_smoother.h"
 #include "boundary/rim_trimmer.h"
 #include "clustering/clusterer.h"
 #include "isosurface/iso_mesh.h"
@@ -78,6 +79,7 @@ class MeshOutput {
 
  private:
   void work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last);
+  void trim(bool last);
   void pass_on(MeshSlab& slab);
 
   VertexSettings settings_;
@@ -88,7 +90,12 @@ class MeshOutput {
   std::deque<std::shared_ptr<IsoSlab>> clustered_;  ///< by the clusterer, not yet written
   FinalSlab done_;                                  ///< lent to the clusterer and back: its storage is kept
   MeshSlab mesh_;                                   ///< of `done_`
-  std::optional<RimTrimmer> trimmer_;
+  /// What cuts the rims.
+  struct Rims {
+    RimSmoother smoother;
+    RimTrimmer trimmer;
+  };
+  std::optional<Rims> rims_;
   DistinctPositions distinct_;
   std::mutex mutex_;  ///< of spares_
   std::vector<std::shared_ptr<IsoSlab>> spares_;

@@ -34,14 +34,15 @@ struct StageReach {
 };
 
 inline constexpr std::array<StageReach, kStages> kStageReach{{
-    {"mark", 3 + kTouchSlabs, 8 + kTouchSlabs, 6 + kTouchSlabs, "samples touch cells three slabs away"},
-    {"refine", 3, 8, 6, "a corner belongs to the cells of the slab below, too"},
-    {"place", 3, 7, 6, "corners of the cells; the values of a slab are extended from those above it"},
-    {"project", 3, 7, 6, "as place; with diffusion a slab more below, for the centres of its cells"},
-    {"extend", 2, 6, 5, "signs by the values around, a slab either way"},
-    {"number", 1, 6, 5, "an edge's ends lie in its slab and on the first plane above"},
-    {"triangulate", 0, 6, 4,
-     "clusters look two slabs down and two up, fans, vertices at one position and rims one further down, rims one up"},
+    {"mark", 3 + kTouchSlabs, 9 + kTouchSlabs, 7 + kTouchSlabs, "samples touch cells three slabs away"},
+    {"refine", 3, 9, 7, "a corner belongs to the cells of the slab below, too"},
+    {"place", 3, 8, 7, "corners of the cells; the values of a slab are extended from those above it"},
+    {"project", 3, 8, 7, "as place; with diffusion a slab more below, for the centres of its cells"},
+    {"extend", 2, 7, 6, "signs by the values around, a slab either way"},
+    {"number", 1, 7, 6, "an edge's ends lie in its slab and on the first plane above"},
+    {"triangulate", 0, 7, 5,
+     "clusters look two slabs down and two up, fans and vertices at one position one further down, rims one further "
+     "either way"},
 }};
 
 constexpr const StageReach& reach_of(Stage stage) {

@@ -1,0 +1,136 @@
+#include "boundary/rim_smoother.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+namespace lamina {
+namespace {
+
+constexpr int kSide = 40;
+constexpr float kCutLevel = 0.2F;
+
+/// The squares of a grid that are wanted, halved; a slab for each row of vertices, with the triangles below it. No
+/// vertex reaches beyond its samples.
+std::vector<MeshSlab> squares(const std::function<bool(int, int)>& wanted) {
+  std::vector<MeshSlab> slabs;
+  for (int row = 0; row < kSide; ++row) {
+    MeshSlab& slab = slabs.emplace_back();
+    slab.slab = row;
+    for (int i = 0; i < kSide; ++i) {
+      slab.vertices.x.push_back(i);
+      slab.vertices.y.push_back(row);
+      slab.vertices.z.push_back(0);
+      slab.vertices.nx.push_back(0);
+      slab.vertices.ny.push_back(0);
+      slab.vertices.nz.push_back(1);
+      slab.vertices.overhang.push_back(0);
+    }
+    if (row == 0) continue;
+    const auto at = [](int i, int j) { return static_cast<std::uint32_t>(j * kSide + i); };
+    for (int i = 0; i + 1 < kSide; ++i) {
+      if (!wanted(i, row - 1)) continue;
+      slab.triangles.push_back({at(i, row - 1), at(i + 1, row - 1), at(i, row)});
+      slab.triangles.push_back({at(i + 1, row - 1), at(i + 1, row), at(i, row)});
+    }
+  }
+  return slabs;
+}
+
+bool in_disc(int i, int row) {
+  return std::hypot(i + 0.5 - kSide / 2.0, row + 0.5 - kSide / 2.0) < 15;
+}
+
+std::vector<MeshSlab> smoothed(std::vector<MeshSlab> slabs) {
+  RimSmoother smoother(kCutLevel);
+  std::vector<MeshSlab> out;
+  MeshSlab slab;
+  const auto take = [&] {
+    while (smoother.pop(slab)) {
+      EXPECT_EQ(slab.slab, static_cast<std::int64_t>(out.size()));
+      out.push_back(std::move(slab));
+    }
+  };
+  for (MeshSlab& s : slabs) {
+    smoother.push(std::move(s));
+    take();
+  }
+  smoother.finish();
+  take();
+  return out;
+}
+
+float overhang_at(const std::vector<MeshSlab>& slabs, int i, int row) {
+  return slabs[static_cast<std::size_t>(row)].vertices.overhang[static_cast<std::size_t>(i)];
+}
+
+TEST(RimSmoother, RaisesTheEndsOfASurfaceAndLeavesItsInside) {
+  const std::vector<MeshSlab> out = smoothed(squares(in_disc));
+  ASSERT_EQ(out.size(), std::size_t{kSide});
+  for (int row = 1; row + 1 < kSide; ++row) {
+    for (int i = 1; i + 1 < kSide; ++i) {
+      const int around = in_disc(i, row) + in_disc(i - 1, row) + in_disc(i, row - 1) + in_disc(i - 1, row - 1);
+      const double from_middle = std::hypot(i - kSide / 2.0, row - kSide / 2.0);
+      if (around > 0 && around < 4) {
+        EXPECT_GT(overhang_at(out, i, row), 0.6F * kCutLevel) << i << ' ' << row;
+      } else if (from_middle < 12) {
+        EXPECT_EQ(overhang_at(out, i, row), 0) << i << ' ' << row;
+      }
+    }
+  }
+}
+
+TEST(RimSmoother, ABridgeWithoutAnInsideStays) {
+  const auto disc_and_bridge = [](int i, int row) { return in_disc(i, row) || row == kSide / 2; };
+  const std::vector<MeshSlab> out = smoothed(squares(disc_and_bridge));
+  for (const int row : {kSide / 2, kSide / 2 + 1}) EXPECT_EQ(overhang_at(out, kSide - 3, row), 0);
+}
+
+TEST(RimSmoother, DoesNotDependOnTheOrderOfTriangles) {
+  std::vector<MeshSlab> slabs = squares(in_disc);
+  const std::vector<MeshSlab> before = smoothed(slabs);
+  for (MeshSlab& s : slabs) {
+    std::reverse(s.triangles.begin(), s.triangles.end());
+    for (auto& t : s.triangles) std::rotate(t.begin(), t.begin() + 1, t.end());
+  }
+  const std::vector<MeshSlab> after = smoothed(slabs);
+  for (std::size_t s = 0; s < before.size(); ++s) EXPECT_EQ(before[s].vertices.overhang, after[s].vertices.overhang);
+}
+
+/// The staircase of a disc's squares turns by 90 degrees at every other vertex; its rim as cut is nearly round.
+TEST(RimSmoother, ARaggedDiscIsCutNearlyRound) {
+  RimTrimmer trimmer(kCutLevel);
+  for (MeshSlab& s : smoothed(squares(in_disc))) trimmer.push(std::move(s));
+  trimmer.finish();
+  MeshSlab slab;
+  double area = 0;
+  double length = 0;
+  std::vector<double> x;
+  std::vector<double> y;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> half_edges;
+  while (trimmer.pop(slab)) {
+    x.insert(x.end(), slab.vertices.x.begin(), slab.vertices.x.end());
+    y.insert(y.end(), slab.vertices.y.begin(), slab.vertices.y.end());
+    for (const auto& t : slab.triangles) {
+      area += 0.5 * ((x[t[1]] - x[t[0]]) * (y[t[2]] - y[t[0]]) - (x[t[2]] - x[t[0]]) * (y[t[1]] - y[t[0]]));
+      for (std::size_t k = 0; k < 3; ++k) ++half_edges[{t[k], t[(k + 1) % 3]}];
+    }
+  }
+  for (const auto& [edge, count] : half_edges) {
+    ASSERT_EQ(count, 1);
+    if (!half_edges.contains({edge.second, edge.first}))
+      length += std::hypot(x[edge.first] - x[edge.second], y[edge.first] - y[edge.second]);
+  }
+  const double round = 2 * std::sqrt(std::numbers::pi * area);  // the circle of that area
+  EXPECT_LT(length, 1.1 * round);                               // the staircase: 1.27
+  EXPECT_GT(area, 0.8 * std::numbers::pi * 15 * 15);
+}
+
+}  // namespace
+}  // namespace lamina
