@@ -65,7 +65,8 @@ inline constexpr double kMainCell = 0.7;
 /// Half the side of a counting cell of 16 samples in radii: two radii wide, with room for scatter.
 inline constexpr double kCountingHalfWidth = 1.15;
 
-/// Noise (r) up to which sharp edges stand out: detail that the sampling hardly resolves has more, and bends everywhere.
+/// Noise (r) up to which sharp edges stand out: detail that the sampling hardly resolves has more, and bends
+/// everywhere.
 inline constexpr float kSharp = 0.03F;
 /// Share of samples with normals interpolated over sharp edges from which on such normals are found again.
 inline constexpr double kBlurred = 0.01;
