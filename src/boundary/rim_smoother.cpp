@@ -94,10 +94,8 @@ void RimSmoother::smooth(Held& here, const Held* below, const Held* above) {
   for_corners(here.mesh.triangles, here.first, here.end(), add);
   if (above != nullptr) for_corners(above->mesh.triangles, here.first, here.end(), add);
   std::vector<float>& out = here.mesh.vertices.overhang;
-  // An ear that sticks out has one or two triangles, the sides of a bridge have three and more.
-  constexpr std::uint32_t kEar = 2 * 2;
   for (std::size_t i = 0; i < out.size(); ++i) {
-    if (counts_[i] == 0 || (here.boundary[i] != 0 && inside_[i] == 0 && counts_[i] > kEar)) continue;
+    if (counts_[i] == 0 || (here.boundary[i] != 0 && inside_[i] == 0)) continue;
     const float mean = static_cast<float>(sums_[i]) / (kUnits * static_cast<float>(counts_[i]));
     out[i] = 0.5F * (raised(here, i) + mean);
   }

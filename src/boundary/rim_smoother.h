@@ -14,7 +14,7 @@ namespace lamina {
 inline constexpr float kEndOverhang = 1.15F;
 
 /// Takes a streamed mesh slab by slab and gives it back, two slabs later. Overhangs on the boundary are raised to
-/// kEndOverhang, but not where a vertex has no neighbour inside and is no ear: narrow bridges stay. Then every vertex's
+/// kEndOverhang, but not where a vertex has no neighbour inside: narrow bridges stay. Then every vertex's
 /// moves half of the way to the mean of its neighbours' along the edges (an edge with two triangles counts twice).
 /// Slabs far from any boundary and any overhang of the level pass as they are. What comes out of a slab depends on it,
 /// on the two above and on the one below (for whose boundary the triangles of this one count) alone, and not on the
