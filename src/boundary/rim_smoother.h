@@ -11,7 +11,7 @@ namespace lamina {
 
 /// The overhang that vertices on the boundary have at least, levels of the cut: more than one, so that the mesh is cut
 /// through its last row of triangles, not left with it, where the surface ends before the level is reached.
-inline constexpr float kEndOverhang = 1.15F;
+inline constexpr float kEndOverhang = 1.25F;
 
 /// Takes a streamed mesh slab by slab and gives it back, two slabs later. Overhangs on the boundary are raised to
 /// kEndOverhang, but not where a vertex has no neighbour inside: narrow bridges stay. Then every vertex's
