@@ -4,9 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <utility>
 #include <vector>
+
+#include "boundary/grid_slabs.h"
 
 namespace lamina {
 namespace {
@@ -14,31 +15,10 @@ namespace {
 constexpr int kSide = 40;
 constexpr float kCutLevel = 0.2F;
 
-/// The squares of a grid that are wanted, halved; a slab for each row of vertices, with the triangles below it. No
-/// vertex reaches beyond its samples.
-std::vector<MeshSlab> squares(const std::function<bool(int, int)>& wanted) {
-  std::vector<MeshSlab> slabs;
-  for (int row = 0; row < kSide; ++row) {
-    MeshSlab& slab = slabs.emplace_back();
-    slab.slab = row;
-    for (int i = 0; i < kSide; ++i) {
-      slab.vertices.x.push_back(i);
-      slab.vertices.y.push_back(row);
-      slab.vertices.z.push_back(0);
-      slab.vertices.nx.push_back(0);
-      slab.vertices.ny.push_back(0);
-      slab.vertices.nz.push_back(1);
-      slab.vertices.overhang.push_back(0);
-    }
-    if (row == 0) continue;
-    const auto at = [](int i, int j) { return static_cast<std::uint32_t>(j * kSide + i); };
-    for (int i = 0; i + 1 < kSide; ++i) {
-      if (!wanted(i, row - 1)) continue;
-      slab.triangles.push_back({at(i, row - 1), at(i + 1, row - 1), at(i, row)});
-      slab.triangles.push_back({at(i + 1, row - 1), at(i + 1, row), at(i, row)});
-    }
-  }
-  return slabs;
+/// The squares of a grid that are wanted. No vertex reaches beyond its samples.
+std::vector<MeshSlab> squares(const test::WantedSquare& wanted) {
+  return test::grid_slabs(
+      kSide, [](int, int) { return 0.0F; }, wanted);
 }
 
 bool in_disc(int i, int row) {

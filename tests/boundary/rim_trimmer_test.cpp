@@ -7,35 +7,18 @@
 #include <functional>
 #include <map>
 
+#include "boundary/grid_slabs.h"
+
 namespace lamina {
 namespace {
 
 using Field = std::function<float(double, double)>;
 
-/// Rows of a triangulated grid in the plane, a slab each: the triangles of a row hang on the row below.
 std::vector<MeshSlab> grid(int side, const Field& overhang) {
-  std::vector<MeshSlab> slabs;
-  for (int row = 0; row < side; ++row) {
-    MeshSlab& slab = slabs.emplace_back();
-    slab.slab = row;
-    slab.vertices.attributes.resize(1);
-    for (int i = 0; i < side; ++i) {
-      slab.vertices.x.push_back(i);
-      slab.vertices.y.push_back(row);
-      slab.vertices.z.push_back(0);
-      slab.vertices.nx.push_back(0);
-      slab.vertices.ny.push_back(0);
-      slab.vertices.nz.push_back(1);
-      slab.vertices.attributes[0].push_back(static_cast<float>(i));
-      slab.vertices.radius.push_back(2);
-      slab.vertices.overhang.push_back(overhang(i, row));
-    }
-    if (row == 0) continue;
-    const auto at = [side](int i, int j) { return static_cast<std::uint32_t>(j * side + i); };
-    for (int i = 0; i + 1 < side; ++i) {
-      slab.triangles.push_back({at(i, row - 1), at(i + 1, row - 1), at(i, row)});
-      slab.triangles.push_back({at(i + 1, row - 1), at(i + 1, row), at(i, row)});
-    }
+  std::vector<MeshSlab> slabs = test::grid_slabs(side, overhang);
+  for (MeshSlab& slab : slabs) {
+    slab.vertices.attributes.emplace_back(slab.vertices.x.begin(), slab.vertices.x.end());
+    slab.vertices.radius.assign(slab.vertices.size(), 2);
   }
   return slabs;
 }
