@@ -100,8 +100,9 @@ void add_hole_options(CLI::App& tool, SurfaceSettings& settings, const std::stri
             settings.watertight = word == "auto" ? std::nullopt : std::optional(word == "yes");
           },
           "Close all holes, whatever lies around, unless a rim longer than 24 influence radii shows that the surface "
-          "is "
-          "an open one; auto: where --blend auto finds a clean, even cloud")
+          "is an open one, since the surface does not lead into it; auto: where --blend auto finds a clean, even "
+          "cloud, "
+          "with rims longer than that only if its normals had to be found")
       ->check(CLI::IsMember({"auto", "yes", "no"}).description(""))
       ->type_name("auto|yes|no")
       ->default_str("auto")

@@ -18,13 +18,21 @@ struct OpenLoop {
   std::string reason;
 };
 
+/// What tells that the scanned object is closed. Then all loops are closed, whatever lies around them.
+enum class Watertight : std::uint8_t {
+  no,           ///< nothing does
+  short_loops,  ///< that no loop longer than HoleSettings::kWatertight is left
+  any_loops,    ///< also that the surface around every longer one leads into it, and not away from it as at the outer
+                ///< boundary of a sheet
+};
+
 /// Which boundary loops to close.
 struct HoleSettings {
   /// Local influence radii: loops up to this length are closed where the surface around them tells how. 0: none.
   double longest = 8;
-  /// Where no loop longer than kWatertight (local influence radii) is left, the scanned object is taken to be closed:
-  /// all loops are closed, whatever lies around them, by the triangulation of least area.
-  bool watertight = false;
+  /// Loops up to kWatertight (local influence radii) are closed by the triangulation of least area, longer ones by a
+  /// smooth surface (boundary/closure.h).
+  Watertight watertight = Watertight::no;
   static constexpr double kWatertight = 24;
   /// Vertices' last attribute says which of them were added: those that are get 1.
   bool mark = false;

@@ -31,6 +31,7 @@ struct PointSourceInfo {
   std::string path;                  ///< as given by the user, for messages
   std::uint64_t count = 0;           ///< rows
   bool has_normals = false;          ///< nx ny nz all present
+  bool found_normals = false;        ///< not the source's own: it had none, and they were found from the positions
   bool has_radius = false;           ///< by the column radius, else pscale
   bool has_quality = false;          ///< by the column quality, else confidence
   std::string radius_name;           ///< as the file calls it; empty: none

@@ -83,8 +83,9 @@ struct SurfaceSettings {
   /// (boundary/fill.h). 0, or ClusterMode::free: none are. R is taken from the cells of the octree, which follow it by
   /// powers of two. Unset: 300, gaps up to some hundred radii wide.
   std::optional<double> close_holes = 8;
-  /// Close all loops where none longer than 24 R is left: the scanned object is taken to be closed then.
-  /// Unset: chosen where `blend` is, else false.
+  /// Close all loops where none is left that is longer than 24 R and whose surface does not lead into it: the scanned
+  /// object is taken to be closed then. Unset: chosen where `blend` is (where the samples came with normals, only if
+  /// none longer than 24 R is left), else false.
   std::optional<bool> watertight;
   /// Close everything: what `close_holes` and `watertight` leave open gets surfaces that rest on nothing but its rim.
   /// Vertices get an attribute `invented`: 1 where one was added for that, else 0. Not with ClusterMode::free.

@@ -140,9 +140,14 @@ double turn_for(double flat) {
   return std::copysign(turn, flat);
 }
 
-/// At each vertex of the rim by how much the closure is to leave it otherwise than the membrane does: the difference
-/// of their derivatives across the rim, times the length of rim that belongs to the vertex.
-Eigen::MatrixXd turns(const Loop& loop, const Disc& flat, const Sparse& stiff) {
+struct Turns {
+  /// At each vertex of the rim by how much the closure is to leave it otherwise than the membrane does: the difference
+  /// of their derivatives across the rim, times the length of rim that belongs to the vertex.
+  Eigen::MatrixXd at_rim;
+  double leads_in = 0;  ///< Closure::leads_in
+};
+
+Turns turns(const Loop& loop, const Disc& flat, const Sparse& stiff) {
   const std::size_t n = loop.vertices.size();
   const std::size_t window =
       std::min((n - 1) / 2, std::max<std::size_t>(2, static_cast<std::size_t>(kRimWindow * static_cast<double>(n))));
@@ -175,7 +180,8 @@ Eigen::MatrixXd turns(const Loop& loop, const Disc& flat, const Sparse& stiff) {
     lying += own_length[i].x() * std::cos(angles[i]);
     all += own_length[i].x();
   }
-  const bool is_sheet = lying < kLiesBack * all;
+  const double leads_in = all > 0 ? lying / all : 0;
+  const bool is_sheet = leads_in < kLiesBack;
   std::vector<Vec3> wanted(n);
   for (std::size_t i = 0; i < n; ++i) {
     if (is_sheet && angles[i] < -kTurnsOff / 2) angles[i] = std::numbers::pi;
@@ -192,7 +198,7 @@ Eigen::MatrixXd turns(const Loop& loop, const Disc& flat, const Sparse& stiff) {
     const Vec3 turn = straight * wanted[i].normalized() - inward[i];
     out.row(static_cast<Eigen::Index>(i)) = (turn.allFinite() ? share * turn : Vec3(Vec3::Zero())).transpose();
   }
-  return out;
+  return {std::move(out), leads_in};
 }
 
 /// Moves the membrane by the displacement of least bending (its bilaplacian over the membrane is zero) whose derivative
@@ -239,7 +245,7 @@ Filling filling_of(const Disc& disc, const Vec3& origin, double unit, const Eige
 
 }  // namespace
 
-Filling invent_closure(const Loop& loop) {
+Closure close_loop(const Loop& loop) {
   const std::size_t n = loop.vertices.size();
   const auto& first = loop.vertices.front().position;
   const Vec3 origin(first[0], first[1], first[2]);
@@ -260,8 +266,9 @@ Filling invent_closure(const Loop& loop) {
     values = harmonic(stiff, split, given.cast<double>());
     if (values.size() == 0) values = given.cast<double>().colwise().mean().replicate(split.fresh, 1);
   }
-  bend(turns(loop, disc, stiff), stiff, disc);
-  return filling_of(disc, origin, unit, values);
+  const Turns turned = turns(loop, disc, stiff);
+  bend(turned.at_rim, stiff, disc);
+  return {filling_of(disc, origin, unit, values), turned.leads_in};
 }
 
 }  // namespace lamina::boundary

@@ -44,7 +44,8 @@ HoleCloser::HoleCloser(const HoleSettings& settings, std::size_t attributes, boo
           [this](const LoopExtent& extent) { leave(extent, Verdict::too_long); }) {}
 
 double HoleCloser::bound() const {
-  return settings_.watertight ? std::max(settings_.longest, HoleSettings::kWatertight) : settings_.longest;
+  return settings_.watertight != Watertight::no ? std::max(settings_.longest, HoleSettings::kWatertight)
+                                                : settings_.longest;
 }
 
 void HoleCloser::take(Loop&& loop, const LoopExtent& extent) {
@@ -192,14 +193,33 @@ void HoleCloser::settle_occupied(std::vector<Closing>& closings) const {
   for (const std::size_t island : taken) closings[island].filling.verdict = Verdict::joined;
 }
 
-bool HoleCloser::is_closed_thing(std::uint64_t vertices, const std::vector<Closing>& closings) const {
+bool HoleCloser::may_be_closed_thing(std::uint64_t vertices, const std::vector<Closing>& closings) const {
   std::uint64_t edges = 0;
   for (std::size_t l = 0; l < loops_.size(); ++l) {
-    if (closings[l].is_closed()) continue;
-    if (loops_[l].second.radii > HoleSettings::kWatertight) return false;
-    edges += loops_[l].second.edges;
+    if (!closings[l].is_closed() && !is_wide(l)) edges += loops_[l].second.edges;
   }
-  return settings_.watertight && stats_.open == 0 && long_.empty() && edges * kLeastVerticesPerEdge <= vertices;
+  return settings_.watertight != Watertight::no && stats_.open == 0 && long_.empty() &&
+         edges * kLeastVerticesPerEdge <= vertices;
+}
+
+bool HoleCloser::close_wide(std::vector<Closing>& closings) const {
+  std::vector<std::size_t> wide;
+  for (std::size_t l = 0; l < loops_.size(); ++l) {
+    if (!closings[l].is_closed() && is_wide(l)) wide.push_back(l);
+  }
+  if (wide.empty()) return true;
+  if (settings_.watertight != Watertight::any_loops) return false;
+  std::vector<Closure> closures(wide.size());
+  tbb::parallel_for(std::size_t{0}, wide.size(),
+                    [&](std::size_t i) { closures[i] = close_loop(loops_[wide[i]].first); });
+  if (!std::all_of(closures.begin(), closures.end(), [](const Closure& c) { return c.leads_in >= kLeadsIn; }))
+    return false;
+  for (std::size_t i = 0; i < wide.size(); ++i) {
+    Filling& filling = closings[wide[i]].filling;
+    filling = std::move(closures[i].filling);
+    filling.verdict = Verdict::filled;
+  }
+  return true;
 }
 
 void HoleCloser::fill_rest(std::vector<Closing>& closings) const {
@@ -214,7 +234,7 @@ void HoleCloser::invent_rest(std::vector<Closing>& closings) {
   long_.clear();
   closings.resize(loops_.size());
   tbb::parallel_for(std::size_t{0}, loops_.size(), [&](std::size_t i) {
-    if (!closings[i].is_closed()) closings[i].filling = invent_closure(loops_[i].first);
+    if (!closings[i].is_closed()) closings[i].filling = close_loop(loops_[i].first).filling;
   });
 }
 
@@ -294,7 +314,7 @@ Addition HoleCloser::finish(std::uint64_t vertices) {
   std::vector<Closing> closings(loops_.size());
   fill_all(closings);
   settle_occupied(closings);
-  if (is_closed_thing(vertices, closings)) fill_rest(closings);
+  if (may_be_closed_thing(vertices, closings) && close_wide(closings)) fill_rest(closings);
   if (settings_.all) {
     sort_loops(long_);
     invent_rest(closings);

@@ -17,6 +17,8 @@ namespace lamina::boundary {
 /// surface has one long boundary loop at least, unless it is so small that the loop is a good part of it. The dragon's,
 /// whose whiskers leave many loops, has one for four hundred.
 inline constexpr std::uint64_t kLeastVerticesPerEdge = 100;
+/// The surface leads into a loop where Closure::leads_in is at least this (84 degrees).
+inline constexpr double kLeadsIn = 0.1;
 /// Loops of more edges are not looked at, whatever their length, but where all are to be closed.
 inline constexpr std::uint64_t kMostEdges = 4096;
 
@@ -63,7 +65,11 @@ class HoleCloser {
   bool take_islands(std::size_t outer, const std::vector<std::size_t>& occupants, const std::vector<Closing>& closings,
                     Closing& out) const;
   void settle_occupied(std::vector<Closing>& closings) const;
-  [[nodiscard]] bool is_closed_thing(std::uint64_t vertices, const std::vector<Closing>& closings) const;
+  [[nodiscard]] bool is_wide(std::size_t l) const { return loops_[l].second.radii > HoleSettings::kWatertight; }
+  /// Whether the short loops that are left look like those of a closed thing.
+  [[nodiscard]] bool may_be_closed_thing(std::uint64_t vertices, const std::vector<Closing>& closings) const;
+  /// Closes the longer ones that are left, all or none; whether none remains.
+  bool close_wide(std::vector<Closing>& closings) const;
   void fill_rest(std::vector<Closing>& closings) const;
   void append(std::size_t l, const Closing& closing, std::uint64_t vertices, Addition& out);
   void invent_rest(std::vector<Closing>& closings);

@@ -64,7 +64,7 @@ nlohmann::json to_json(const PartInfo& info) {
           {"attributes", attributes},
           {"comments", info.comments},
           {"close_holes", info.holes.longest},
-          {"watertight", info.holes.watertight},
+          {"watertight", static_cast<int>(info.holes.watertight)},
           {"mark_filled", info.holes.mark},
           {"fill_all", info.holes.all},
           {"vertices", info.vertices},
@@ -86,8 +86,8 @@ PartInfo info_from(const nlohmann::json& j) {
     info.attributes.push_back({a.at("name").get<std::string>(), *type});
   }
   info.comments = j.at("comments").get<std::vector<std::string>>();
-  info.holes = {j.at("close_holes").get<double>(), j.at("watertight").get<bool>(), j.at("mark_filled").get<bool>(),
-                j.at("fill_all").get<bool>()};
+  info.holes = {j.at("close_holes").get<double>(), static_cast<Watertight>(j.at("watertight").get<int>()),
+                j.at("mark_filled").get<bool>(), j.at("fill_all").get<bool>()};
   info.vertices = j.at("vertices").get<std::uint64_t>();
   info.triangles = j.at("triangles").get<std::uint64_t>();
   info.below = mark_from(j.at("below"));

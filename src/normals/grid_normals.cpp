@@ -116,6 +116,7 @@ class WithGridNormals final : public PointSource {
   WithGridNormals(std::unique_ptr<PointSource> source, SpillFile file)
       : source_(std::move(source)), file_(std::move(file)) {
     info_ = source_->info();
+    info_.found_normals = !info_.has_normals;
     info_.has_normals = true;
   }
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {

@@ -41,6 +41,7 @@ class PointsWithNormals final : public PointSource {
   PointsWithNormals(std::unique_ptr<PointSource> source, std::unique_ptr<RowNormals> normals)
       : source_(std::move(source)), normals_(std::move(normals)) {
     info_ = source_->info();
+    info_.found_normals = !info_.has_normals;
     info_.has_normals = true;
   }
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {

@@ -24,13 +24,12 @@ void choose_for_noise(const RadiusSurvey& survey, bool cell_given, StageSettings
   if (!cell_given) out.projection.band = kNoisyBand;
 }
 
-/// What an even, clean sampling allows: the narrowest support, finer cells between sheets, and a closed mesh.
+/// What an even, clean sampling allows: the narrowest support, and finer cells between sheets.
 void choose_for_even(bool cell_given, StageSettings& out) {
   out.feed.blend = 1;
   out.feed.cell = {kChosenCell, Length::Unit::sample_radius};
   out.projection.trusted_offset = kEvenTrust;
   out.projection.trusted_samples = kEvenTrustedSamples;
-  out.holes.watertight = true;
   if (cell_given) return;
   out.feed.refine_sheets = true;
   out.projection.band = kSheetBand;
@@ -38,16 +37,18 @@ void choose_for_even(bool cell_given, StageSettings& out) {
 
 }  // namespace
 
-StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& survey) {
+StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& survey, const PointSourceInfo& info) {
   StageSettings out;
   out.feed.blend = kDefaultBlend;
-  out.holes.watertight = false;
   if (s.blend) {
     out.feed.blend = *s.blend;
   } else if (survey.noise > kNoisy) {
     choose_for_noise(survey, s.cell.has_value(), out);
   } else if (survey.high < kEven * survey.low) {
     choose_for_even(s.cell.has_value(), out);
+    // A closed mesh. Normals come with samples of a surface, which ends where they do; positions alone say nothing of
+    // wide gaps among them.
+    out.holes.watertight = info.found_normals ? Watertight::any_loops : Watertight::short_loops;
   }
   if (!s.blend && survey.noise <= kNoisy) out.trim = kCleanRimOverhang;
   if (s.trim) out.trim = *s.trim;
@@ -64,7 +65,8 @@ StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& surve
   out.holes.longest = s.cluster == ClusterMode::free ? 0 : s.close_holes.value_or(kLongestRim);
   out.holes.mark = s.vertex_filled;
   out.holes.all = s.fill_all;
-  out.holes.watertight = s.watertight.value_or(out.holes.watertight) && out.holes.longest > 0;
+  if (s.watertight) out.holes.watertight = *s.watertight ? Watertight::any_loops : Watertight::no;
+  if (out.holes.longest == 0) out.holes.watertight = Watertight::no;
   out.feed.radius_scale = static_cast<float>(s.radius_scale);
   out.projection.fit = s.fit == FitMode::sphere ? Fit::sphere : Fit::plane;
   out.projection.steps = s.steps == 0 ? kMostProjections : s.steps;

@@ -2,6 +2,7 @@
 #pragma once
 #include "isosurface/number_edges.h"
 #include "lamina/holes.h"
+#include "lamina/points.h"
 #include "lamina/surface.h"
 #include "mls/project.h"
 #include "mls/refit_normals.h"
@@ -22,6 +23,6 @@ struct StageSettings {
 };
 
 /// A function of settings and survey alone, so that all parts of a job choose the same.
-StageSettings choose_support(const SurfaceSettings& settings, const RadiusSurvey& survey);
+StageSettings choose_support(const SurfaceSettings& settings, const RadiusSurvey& survey, const PointSourceInfo& info);
 
 }  // namespace lamina

@@ -38,8 +38,9 @@ Eigen::Vector3d vector_from(const Json& j) {
 Json to_json(const PointSourceInfo& info) {
   Json attributes = Json::array();
   for (const AttributeSpec& a : info.attributes) attributes.push_back({{"name", a.name}, {"type", ply_name(a.type)}});
-  return {{"path", info.path},           {"rows", info.count}, {"radius", info.has_radius},
-          {"quality", info.has_quality}, {"crs", info.crs},    {"attributes", attributes}};
+  return {{"path", info.path},         {"rows", info.count},          {"found_normals", info.found_normals},
+          {"radius", info.has_radius}, {"quality", info.has_quality}, {"crs", info.crs},
+          {"attributes", attributes}};
 }
 
 PointSourceInfo info_from(const Json& j) {
@@ -47,6 +48,7 @@ PointSourceInfo info_from(const Json& j) {
   info.path = j.at("path").get<std::string>();
   info.count = j.at("rows").get<std::uint64_t>();
   info.has_normals = true;
+  info.found_normals = j.value("found_normals", false);  // older stores do not say
   info.has_radius = j.at("radius").get<bool>();
   info.has_quality = j.at("quality").get<bool>();
   info.crs = j.value("crs", std::string());  // older stores have none

@@ -259,7 +259,7 @@ ReconstructionPlan make_plan(const SurfaceSettings& s, const StoredCloud& cloud,
   plan.window = s.window;
   plan.boundary = static_cast<float>(s.boundary);
 
-  const StageSettings stages = choose_support(s, survey);
+  const StageSettings stages = choose_support(s, survey, cloud.info);
   plan.feed = stages.feed;
   plan.refit = stages.refit;
   plan.projection = stages.projection;
@@ -329,7 +329,7 @@ SurfacePlan summary_of(const ReconstructionPlan& p) {
   out.sharpen = p.refit.only_blurred;
   out.cell = p.feed.cell;
   out.refine_sheets = p.feed.refine_sheets;
-  out.watertight = p.holes.watertight;
+  out.watertight = p.holes.watertight != Watertight::no;
   out.trim = p.vertices.trim;
   out.longest_rim = p.holes.longest;
   out.finest_cell = p.lattice.cell * step;

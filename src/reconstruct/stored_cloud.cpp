@@ -26,6 +26,7 @@ class PlannedNormals final : public PointSource {
  public:
   explicit PlannedNormals(std::unique_ptr<PointSource> source) : source_(std::move(source)) {
     info_ = source_->info();
+    info_.found_normals = !info_.has_normals;
     info_.has_normals = true;
   }
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {

@@ -215,13 +215,15 @@ class SeedNeighbourhoods {
     if (samples_.nx.size() != samples_.size()) return Eigen::Vector3d::Zero();
     return Eigen::Vector3f(samples_.nx[seed], samples_.ny[seed], samples_.nz[seed]).cast<double>();
   }
-  /// The neighbours' places about the seed, in units of the neighbourhood.
+  /// The places about the seed, in units of the neighbourhood, of neighbours that do not face the other way: the
+  /// two sides of a thin wall or a spine are no noise of each other.
   void gather(std::size_t seed, std::vector<Eigen::Vector3d>& out) const {
     out.clear();
     const NoiseCell c = cell_of(seed);
+    const Eigen::Vector3d facing = normal(seed);
     for (int k = 0; k < 27; ++k) {
       for (const std::uint32_t i : cells_.at(beside(c, k))) {
-        if (i == seed || out.size() >= kMost) continue;
+        if (i == seed || out.size() >= kMost || normal(i).dot(facing) < 0) continue;
         const Eigen::Vector3d p = Eigen::Vector3d(static_cast<double>(samples_.x[i]) - samples_.x[seed],
                                                   static_cast<double>(samples_.y[i]) - samples_.y[seed],
                                                   static_cast<double>(samples_.z[i]) - samples_.z[seed]) *

@@ -63,7 +63,7 @@ TEST(Closure, OfACapGoesOnRound) {
     return Place{std::sin(angle) * std::cos(t), std::sin(angle) * std::sin(t), std::cos(angle)};
   };
   const Loop loop = loop_through(120, on_sphere, on_sphere);
-  const Filling filling = invent_closure(loop);
+  const Filling filling = close_loop(loop).filling;
   expect_closure(loop, filling);
   for (const auto& p : filling.positions) EXPECT_NEAR(std::hypot(p[0], p[1], p[2]), 1, 0.01);
   for (std::size_t i = 0; i < filling.positions.size(); ++i)
@@ -73,7 +73,7 @@ TEST(Closure, OfACapGoesOnRound) {
 TEST(Closure, OfATubesEndIsFlat) {
   const auto round = [](double t) { return Place{std::cos(t), std::sin(t), 0}; };
   const Loop loop = loop_through(200, round, round);
-  const Filling filling = invent_closure(loop);
+  const Filling filling = close_loop(loop).filling;
   expect_closure(loop, filling);
   for (const auto& p : filling.positions) EXPECT_NEAR(p[2], 0, 0.05);
 }
@@ -82,7 +82,7 @@ TEST(Closure, OfASheetLiesBehindIt) {
   // The sheet faces up: its rim is run through clockwise.
   const auto round = [](double t) { return Place{std::cos(-t), std::sin(-t), 0}; };
   const Loop loop = loop_through(200, round, [](double) { return Place{0, 0, 1}; });
-  const Filling filling = invent_closure(loop);
+  const Filling filling = close_loop(loop).filling;
   expect_closure(loop, filling);
   double lowest = 0;
   for (const auto& p : filling.positions) {
@@ -95,7 +95,7 @@ TEST(Closure, OfASheetLiesBehindIt) {
 TEST(Closure, GrowsCoarserInwards) {
   const auto round = [](double t) { return Place{std::cos(t), std::sin(t), 0}; };
   const Loop loop = loop_through(2000, round, round);
-  const Filling filling = invent_closure(loop);
+  const Filling filling = close_loop(loop).filling;
   expect_closure(loop, filling);
   EXPECT_LT(filling.positions.size(), 12'000U);
   double longest = 0;
@@ -114,7 +114,7 @@ TEST(Closure, GrowsCoarserInwards) {
 TEST(Closure, OfALongSlitIsMadeOfFairTriangles) {
   const auto slit = [](double t) { return Place{40 * std::cos(t), std::sin(t), 0}; };
   const Loop loop = loop_through(1200, slit, [](double) { return Place{0, 0, 1}; });
-  const Filling filling = invent_closure(loop);
+  const Filling filling = close_loop(loop).filling;
   expect_closure(loop, filling);
   for (const auto& p : filling.positions) EXPECT_NEAR(p[2], 0, 1e-6);
 }
@@ -126,7 +126,7 @@ RC_GTEST_PROP(Closure, IsADiscWhateverTheRimLooksLike, ()) {
   std::uniform_real_distribution<> uniform(-1, 1);
   const auto anywhere = [&](double) { return Place{1e6 + uniform(random), uniform(random), uniform(random)}; };
   const Loop loop = loop_through(n, anywhere, anywhere);
-  const Filling filling = invent_closure(loop);
+  const Filling filling = close_loop(loop).filling;
   expect_closure(loop, filling);
   for (const auto& p : filling.positions) RC_ASSERT(std::isfinite(p[0]) && std::isfinite(p[1]) && std::isfinite(p[2]));
 }

@@ -10,6 +10,13 @@ RadiusSurvey survey(float noise, float high) {
   return {1000, 1, 1.2F, high, noise};
 }
 
+/// For samples that come with their normals, or have none.
+StageSettings choice_of(const SurfaceSettings& settings, const RadiusSurvey& survey, bool found_normals = false) {
+  PointSourceInfo info;
+  info.found_normals = found_normals;
+  return choose_support(settings, survey, info);
+}
+
 SurfaceSettings by_noise() {
   SurfaceSettings settings;
   settings.blend.reset();
@@ -17,50 +24,58 @@ SurfaceSettings by_noise() {
 }
 
 TEST(ChooseSupport, NothingIsChosenUnlessAskedFor) {
-  const StageSettings choice = choose_support({}, survey(0.2F, 2));
+  const StageSettings choice = choice_of({}, survey(0.2F, 2));
   EXPECT_EQ(choice.feed.blend, 1.2);
   EXPECT_EQ(choice.refit.support, 0);
   EXPECT_EQ(choice.feed.cell, (Length{0.9, Length::Unit::influence_radius}));
 }
 
 TEST(ChooseSupport, EvenCleanCloudsGetTheNarrowestSupport) {
-  const StageSettings even = choose_support(by_noise(), survey(0.01F, 2.5F));
-  const StageSettings varying = choose_support(by_noise(), survey(0.01F, 8));
+  const StageSettings even = choice_of(by_noise(), survey(0.01F, 2.5F));
+  const StageSettings varying = choice_of(by_noise(), survey(0.01F, 8));
   EXPECT_EQ(even.feed.blend, 1);
   EXPECT_EQ(even.feed.cell.unit, Length::Unit::sample_radius);
   EXPECT_EQ(varying.feed.blend, 1.2);
   EXPECT_EQ(even.refit.support + varying.refit.support, 0);
-  EXPECT_TRUE(even.feed.refine_sheets && even.holes.watertight);
-  EXPECT_FALSE(varying.feed.refine_sheets || varying.holes.watertight);
+  EXPECT_TRUE(even.feed.refine_sheets);
+  EXPECT_FALSE(varying.feed.refine_sheets);
+  EXPECT_EQ(even.holes.watertight, Watertight::short_loops);
+  EXPECT_EQ(varying.holes.watertight, Watertight::no);
+}
+
+TEST(ChooseSupport, PositionsAloneMayHaveWideGaps) {
+  EXPECT_EQ(choice_of(by_noise(), survey(0.01F, 2.5F), true).holes.watertight, Watertight::any_loops);
+  EXPECT_EQ(choice_of(by_noise(), survey(0.01F, 8), true).holes.watertight, Watertight::no);
+  EXPECT_EQ(choice_of(by_noise(), survey(0.2F, 2.5F), true).holes.watertight, Watertight::no);
 }
 
 TEST(ChooseSupport, ClosedMeshesAreMadeWhereAskedFor) {
   SurfaceSettings settings;
-  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2)).holes.watertight);
+  EXPECT_EQ(choice_of(settings, survey(0.01F, 2)).holes.watertight, Watertight::no);
   settings.watertight = true;
-  EXPECT_TRUE(choose_support(settings, survey(0.2F, 8)).holes.watertight);
+  EXPECT_EQ(choice_of(settings, survey(0.2F, 8)).holes.watertight, Watertight::any_loops);
   settings.blend.reset();
   settings.watertight = false;
-  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2)).holes.watertight);
+  EXPECT_EQ(choice_of(settings, survey(0.01F, 2)).holes.watertight, Watertight::no);
 }
 
 TEST(ChooseSupport, NoiseWidensTheSupportAndRefitsNormals) {
   double before = 1.2;
   for (const float noise : {0.06F, 0.1F, kVeryNoisy}) {
-    const StageSettings choice = choose_support(by_noise(), survey(noise, 2));
+    const StageSettings choice = choice_of(by_noise(), survey(noise, 2));
     EXPECT_GT(choice.feed.blend, before);
     EXPECT_GT(choice.refit.support, 0);
     EXPECT_EQ(choice.feed.cell.unit, Length::Unit::sample_radius);
     before = choice.feed.blend;
   }
-  EXPECT_EQ(choose_support(by_noise(), survey(1, 2)).feed.blend, before);
+  EXPECT_EQ(choice_of(by_noise(), survey(1, 2)).feed.blend, before);
 }
 
 TEST(ChooseSupport, RoughNormalsWantTheWideSupportSooner) {
   RadiusSurvey cloud = survey(kVeryNoisyRough, 2);
-  const StageSettings even = choose_support(by_noise(), cloud);
+  const StageSettings even = choice_of(by_noise(), cloud);
   cloud.normal_noise = 0.25F;  // 14 degrees
-  const StageSettings rough = choose_support(by_noise(), cloud);
+  const StageSettings rough = choice_of(by_noise(), cloud);
   EXPECT_EQ(rough.feed.blend, kVeryNoisyBlend);
   EXPECT_LT(even.feed.blend, rough.feed.blend);
   EXPECT_EQ(rough.refit.support, kRoughRefit);
@@ -70,16 +85,16 @@ TEST(ChooseSupport, RoughNormalsWantTheWideSupportSooner) {
 TEST(ChooseSupport, GivenNumbersStand) {
   SurfaceSettings settings;
   settings.blend = 1.7;
-  EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).feed.blend, 1.7);
-  EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).refit.support, 0);
-  EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).feed.cell, (Length{0.9, Length::Unit::influence_radius}));
+  EXPECT_EQ(choice_of(settings, survey(0.2F, 2)).feed.blend, 1.7);
+  EXPECT_EQ(choice_of(settings, survey(0.2F, 2)).refit.support, 0);
+  EXPECT_EQ(choice_of(settings, survey(0.2F, 2)).feed.cell, (Length{0.9, Length::Unit::influence_radius}));
   settings.blend.reset();
   settings.refit = 0.0;
   settings.cell = Length{0.5, Length::Unit::world};
-  EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).refit.support, 0);
-  EXPECT_EQ(choose_support(settings, survey(0.2F, 2)).feed.cell, *settings.cell);
-  EXPECT_GT(choose_support(settings, survey(0.2F, 2)).feed.blend, 2);
-  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2)).feed.refine_sheets);
+  EXPECT_EQ(choice_of(settings, survey(0.2F, 2)).refit.support, 0);
+  EXPECT_EQ(choice_of(settings, survey(0.2F, 2)).feed.cell, *settings.cell);
+  EXPECT_GT(choice_of(settings, survey(0.2F, 2)).feed.blend, 2);
+  EXPECT_FALSE(choice_of(settings, survey(0.01F, 2)).feed.refine_sheets);
 }
 
 }  // namespace

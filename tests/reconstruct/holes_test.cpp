@@ -1,9 +1,11 @@
 // Gaps between samples: closed where the surface around tells how it goes on, left open and listed where not.
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
 #include <rapidcheck/gtest.h>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include "lamina/chunk.h"
 #include "lamina/error.h"
@@ -85,6 +87,67 @@ TEST(Holes, OfAClosedThingAreAllClosedWhereAskedFor) {
   const Reconstruction wide = test::reconstruct(pierced_sphere(16000, gaps, 0.3), s);
   ASSERT_GT(wide.stats.holes.longest.front().radii, HoleSettings::kWatertight);
   EXPECT_EQ(wide.stats.holes.open, 2U) << "a long rim: an open thing";
+}
+
+/// A cube's surface about the origin, two wide, where `keep` says so.
+Cloud cube_cloud(std::size_t count, const std::function<bool(const Point3&)>& keep) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<> uniform(-1, 1);
+  Cloud cloud;
+  while (cloud.size() < count) {
+    const std::size_t axis = random() % 3;
+    Point3 p{uniform(random), uniform(random), uniform(random)}, n{};
+    p[axis] = n[axis] = p[axis] < 0 ? -1 : 1;
+    if (keep(p)) cloud.add(p, n);
+  }
+  return cloud;
+}
+
+bool beside_corner(const Point3& p) {
+  return std::hypot(p[0] - 1, p[1] - 1, p[2] - 1) < 0.8;
+}
+
+TEST(Holes, WideOnesOfAClosedThingAreClosedWhereTheSurfaceLeadsIntoThem) {
+  // Three faces end at the gap: no one surface goes on over it.
+  const Cloud cloud = cube_cloud(20000, [](const Point3& p) { return !beside_corner(p); });
+  SurfaceSettings s = closing(300);
+  s.vertex_filled = true;
+  const Reconstruction open = test::reconstruct(cloud, s);
+  ASSERT_EQ(open.stats.holes.open, 1U);
+  ASSERT_GT(open.stats.holes.longest.front().radii, HoleSettings::kWatertight);
+  s.watertight = true;
+  const Reconstruction closed = test::reconstruct(cloud, s);
+  EXPECT_TRUE(closed.facts.is_closed_manifold());
+  EXPECT_EQ(closed.facts.euler, std::vector<long>{2});
+  const std::vector<float>& filled = closed.mesh.attributes.back();
+  EXPECT_EQ(std::count(filled.begin(), filled.end(), 1.0F), static_cast<std::ptrdiff_t>(closed.stats.holes.vertices));
+
+  const auto open_above = [](const Point3& p) { return p[2] < 1; };
+  EXPECT_EQ(test::reconstruct(cube_cloud(20000, open_above), s).stats.holes.open, 1U) << "a box without its lid";
+}
+
+TEST(Holes, OfPositionsAloneAreClosedUnasked) {
+  const Cloud cloud = cube_cloud(20000, [](const Point3& p) { return !beside_corner(p); });
+  const test::TemporaryFolder folder;
+  std::string bare;
+  for (const Point3& p : cloud.positions) bare += fmt::format("{} {} {}\n", p[0], p[1], p[2]);
+  SurfaceSettings s = closing(0);
+  s.close_holes.reset();
+  s.blend.reset();
+  s.normals = NormalsChoice::automatic;
+  s.input = test::write_cloud(cloud, folder / "with_normals.ply");
+  s.output = folder / "open.ply";
+  EXPECT_EQ(reconstruct_surface(s, {}).holes.open, 1U) << "samples of a surface, which ends where they do";
+  s.input = test::write_file(folder / "bare.xyz", bare);
+  s.output = folder / "closed.ply";
+  EXPECT_EQ(reconstruct_surface(s, {}).holes.open, 0U);
+  EXPECT_TRUE(test::check_mesh(read_mesh(s.output).triangles).is_closed_manifold());
+  // A store remembers that they had none.
+  write_store(s, folder / "store", {});
+  s.input = folder / "store";
+  s.output = folder / "from_store.ply";
+  reconstruct_surface(s, {});
+  EXPECT_EQ(test::read_file(s.output), test::read_file(folder / "closed.ply"));
 }
 
 TEST(Holes, AreClosedWhereNobodySaysHowLong) {
@@ -194,6 +257,7 @@ RC_GTEST_PROP(Holes, RandomGapsStayManifoldAndTheSameBytes, ()) {
   const Cloud cloud = pierced_sphere(1500, gaps, 0.3 + 0.25 * uniform(random));
   const test::TemporaryFolder folder;
   SurfaceSettings s = closing(*rc::gen::element(6.0, 8.0, 20.0, 300.0));
+  s.watertight = *rc::gen::arbitrary<bool>();
   s.input = test::write_cloud(cloud, folder / "in.ply");
   s.output = folder / "out.ply";
   RunContext run;

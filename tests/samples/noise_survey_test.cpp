@@ -131,6 +131,25 @@ TEST(SurveyNoise, OfNormalsIsTheirAngle) {
   }
 }
 
+/// The far side of a thin wall is no noise of the near one.
+TEST(SurveyNoise, OfAWallIsThatOfItsSides) {
+  Scene wall = noisy_plane(20'000, 0.5);
+  LocalSamples& s = wall.samples;
+  for (std::size_t i = 0; i < s.size(); ++i) {
+    const double side = i % 2 == 0 ? 1 : -1;
+    s.x[i] -= static_cast<std::int32_t>(0.3 * side * 0.6 * wall.radius);
+    s.y[i] += static_cast<std::int32_t>(0.3 * side * 0.8 * wall.radius);
+  }
+  EXPECT_GT(noise_of(wall, 50), 1.8 * expected(0.5)) << "without normals nothing tells";
+  for (std::size_t i = 0; i < s.size(); ++i) {
+    const float side = i % 2 == 0 ? 1 : -1;
+    s.nx.push_back(side * -0.6F);
+    s.ny.push_back(side * 0.8F);
+    s.nz.push_back(0);
+  }
+  EXPECT_NEAR(noise_of(wall, 50), expected(0.5), 0.15 * expected(0.5));
+}
+
 TEST(SurveyNoise, IsZeroWhereNothingTells) {
   EXPECT_EQ(noise_of({}, 3), 0);
   Scene one_place;
