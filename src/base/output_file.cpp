@@ -6,9 +6,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -83,6 +83,11 @@ std::string link_to(const Descriptor& file) {
 }
 
 namespace fs = std::filesystem;
+
+/// What to do about a full disk.
+const char* disk_hint(int error) {
+  return error == ENOSPC || error == EDQUOT ? "; free some space or choose another folder" : "";
+}
 
 [[noreturn]] void refuse(const std::string& name, const std::string& why) {
   throw Error(ExitCode::budget, fmt::format("{}: cannot be written: {}", name, why));
@@ -219,9 +224,8 @@ Descriptor OutputFile::destination() const {
 }
 
 void report_write_error(const std::string& name, int error) {
-  const bool full = error == ENOSPC || error == EDQUOT;
-  throw Error(ExitCode::budget, fmt::format("{}: cannot be written: {}{}", name, system_message(error),
-                                            full ? "; free some space or choose another folder" : ""));
+  throw Error(ExitCode::budget,
+              fmt::format("{}: cannot be written: {}{}", name, system_message(error), disk_hint(error)));
 }
 
 ResultFile::ResultFile(std::string path, const std::string& tmp_dir) : path_(std::move(path)) {
@@ -264,13 +268,53 @@ void ResultFile::commit() {
     if (std::fflush(stdout) != 0) fail("cannot be written to its end");
     return;
   }
-  const long bytes = std::ftell(file_);
-  close();
-  staged_->complete(static_cast<std::uint64_t>(bytes));
+  std::vector<std::string> fresh;
+  try {
+    const long bytes = std::ftell(file_);
+    close();
+    commit_companions(fresh);
+    staged_->complete(static_cast<std::uint64_t>(bytes));
+  } catch (...) {
+    for (const std::string& path : fresh) ::unlink(path.c_str());
+    throw;
+  }
+  for (const std::string& path : replaced_) {
+    const bool anew =
+        std::any_of(companions_.begin(), companions_.end(), [&](const auto& c) { return c.path == path; });
+    if (!anew) ::unlink(path.c_str());
+  }
+}
+
+/// Lists those that were not there before.
+void ResultFile::commit_companions(std::vector<std::string>& fresh) {
+  for (const Companion& companion : companions_) {
+    std::error_code ignored;
+    const bool there = fs::exists(companion.path, ignored);
+    companion.file->commit(companion.path);
+    if (!there) fresh.push_back(companion.path);
+  }
+}
+
+std::string ResultFile::path() const {
+  return staged_ == nullptr || staged_->streams() ? std::string() : staged_->path();
+}
+
+ResultFile& ResultFile::add_companion() {
+  companions_.push_back({std::make_unique<ResultFile>(path())});
+  return *companions_.back().file;
+}
+
+void ResultFile::name_companion(const std::string& path) {
+  companions_.back().path = path;
+}
+
+void ResultFile::replace_companion(const std::string& path) {
+  replaced_.push_back(path);
 }
 
 void ResultFile::fail(const char* what) const {
-  throw Error(ExitCode::budget, fmt::format("{}: {}: {}", name(), what, std::strerror(errno)));
+  const int error = errno;
+  throw Error(ExitCode::budget, fmt::format("{}: {}: {}{}", name(), what, system_message(error), disk_hint(error)));
 }
 
 }  // namespace lamina

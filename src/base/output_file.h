@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/descriptor.h"
 
@@ -53,6 +54,7 @@ class OutputFile {
   /// A hidden name by which other processes can open the staged file; empty when it streams. Throws Error(budget).
   [[nodiscard]] std::string staged();
   [[nodiscard]] const std::string& directory() const { return directory_; }  ///< where the staged file lies
+  [[nodiscard]] const std::string& path() const { return path_; }            ///< of the file, links followed
 
   void publish();  ///< gives a file that does not stream its name; throws Error(budget) when that fails
   /// publish(); of a file that streams, sends its first `bytes` on. Throws Error(budget).
@@ -81,15 +83,32 @@ class ResultFile {
   ResultFile& operator=(const ResultFile&) = delete;
   void write(std::string_view bytes);
   [[nodiscard]] std::string name() const;  ///< for messages
+  /// Its place in the file system, links followed; empty where it is a pipe or device.
+  [[nodiscard]] std::string path() const;
+
+  /// A further file of the same output, in the same folder; of one that has a path().
+  ResultFile& add_companion();
+  /// The name (a path in that folder) that the last one appears under when this file does, just before it.
+  void name_companion(const std::string& path);
+  /// A file that goes when this one has appeared, unless a companion has its name: of an older output.
+  void replace_companion(const std::string& path);
+
   void commit();
   /// The same under another name of the same folder.
   void commit(const std::string& name);
 
  private:
+  struct Companion {
+    std::unique_ptr<ResultFile> file;
+    std::string path{};
+  };
   void close();
+  void commit_companions(std::vector<std::string>& fresh);
   [[noreturn]] void fail(const char* what) const;
 
   std::string path_;
+  std::vector<Companion> companions_;
+  std::vector<std::string> replaced_;
   std::unique_ptr<OutputFile> staged_;  ///< null for standard output
   std::FILE* file_ = nullptr;
 };

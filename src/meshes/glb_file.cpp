@@ -4,11 +4,16 @@
 
 #include <algorithm>
 #include <array>
+#include <filesystem>
+#include <fstream>
+#include <optional>
 #include <string_view>
+#include <system_error>
 #include <utility>
 
 #include "base/little_endian.h"
 #include "lamina/error.h"
+#include "meshes/glb_set.h"
 
 namespace lamina::meshes {
 namespace {
@@ -87,6 +92,7 @@ GlbFile::GlbFile(FileBuffer& file, std::string path) : path_(std::move(path)) {
     fail(fmt::format("is glTF of version {}; only version 2 is read", version));
   const std::uint64_t length = word(file);
   bool any = false;
+  std::string data;
   while (bytes_ + glb::kChunkHeaderBytes <= length) {
     const std::uint64_t size = word(file);
     const std::uint32_t kind = word(file);
@@ -97,15 +103,16 @@ GlbFile::GlbFile(FileBuffer& file, std::string path) : path_(std::move(path)) {
       json_ = nlohmann::json::parse(chunk, nullptr, false);
       if (!json_.is_object()) fail("its JSON chunk is no JSON object: the file is damaged");
       any = true;
-    } else if (kind == glb::kDataChunk && data_.empty()) {
-      data_ = std::move(chunk);
+    } else if (kind == glb::kDataChunk && data.empty()) {
+      data = std::move(chunk);
     }
   }
   if (!any) fail("has no JSON chunk");
   if (bytes_ != length || file.sgetc() != FileBuffer::traits_type::eof())
     fail("is not as long as its header says: the file is damaged");
   file.require_sound();
-  require_own_data();
+  require_extensions();
+  read_buffers(std::move(data));
 }
 
 std::string GlbFile::take(FileBuffer& file, std::uint64_t bytes) {
@@ -130,15 +137,51 @@ std::uint32_t GlbFile::word(FileBuffer& file) {
   return load_little<std::uint32_t>(reinterpret_cast<const std::byte*>(bytes.data()));
 }
 
-void GlbFile::require_own_data() const {
+void GlbFile::require_extensions() const {
   for (const nlohmann::json& name : json_.value("extensionsRequired", nlohmann::json::array())) {
     const std::string extension = name.is_string() ? name.get<std::string>() : name.dump();
     if (!is_harmless(extension))
       fail(fmt::format("needs the extension {}, which is not read; write it without compression", extension));
   }
+}
+
+void GlbFile::read_buffers(std::string own) {
+  buffers_.push_back(std::move(own));
   const nlohmann::json buffers = json_.value("buffers", nlohmann::json::array());
-  if (!buffers.is_array() || buffers.size() > 1 || (buffers.size() == 1 && buffers[0].contains("uri")))
-    fail("keeps data in other files; only GLB files that hold all of it are read");
+  if (!buffers.is_array()) fail("its \"buffers\" are no list");
+  for (std::size_t b = 0; b < buffers.size(); ++b) {
+    const auto uri = buffers[b].find("uri");
+    if (uri == buffers[b].end()) {
+      if (b > 0) fail(fmt::format("says nothing of where buffers[{}] is", b));
+      continue;
+    }
+    buffers_.resize(b + 1);
+    buffers_[b] =
+        read_beside(uri->is_string() ? uri->get<std::string>() : uri->dump(), whole(buffers[b], "byteLength"));
+    bytes_ += buffers_[b].size();
+  }
+}
+
+/// Of a link to a GLB the data may lie beside either.
+std::string GlbFile::read_beside(const std::string& uri, std::uint64_t bytes) const {
+  const std::optional<std::string> name = file_of_uri(uri);
+  if (!name || path_ == "-") {
+    fail(fmt::format("keeps data in {:.60}, where they are not read from; only files in its folder or below are",
+                     uri.starts_with("data:") ? "its JSON" : uri));
+  }
+  namespace fs = std::filesystem;
+  std::error_code error;
+  fs::path file = fs::path(path_).parent_path() / *name;
+  if (!fs::exists(file, error)) file = fs::weakly_canonical(path_, error).parent_path() / *name;
+  const bool there = fs::is_regular_file(file, error);
+  const std::uint64_t size = there ? fs::file_size(file, error) : 0;
+  if (!there || error)
+    fail(fmt::format("keeps data in {}, which is not there; the files of a mesh must lie beside each other", *name));
+  if (size < bytes) fail(fmt::format("keeps {} bytes in {}, which is cut short: it has {}", bytes, *name, size));
+  std::ifstream in(file, std::ios::binary);
+  std::string data(bytes, '\0');
+  if (!in.read(data.data(), static_cast<std::streamsize>(bytes))) fail(fmt::format("{} cannot be read", *name));
+  return data;
 }
 
 const nlohmann::json& GlbFile::element(const char* list, std::uint64_t number) const {
@@ -183,11 +226,12 @@ GlbAccessor GlbFile::accessor(std::uint64_t number) const {
   const std::uint64_t begin = whole(view, "byteOffset", 0), length = whole(view, "byteLength");
   const std::uint64_t first = whole(json, "byteOffset", 0);
   if (stride < row || stride > std::max(row, kMostStride)) refuse("has a stride that cannot be");
-  if (begin + length > data_.size() || whole(view, "buffer") != 0 ||
+  const std::uint64_t buffer = whole(view, "buffer");
+  if (buffer >= buffers_.size() || begin + length > buffers_[buffer].size() ||
       (out.count > 0 && first + stride * (out.count - 1) + row > length))
     refuse("reaches beyond the file's data");
   out.stride = stride;
-  out.data = reinterpret_cast<const std::byte*>(data_.data()) + begin + first;
+  out.data = reinterpret_cast<const std::byte*>(buffers_[buffer].data()) + begin + first;
   return out;
 }
 

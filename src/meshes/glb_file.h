@@ -28,8 +28,8 @@ struct GlbAccessor {
 
 class GlbFile {
  public:
-  /// Reads all of it. Throws Error(unreadable) for what is no GLB, is cut short, keeps data in other files or needs
-  /// extensions that change what geometry is.
+  /// Reads all of it, and the files in its folder or below that it says its data lie in. Throws Error(unreadable) for
+  /// what is no GLB, is cut short, keeps data elsewhere or needs extensions that change what geometry is.
   GlbFile(FileBuffer& file, std::string path);
 
   [[nodiscard]] const nlohmann::json& json() const { return json_; }
@@ -46,9 +46,12 @@ class GlbFile {
  private:
   std::string take(FileBuffer& file, std::uint64_t bytes);
   std::uint32_t word(FileBuffer& file);
-  void require_own_data() const;
+  void require_extensions() const;
+  void read_buffers(std::string own);
+  [[nodiscard]] std::string read_beside(const std::string& uri, std::uint64_t bytes) const;
 
-  std::string path_, data_;
+  std::string path_;
+  std::vector<std::string> buffers_;
   nlohmann::json json_;
   std::uint64_t bytes_ = 0;  ///< read
 };

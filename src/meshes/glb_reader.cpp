@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <map>
@@ -86,6 +87,69 @@ class GlbTransform {
 double white_of(ScalarType type) {
   return 255 / static_cast<double>(colour_scale(type));
 }
+
+/// The pieces of a mesh that is one again once they are read: vertices that several of them have become one, and all of
+/// them stand in the mesh's own order. Where another program has changed that, they stay as they are.
+class GlbSeats {
+ public:
+  explicit GlbSeats(const TriangleMesh& mesh) : vertex_(mesh.positions.size()), triangle_(mesh.triangles.size()) {}
+
+  void forget() { known_ = false; }
+  void add(std::uint64_t first, std::uint64_t count) {
+    known_ = known_ && count <= kMost && first + count <= kMost && in_piece_ + count <= kMost;
+    if (!known_) return;
+    runs_.push_back({first, count});
+    in_piece_ += count;
+    end_ = std::max(end_, first + count);
+  }
+  /// Of as many vertices.
+  void end_piece(std::uint64_t vertices) {
+    known_ = known_ && in_piece_ == vertices;
+    in_piece_ = 0;
+  }
+  void take(TriangleMesh& mesh) const {
+    const std::uint64_t there = mesh.positions.size() - vertex_;
+    if (!known_ || runs_.empty() || end_ > there) return;
+    std::vector<std::uint32_t> seats;
+    seats.reserve(there);
+    for (const auto& [first, count] : runs_) {
+      for (std::uint64_t i = 0; i < count; ++i) seats.push_back(static_cast<std::uint32_t>(first + i));
+    }
+    if (!fill(seats, mesh)) return;
+    move_to(seats, mesh.positions);
+    move_to(seats, mesh.normals);
+    for (std::vector<float>& values : mesh.attributes) move_to(seats, values);
+    for (std::size_t t = triangle_; t < mesh.triangles.size(); ++t) {
+      for (std::uint32_t& v : mesh.triangles[t]) v = static_cast<std::uint32_t>(vertex_ + seats[v - vertex_]);
+    }
+  }
+
+ private:
+  static constexpr std::uint64_t kMost = std::numeric_limits<std::uint32_t>::max();
+
+  /// Every seat has a vertex, and all those of one lie in the same place.
+  [[nodiscard]] bool fill(const std::vector<std::uint32_t>& seats, const TriangleMesh& mesh) const {
+    std::vector<std::uint32_t> holder(end_, kMost);
+    for (std::uint32_t v = 0; v < seats.size(); ++v) {
+      std::uint32_t& first = holder[seats[v]];
+      if (first == kMost) first = v;
+      if (mesh.positions[vertex_ + first] != mesh.positions[vertex_ + v]) return false;
+    }
+    return std::find(holder.begin(), holder.end(), kMost) == holder.end();
+  }
+  template <class T>
+  void move_to(const std::vector<std::uint32_t>& seats, std::vector<T>& values) const {
+    std::vector<T> seated(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(vertex_));
+    seated.resize(vertex_ + end_);
+    for (std::size_t v = 0; v < seats.size(); ++v) seated[vertex_ + seats[v]] = values[vertex_ + v];
+    values = std::move(seated);
+  }
+
+  std::size_t vertex_, triangle_;  ///< the first ones
+  std::vector<std::pair<std::uint64_t, std::uint64_t>> runs_;
+  std::uint64_t in_piece_ = 0, end_ = 0;
+  bool known_ = true;
+};
 
 class GlbReader {
  public:
@@ -182,6 +246,7 @@ class GlbReader {
 
   void add_mesh(const GlbObject& mesh, const GlbTransform& transform) {
     std::map<std::string, std::uint64_t> placed;  // primitives may share their vertices
+    GlbSeats seats(mesh_);
     for (const GlbObject& primitive : list_in(mesh, "primitives")) {
       constexpr std::uint64_t kPoints = 0, kTriangles = 4, kFan = 6;
       const std::uint64_t mode = file_.whole(primitive, "mode", kTriangles);
@@ -191,9 +256,26 @@ class GlbReader {
       if (!attributes->contains("POSITION")) continue;
       const auto [at, fresh] = placed.try_emplace(attributes->dump(-1, ' ', false, GlbObject::error_handler_t::replace),
                                                   mesh_.positions.size());
-      if (fresh) add_vertices(*attributes, transform);
+      if (fresh) {
+        add_vertices(*attributes, transform);
+        add_seats(primitive, mesh_.positions.size() - at->second, seats);
+      }
       if (mode != kPoints) add_triangles(primitive, mode, at->second, transform.mirrors());
     }
+    seats.take(mesh_);
+  }
+
+  /// Which of a mesh's vertices those of a piece are, as write_glb_set() notes it.
+  void add_seats(const GlbObject& primitive, std::uint64_t count, GlbSeats& seats) const {
+    const auto extras = primitive.find("extras");
+    if (extras == primitive.end() || !extras->is_object() || !extras->contains("vertices") ||
+        !(*extras)["vertices"].is_number_unsigned())
+      return seats.forget();
+    const GlbAccessor runs = file_.accessor(file_.whole(*extras, "vertices"));
+    if (runs.component != glb::kUint || runs.width != 1 || runs.count % 2 != 0) return seats.forget();
+    for (std::uint64_t r = 0; r < runs.count; r += 2)
+      seats.add(static_cast<std::uint64_t>(runs.raw(r, 0)), static_cast<std::uint64_t>(runs.raw(r + 1, 0)));
+    seats.end_piece(count);
   }
 
   /// Nodes and primitives may name the same data again and again.

@@ -14,6 +14,13 @@ namespace meshes {
 
 enum class MeshFormat : std::uint8_t { ply, obj, off, stl, glb };
 
+/// How much goes into the files of a GLB.
+struct GlbLimits {
+  std::uint64_t file = 0xFFFFFFFF;  ///< the GLB's own length has 32 bits
+  /// Of each piece where one file does not hold all of a mesh: what programs like to have in one array.
+  std::uint64_t buffer = 2'000'000'000;
+};
+
 /// By the ending, in any case; nothing for another one.
 std::optional<MeshFormat> known_mesh_format(std::string_view path);
 

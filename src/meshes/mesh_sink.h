@@ -14,6 +14,7 @@
 #include "lamina/attributes.h"
 #include "lamina/mesh.h"
 #include "lamina/run.h"
+#include "meshes/mesh_format.h"
 
 namespace lamina::meshes {
 class MeshBlocks;
@@ -40,6 +41,7 @@ struct MeshSinkSettings {
   AttributeLayout attributes{};   ///< written after the normals in their own types; integers are rounded and clamped
   bool double_positions = false;  ///< `property double x` where float would lose precision
   std::vector<std::string> comments{};  ///< one header line each, beside the signature
+  meshes::GlbLimits glb{};
 
   /// All names, in their order.
   [[nodiscard]] std::vector<std::string> paths() const;

@@ -20,9 +20,10 @@ TriangleMesh read_ply(FileBuffer& file, const std::string& path);
 /// before.
 TriangleMesh read_off(FileBuffer& file, const std::string& path);
 
-/// GLB (binary glTF 2.0) that holds its data itself: the triangles of its scene, nodes' transforms applied; normals,
-/// COLOR_0 as red green blue [alpha], encoded again, and attributes of one number (_NAME). Materials, textures, skins
-/// and animations are passed over; geometry in compressing extensions is refused. Throws Error(unreadable).
+/// GLB (binary glTF 2.0) whose data lie in it or beside it: the triangles of its scene, nodes' transforms applied;
+/// normals, COLOR_0 as red green blue [alpha], encoded again, and attributes of one number (_NAME). Materials,
+/// textures, skins and animations are passed over; geometry in compressing extensions is refused. Throws
+/// Error(unreadable).
 TriangleMesh read_glb(FileBuffer& file, const std::string& path);
 
 /// Text formats do not say whether their colours reach to 1 or to 255: the largest value does.

@@ -123,7 +123,7 @@ void write_stored(const StoredMesh& mesh, const MeshSinkSettings& settings, cons
   if (meshes::mesh_format(path) == meshes::MeshFormat::ply) {
     blocks.copy_to(out);
   } else {
-    meshes::write_blocks(blocks, meshes::mesh_format(path), out);
+    meshes::write_blocks(blocks, meshes::mesh_format(path), out, settings.glb);
   }
   out.commit();
 }

@@ -147,7 +147,7 @@ void write_stl(MeshBlocks& mesh, ResultFile& out) {
 
 }  // namespace
 
-void write_blocks(MeshBlocks& mesh, MeshFormat format, ResultFile& out) {
+void write_blocks(MeshBlocks& mesh, MeshFormat format, ResultFile& out, const GlbLimits& limits) {
   switch (format) {
     case MeshFormat::obj:
       return write_obj(mesh, out);
@@ -156,7 +156,7 @@ void write_blocks(MeshBlocks& mesh, MeshFormat format, ResultFile& out) {
     case MeshFormat::stl:
       return write_stl(mesh, out);
     case MeshFormat::glb:
-      return write_glb(mesh, out);
+      return write_glb(mesh, out, limits);
     case MeshFormat::ply:
       break;
   }

@@ -39,21 +39,21 @@ class MeshBlocks {
 /// clamped to them); faces as `list uchar int vertex_indices` (uint beyond 2^31 - 1 vertices).
 void write_ply(const TriangleMesh& mesh, ResultFile& out);
 
-/// Bytes of a GLB's data: what limits the mesh, since lengths in it have 32 bits.
+/// Bytes of a GLB's data where one buffer holds it.
 std::uint64_t glb_data_bytes(const AttributeLayout& layout, bool normals, std::uint64_t vertices,
                              std::uint64_t triangles);
-inline constexpr std::uint64_t kMostGlbBytes = 0xFFFFFFFF;
 
 /// GLB, binary glTF 2.0: one mesh of one node, each of positions, normals, colours and attributes in a piece of its
 /// own. Positions are floats; where those lose something, floats from a middle that the node's translation holds in
 /// double. Colours become linear, as glTF has them, in numbers from which they come back unchanged. Normals of no
-/// length become 0 0 1, others of another length than 1 are made unit; attributes that are not finite become 0. Throws
-/// Error(budget) for meshes beyond 4 GB, Error(usage) for positions that are not finite or too far apart for floats.
-void write_glb(MeshBlocks& mesh, ResultFile& out);
+/// length become 0 0 1, others of another length than 1 are made unit; attributes that are not finite become 0. Meshes
+/// beyond what one file holds are split into primitives with files of their own (glb_set.h). Throws Error(usage) for
+/// positions that are not finite or too far apart for floats.
+void write_glb(MeshBlocks& mesh, ResultFile& out, const GlbLimits& limits = {});
 
 /// The same of a mesh in memory, or of points where it has no triangles, handed on in pieces; `name` is for messages.
+/// Throws Error(budget) for meshes beyond 4 GB.
 void write_glb(const TriangleMesh& mesh, const std::string& name, const std::function<void(std::string_view)>& sink);
-/// What both do.
 void write_glb(MeshBlocks& mesh, const std::string& name, const std::function<void(std::string_view)>& sink);
 
 /// Of the other formats. Keeps blocks, for STL at most a million positions, too.
@@ -61,6 +61,6 @@ void write_glb(MeshBlocks& mesh, const std::string& name, const std::function<vo
 /// OFF: [C][N]OFF with colours as r g b a bytes. Positions read back as the same bits.
 /// STL: positions as floats, facet normals computed; vertices and colours are not shared by this format. Throws
 /// Error(budget) for more than 2^32 - 1 triangles.
-void write_blocks(MeshBlocks& mesh, MeshFormat format, ResultFile& out);
+void write_blocks(MeshBlocks& mesh, MeshFormat format, ResultFile& out, const GlbLimits& limits = {});
 
 }  // namespace lamina::meshes

@@ -7,9 +7,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "lamina/error.h"
@@ -109,19 +111,21 @@ std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceS
                                             input_name(settings), mb(plan.memory_bytes), mb(allowed), remedy));
 }
 
-/// A GLB of more than 4 GB is better refused before the work than after it.
+/// A GLB of more than 4 GB needs files beside it, which a pipe has none of: better refused before the work than after
+/// it.
 void refuse_large_glb(const SurfaceSettings& settings, const ReconstructionPlan& plan) {
   constexpr double kVerticesPerFace = 0.5, kSurely = 1.25;
   const double triangles = expected_triangles(plan);
   const std::uint64_t bytes = meshes::glb_data_bytes(plan.mesh_attributes, /*normals=*/true,
                                                      static_cast<std::uint64_t>(kVerticesPerFace * triangles),
                                                      static_cast<std::uint64_t>(triangles));
-  if (static_cast<double>(bytes) <= kSurely * static_cast<double>(meshes::kMostGlbBytes)) return;
+  if (static_cast<double>(bytes) <= kSurely * static_cast<double>(meshes::GlbLimits{}.file)) return;
   for (const std::string& output : output_names(settings)) {
-    if (meshes::mesh_format(output) != meshes::MeshFormat::glb) continue;
+    std::error_code ignored;
+    if (meshes::mesh_format(output) != meshes::MeshFormat::glb || !std::filesystem::is_other(output, ignored)) continue;
     throw Error(ExitCode::budget,
-                fmt::format("{}: a GLB holds at most 4 GB, the mesh would take about {:.1f} GB in it; write a .ply, or "
-                            "cut the cloud",
+                fmt::format("{}: a single GLB holds at most 4 GB, the mesh would take about {:.1f} GB; write to a "
+                            "file, beside which others may lie, or a .ply",
                             output, static_cast<double>(bytes) * 1e-9));
   }
 }

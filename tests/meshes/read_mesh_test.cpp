@@ -207,7 +207,8 @@ TEST(ReadMesh, BadFilesAreNamed) {
       "\xEF\xBB\xBF"
       "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\n",
       {"byte order mark", "tail -c +4"});
-  bad("e.xyz", "1 2 3\n", {"unknown mesh format \".xyz\""});
+  bad("e.xyz", "1 2 3\n", {"holds points, where a mesh is wanted", "lamina surface"});
+  bad("e.dxf", "1 2 3\n", {"unknown mesh format \".dxf\""});
   bad("e.vdb", " BDV", {"is a volume", "lamina convert"});
   bad("a.ply", "plx\n", {"not a PLY file"});
   bad("b.ply", "ply\nformat ascii 1.0\nelement vertex -3\n", {"line 3", "'-3'"});
