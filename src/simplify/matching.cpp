@@ -21,6 +21,7 @@ constexpr std::size_t kPassBlock = 1'024;  ///< triangles whose edges are sorted
 constexpr std::size_t kSampleStep = 32;    ///< one of so many triangles says what edges cost
 constexpr double kEdgesOfVertex = 3;
 constexpr unsigned kCostShift = 32;  ///< in the queue
+constexpr std::size_t kAhead = 6;    ///< contractions whose stars are on their way while others are made
 
 /// The middle of the box of a mesh.
 Vec3 middle_of(const std::vector<Vec3>& positions) {
@@ -33,6 +34,16 @@ Vec3 middle_of(const std::vector<Vec3>& positions) {
     }
   }
   return 0.5 * (low + high);
+}
+
+/// Asks for an element that will be read soon: what belongs to a vertex lies where no processor foresees it, and most
+/// of the time went into waiting for it.
+template <class T>
+void ask_for(const T& element) {
+  constexpr std::size_t kLine = 64;
+  const char* const begin = reinterpret_cast<const char*>(&element);
+  __builtin_prefetch(begin);
+  if constexpr (sizeof(T) > 16) __builtin_prefetch(begin + std::min(sizeof(T) - 1, kLine));
 }
 
 /// Floats that are not negative stand in the order of their bits.
@@ -104,18 +115,18 @@ void Matching::survey_ring(std::uint32_t vertex) {
   };
   bool manifold = true;
   visit([&](std::uint32_t next, std::uint32_t last) {
-    manifold = manifold && ways_[next].out == 0 && ways_[last].in == 0;
-    ways_[next].out = ways_[last].in = 1;
+    manifold = manifold && ways_[next].out != vertex && ways_[last].in != vertex;
+    ways_[next].out = ways_[last].in = vertex;
   });
   int rims = 0;
   visit([&](std::uint32_t next, std::uint32_t last) {
-    if (ways_[next].in == 0) {
+    if (ways_[next].in != vertex) {
       ++rims;
       add_wall(vertex, next, last);
     }
-    if (ways_[last].out == 0) ++rims;
+    if (ways_[last].out != vertex) ++rims;
   });
-  visit([&](std::uint32_t next, std::uint32_t last) { ways_[next] = ways_[last] = {}; });
+  if (rims > 0) stars_.set_boundary(vertex);
   if (!manifold || rims > 2) locked_[vertex] = 1;
 }
 
@@ -137,6 +148,8 @@ void Matching::gather(std::size_t begin, std::size_t end, std::size_t step) {
     const Triangle& t = stars_.triangles()[triangle];
     for (std::size_t k = 0; k < 3; ++k) {  // without branches: chance decides
       const std::uint32_t u = t[k], v = t[(k + 1) % 3];
+      ask_for(quadrics_[u]);
+      ask_for(positions_[u]);
       const unsigned rim = unsigned{stars_.boundary(u)} & unsigned{stars_.boundary(v)};
       const auto free = static_cast<unsigned>((held_[u] | held_[v]) == 0);
       *out = {u, v};
@@ -148,14 +161,16 @@ void Matching::gather(std::size_t begin, std::size_t end, std::size_t step) {
 
 /// What is in edges_ into the queue, where it costs no more than that.
 void Matching::price(float dearest) {
-  queue_.clear();
+  queue_.resize(edges_.size());
+  std::uint64_t* out = queue_.data();
   for (std::size_t e = 0; e < edges_.size(); ++e) {
     const auto [u, v] = edges_[e];
     Quadric sum = quadrics_[u];
     sum += quadrics_[v];
-    const std::uint64_t key = queue_key(place_edge(sum, positions_[u], positions_[v]).cost, e);
-    if (cost_of(key) <= dearest) queue_.push_back(key);
+    *out = queue_key(place_edge(sum, positions_[u], positions_[v]).cost, e);
+    out += static_cast<unsigned>(cost_of(*out) <= dearest);  // without a branch, as above
   }
+  queue_.resize(static_cast<std::size_t>(out - queue_.data()));
 }
 
 /// What an edge may cost for a pass to be offered that share of them.
@@ -176,15 +191,25 @@ void Matching::pass(float dearest, std::uint64_t wanted) {
     gather(begin, std::min(begin + kPassBlock, count), 1);
     price(dearest);
     std::sort(queue_.begin(), queue_.end());
-    for (const std::uint64_t key : queue_) {
-      if (size_ <= wanted) break;
-      const auto [u, v] = edges_[static_cast<std::uint32_t>(key)];
+    for (std::size_t i = 0; i < queue_.size() && size_ > wanted; ++i) {
+      const auto [next, beside] = edges_[static_cast<std::uint32_t>(queue_[std::min(i + kAhead, queue_.size() - 1)])];
+      stars_.ask_for(next);
+      stars_.ask_for(beside);
+      const auto [u, v] = edges_[static_cast<std::uint32_t>(queue_[i])];
       if (held_[u] == 0 && held_[v] == 0) contract(std::min(u, v), std::max(u, v));
     }
   }
 }
 
 void Matching::contract(std::uint32_t u, std::uint32_t v) {
+  if (!mesh_->normals.empty()) {
+    ask_for(mesh_->normals[u]);
+    ask_for(mesh_->normals[v]);
+  }
+  for (const auto& values : mesh_->attributes) {
+    ask_for(values[u]);
+    ask_for(values[v]);
+  }
   if (!stars_.contractible(u, v)) return;
   Quadric sum = quadrics_[u];
   sum += quadrics_[v];

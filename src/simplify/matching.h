@@ -32,9 +32,9 @@ class Matching {
   struct Edge {
     std::uint32_t u, v;
   };
-  /// How many triangles run along an edge, either way.
+  /// Whether triangles run along an edge, either way: the vertex at its other end, if they do.
   struct Ways {
-    std::uint8_t out = 0, in = 0;
+    std::uint32_t out = kNone, in = kNone;
   };
 
   void begin(TriangleMesh& mesh, std::span<const std::uint8_t> locked);
@@ -58,7 +58,7 @@ class Matching {
   std::uint64_t free_ = 0;  ///< vertices that are there and not locked
   double deviation2_ = 0;
 
-  std::vector<Ways> ways_;            ///< by the other vertex; zero but for the vertex that is looked at
+  std::vector<Ways> ways_;            ///< of edges to the vertex that is looked at
   std::vector<Edge> edges_;           ///< of a block
   std::vector<std::uint64_t> queue_;  ///< the bits of an edge's cost above its place in edges_: sorted by cost
 };

@@ -12,9 +12,12 @@ void Stars::reset(std::vector<Triangle> triangles, std::size_t vertices) {
   mark_.assign(vertices, 0);
   question_ = 0;
   list_triangles();
-  // An inner vertex of a manifold has as many neighbours as triangles.
+}
+
+/// An inner vertex of a manifold has as many neighbours as triangles.
+void Stars::find_boundary() {
   std::vector<std::uint32_t> near;
-  for (std::uint32_t v = 0; v < vertices; ++v) {
+  for (std::uint32_t v = 0; v < star_.size(); ++v) {
     neighbours(v, near);
     boundary_[v] = near.size() > star_[v].size ? 1 : 0;
   }

@@ -26,9 +26,13 @@ inline bool names(const Triangle& t, std::uint32_t vertex) {
 class Stars {
  public:
   Stars() = default;
-  Stars(std::vector<Triangle> triangles, std::size_t vertices) { reset(std::move(triangles), vertices); }
-  /// As if made anew, in the memory that is there.
+  Stars(std::vector<Triangle> triangles, std::size_t vertices) {
+    reset(std::move(triangles), vertices);
+    find_boundary();
+  }
+  /// As if made anew, in the memory that is there, but for the boundary, of which set_boundary() tells.
   void reset(std::vector<Triangle> triangles, std::size_t vertices);
+  void set_boundary(std::uint32_t vertex) { boundary_[vertex] = 1; }
   /// The triangles, with those that have gone; what is left is for reset().
   std::vector<Triangle> release() { return std::move(triangles_); }
 
@@ -38,6 +42,8 @@ class Stars {
   [[nodiscard]] std::span<const std::uint32_t> around(std::uint32_t vertex) const {
     return {runs_.data() + star_[vertex].begin, star_[vertex].size};
   }
+  /// They will be read soon.
+  void ask_for(std::uint32_t vertex) const { __builtin_prefetch(runs_.data() + star_[vertex].begin); }
   /// Their other vertices, each once, into `out`.
   void neighbours(std::uint32_t vertex, std::vector<std::uint32_t>& out);
   /// Is it at an edge of one triangle?
@@ -62,6 +68,7 @@ class Stars {
     std::uint32_t begin = 0, size = 0;
   };
   void list_triangles();
+  void find_boundary();
   void drop(std::uint32_t vertex, std::uint32_t triangle);
 
   std::vector<Triangle> triangles_;  ///< of dead ones the first vertex is kNone

@@ -1,7 +1,7 @@
 // A tile's content: its mesh as a GLB.
 #pragma once
 #include <array>
-#include <cstdint>
+#include <memory>
 #include <string>
 
 #include "meshes/vec3.h"
@@ -16,11 +16,24 @@ struct StepBox {
 
 StepBox box_of_tile(const TriangleMesh& mesh);
 
-/// Binary glTF 2.0 with y up, as 3D Tiles want it: x, z, -y of the lattice. Positions are whole numbers of steps from
-/// the middle of the tile in 16 bits (KHR_mesh_quantization), in floats where these do not do; the node brings them to
-/// units of the mesh from the lattice's origin. Normals in bytes; colours linear, 8 bits in 16, others as floats;
-/// further attributes as _NAME in whole numbers of their own type, or floats to 16 bits of a number. `compress`:
-/// EXT_meshopt_compression.
-std::string tile_content(const TriangleMesh& mesh, const TileLattice& lattice, bool compress);
+/// Writes one tile after the other, in the memory of the first.
+class TileEncoder {
+ public:
+  TileEncoder();
+  ~TileEncoder();
+  TileEncoder(const TileEncoder&) = delete;
+  TileEncoder& operator=(const TileEncoder&) = delete;
+
+  /// Binary glTF 2.0 with y up, as 3D Tiles want it: x, z, -y of the lattice. Positions are whole numbers of steps from
+  /// the middle of the tile in 16 bits (KHR_mesh_quantization), in floats where these do not do; the node brings them
+  /// to units of the mesh from the lattice's origin. Normals in bytes; colours linear, 8 bits in 16, others as floats;
+  /// further attributes as _NAME in whole numbers of their own type, or floats to 16 bits of a number. `compress`:
+  /// EXT_meshopt_compression. Stays as it is until the next one.
+  const std::string& content(const TriangleMesh& mesh, const TileLattice& lattice, bool compress);
+
+ private:
+  struct Memory;
+  std::unique_ptr<Memory> memory_;
+};
 
 }  // namespace lamina::tiles

@@ -95,6 +95,13 @@ bool TileOctree::count_and_split(meshes::MeshBlocks& mesh, int levels) {
   std::vector<std::unordered_map<std::uint64_t, std::uint64_t>> counts(cells_.size());
   const auto too_many = [&](const Cell& cell) { return !cell.split && cell.vertices > most_ && cell.depth < kDeepest; };
   if (std::none_of(cells_.begin(), cells_.end(), too_many)) return false;
+  // Vertices that follow each other mostly lie in one cell.
+  Counted run{};
+  std::uint32_t cell_of_run = 0;
+  const auto end_run = [&] {
+    if (run.vertices > 0) counts[cell_of_run][run.key] += run.vertices;
+    run.vertices = 0;
+  };
   meshes::for_vertices(mesh, [&](const TriangleMesh& block, std::size_t v) {
     const auto where = place(block.positions[v]);
     const std::uint32_t cell = cell_at(where);
@@ -104,8 +111,12 @@ bool TileOctree::count_and_split(meshes::MeshBlocks& mesh, int levels) {
       const int bit = kDeepest - 1 - cells_[cell].depth - level;
       key = key << 3U | (bit >= 0 ? octant(where, bit) : 0);
     }
-    ++counts[cell][key];
+    if (key != run.key || cell != cell_of_run) end_run();
+    run.key = key;
+    cell_of_run = cell;
+    ++run.vertices;
   });
+  end_run();
   for (std::uint32_t cell = 0; cell < counts.size(); ++cell) {
     if (counts[cell].empty()) continue;
     std::vector<Counted> sorted;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/partitioner.h>
 
@@ -144,7 +145,7 @@ class TileBuilder {
     TileEntry& entry = entries_[node];
     entry.box = box_of_tile(tile.mesh);
     entry.error = tile.error;
-    const std::string bytes = tile_content(tile.mesh, lattice_, compress_);
+    const std::string& bytes = encoders_.local().content(tile.mesh, lattice_, compress_);
     entry.bytes = bytes.size();
     entry.content = fmt::format("{}/{}.glb", kContentFolder, octree_.nodes()[node].name);
     folder_.write(entry.content, bytes);
@@ -158,6 +159,7 @@ class TileBuilder {
   StagedFolder& folder_;
   std::vector<TileEntry> entries_;
   simplify::PartSimplifier simplifier_;
+  tbb::enumerable_thread_specific<TileEncoder> encoders_;
   std::mutex telling_;
   std::int64_t done_ = 0;  ///< tiles
   std::mutex failing_;
