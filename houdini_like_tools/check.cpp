@@ -72,7 +72,8 @@ void print_json(const std::string& mesh, const CheckReport& report) {
 void run_check(const CheckOptions& o) {
   const TriangleMesh mesh = read_mesh_input(o.mesh, o.run, NonFinite::keep);
   if (mesh.triangles.empty())
-    throw Error(ExitCode::unreadable, fmt::format("{}: has no faces: a point cloud, not a mesh", o.mesh));
+    throw Error(ExitCode::unreadable,
+                fmt::format("{}: has no faces: a point cloud, not a mesh; 'lamina surface' makes one of it", o.mesh));
   const CheckReport report = check_mesh(mesh, o.run);
   if (o.json)
     print_json(o.mesh, report);

@@ -39,7 +39,9 @@ SimplifyStats simplify_held(const SimplifyOptions& o, const SimplifySettings& se
   }
   TriangleMesh mesh = read_mesh_input(o.input, context, o.bad);
   if (mesh.triangles.empty())
-    throw Error(ExitCode::unreadable, fmt::format("{}: has no faces: a point cloud, not a mesh", shown_name(o.input)));
+    throw Error(ExitCode::unreadable,
+                fmt::format("{}: has no faces: a point cloud, not a mesh; 'lamina surface' makes one of it",
+                            shown_name(o.input)));
   // Doubles, quadrics and a queue of edges, whatever the file's format; with a bound also what triangles stand for.
   const std::size_t bytes_per_triangle = o.goal.error ? 650 : 450;
   if (context.max_memory > 0 && bytes_per_triangle * mesh.triangles.size() > context.max_memory) {

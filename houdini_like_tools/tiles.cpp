@@ -35,7 +35,9 @@ void run_tiles(const TilesOptions& o) {
   }
   const TriangleMesh mesh = read_mesh_input(o.input, context);
   if (mesh.triangles.empty())
-    throw Error(ExitCode::unreadable, fmt::format("{}: has no faces: a point cloud, not a mesh", shown_name(o.input)));
+    throw Error(ExitCode::unreadable,
+                fmt::format("{}: has no faces: a point cloud, not a mesh; 'lamina surface' makes one of it",
+                            shown_name(o.input)));
   context.info(tiles_text(write_tiles(mesh, settings, context)));
 }
 

@@ -8,6 +8,7 @@
 #include "lamina/file_ending.h"
 #include "lamina/mesh.h"
 #include "meshes/readers.h"
+#include "points/sniff.h"
 #include "points/text_rows.h"
 
 namespace lamina {
@@ -38,6 +39,12 @@ TriangleMesh read_by_format(meshes::FileBuffer& file, const std::string& path) {
         ExitCode::unreadable,
         fmt::format("{0}: is a volume, where a mesh is wanted; 'lamina convert {0} -o mesh.ply' meshes its level "
                     "set",
+                    path));
+  }
+  if (has_point_ending(path)) {
+    throw Error(
+        ExitCode::unreadable,
+        fmt::format("{0}: holds points, where a mesh is wanted; 'lamina surface {0} -o mesh.ply' makes one of them",
                     path));
   }
   throw Error(ExitCode::unreadable,

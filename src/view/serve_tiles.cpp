@@ -21,6 +21,7 @@ void serve_tiles(const std::string& /*folder*/, const ViewSettings& /*settings*/
 #else
 
 #include <httplib.h>
+#include <sys/socket.h>
 
 #include <atomic>
 #include <chrono>
@@ -74,6 +75,11 @@ void send_file(const std::string& path, httplib::Response& response) {
       });
 }
 
+void refuse_method(httplib::Response& response) {
+  response.status = 405;
+  response.set_header("Allow", "GET, HEAD");
+}
+
 /// A page of the internet may name this server by a name of its own: only those who ask for this machine are answered.
 bool asks_this_machine(const httplib::Request& request) {
   const std::string host = request.get_header_value("Host");
@@ -89,16 +95,21 @@ void serve_tiles(const std::string& folder, const ViewSettings& settings, int po
   using namespace view;
   const std::string page = tiles_page(settings, tile_files(folder).size());
   httplib::Server server;
+  // By default two servers could share a port, and answer by turns.
+  server.set_socket_options([](socket_t socket) {
+    const int yes = 1;
+    (void)::setsockopt(socket, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
+  });
   server.set_pre_routing_handler([](const httplib::Request& request, httplib::Response& response) {
     using Handled = httplib::Server::HandlerResponse;
     response.set_header("X-Content-Type-Options", "nosniff");
     response.set_header("Cache-Control", "no-cache");
     if (!asks_this_machine(request))
       response.status = 403;
-    else if (request.method != "GET")
-      response.status = 405;
-    else
+    else if (request.method == "GET" || request.method == "HEAD")  // which is GET's answer without its body
       return Handled::Unhandled;
+    else
+      refuse_method(response);
     return Handled::Handled;
   });
   server.Get("/", [&page](const httplib::Request&, httplib::Response& response) {

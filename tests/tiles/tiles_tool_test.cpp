@@ -82,6 +82,8 @@ TEST_F(TilesTool, TellsHowFarItIs) {
 
 TEST_F(TilesTool, Refusals) {
   refused({"tiles", scan_, "-o", set_}, 3, "a point cloud, not a mesh");
+  test::write_file(folder_ / "cloud.las", "LASF");
+  refused({"tiles", folder_ / "cloud.las", "-o", set_}, 3, "holds points, where a mesh is wanted; 'lamina surface");
   refused({"tiles", folder_ / "nothing.ply", "-o", set_}, 3, "nothing.ply");
   refused({"surface", scan_, "-o", mesh_, "--tiles", mesh_}, 2, "named twice");
   refused({"surface", scan_, "-o", mesh_, "--tiles", folder_ / "no/where"}, 4, "no/where");

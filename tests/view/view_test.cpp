@@ -308,6 +308,17 @@ TEST_F(View, ServesThisMachineAlone) {
   EXPECT_THAT(answer_of(port, get("/", "evil.example")), StartsWith("HTTP/1.1 403"));
   std::string post = get("/tiles/tileset.json");
   EXPECT_THAT(answer_of(port, post.replace(0, 3, "PUT")), StartsWith("HTTP/1.1 405"));
+  const std::string head = answer_of(port, "HEAD" + get("/tiles/1/0.glb").substr(3));
+  EXPECT_THAT(head, StartsWith("HTTP/1.1 200"));
+  EXPECT_THAT(head, HasSubstr("Content-Length: 100000"));
+  EXPECT_THAT(head, EndsWith("\r\n\r\n"));
+  try {
+    serve_tiles(
+        folder_ / "tiles", settings_, port, [](const std::string&) {}, run);
+    ADD_FAILURE() << "two servers share a port";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("is taken"));
+  }
   // 0100007F is 127.0.0.1 as the kernel writes it; 0A: listens.
   EXPECT_THAT(read_text("/proc/net/tcp"), HasSubstr(fmt::format("0100007F:{:04X} 00000000:0000 0A", port)));
   EXPECT_THAT(read_text("/proc/net/tcp"), Not(HasSubstr(fmt::format("00000000:{:04X} ", port))));
