@@ -38,12 +38,18 @@ struct Surroundings {
   std::vector<std::uint32_t> neighbours;  ///< kLookedAt for each place, nearest first
   std::vector<std::uint8_t> count;        ///< of them
   std::vector<std::uint8_t> stray;        ///< Verdict
-  std::vector<std::uint8_t> suspect;      ///< 1: may be one
+  std::vector<std::uint8_t> suspect;      ///< Suspicion
   std::vector<std::uint8_t> beside;       ///< 1: few neighbours, but many samples not much farther away
   std::vector<std::uint32_t> leaf;        ///< of the tree
 };
 
 enum Verdict : std::uint8_t { kStays, kIsLonely, kIsOffSurface };
+
+enum Suspicion : std::uint8_t {
+  kClear,      ///< no stray
+  kInCompany,  ///< perhaps off all surfaces, but not lonely
+  kCompared,   ///< perhaps either: its neighbours' own have to be known
+};
 
 /// The neighbours of a place that have not been found to be strays.
 struct Company {
@@ -148,64 +154,142 @@ bool is_plain(const Placed& s, const SampleTree::Places& places) {
   return farthest2 <= kPlainSpread * mean2 && thickest * thickest <= kPlainThickness * mean2 * length * length;
 }
 
-/// Finds the neighbours of places that may be strays, and of those neighbours.
-void find_neighbours(const Neighbourhoods& around, float reach, Surroundings& out) {
-  const SampleTree& tree = around.tree();
-  const Placed& samples = around.samples();
-  resize_anew(out.neighbours, tree.size() * kLookedAt);
-  out.count.assign(tree.size(), 0);
-  out.stray.assign(tree.size(), kStays);
-  out.suspect.assign(tree.size(), 0);
-  resize_anew(out.leaf, tree.size());
-  enum Look : std::uint8_t { kNot, kAsNeighbour, kWanted };
-  std::vector<std::uint8_t> looks(tree.leaves(), kNot);
-  const auto for_leaves = [&](const auto& each) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree.leaves(), 64), [&](const auto& range) {
-      for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf) each(leaf, tree.places_of(leaf));
+/// Whether a place cannot be lonely, in whatever company of all its neighbours' own: told without a search around each
+/// of these. Nothing lies in the ball around the place but its neighbours, so that half of them have theirs, by what
+/// is in the ball and by how far each is from the ball's edge, no nearer than loneliness asks for.
+bool is_in_company(const Placed& s, const Surroundings& known, std::size_t place, float reach) {
+  if (known.count[place] < kLookedAt) return false;
+  const std::uint32_t* const neighbours = &known.neighbours[place * kLookedAt];
+  std::array<std::array<float, kLookedAt>, 3> from{};  // the place
+  std::array<float, kLookedAt> away{};
+  for (std::size_t k = 0; k < kLookedAt; ++k) {
+    from[0][k] = static_cast<float>(s.x[neighbours[k]] - s.x[place]);
+    from[1][k] = static_cast<float>(s.y[neighbours[k]] - s.y[place]);
+    from[2][k] = static_cast<float>(s.z[neighbours[k]] - s.z[place]);
+    away[k] = std::sqrt(from[0][k] * from[0][k] + from[1][k] * from[1][k] + from[2][k] * from[2][k]);
+  }
+  constexpr float kSlack = 1.001F;
+  const float least = kSlack / kLonely * mean_distance(s, place, company_of(known, place), reach);
+  std::size_t close = 0;  // neighbours that may have theirs nearer
+  for (std::size_t n = 0; n < kStrayNeighbours; ++n) {
+    const float to_edge = away.back() - away[n];
+    float sum = std::min(away[n], to_edge);  // to the place and to the others
+    for (std::size_t k = 0; k < kLookedAt; ++k) {
+      const float dx = from[0][k] - from[0][n];
+      const float dy = from[1][k] - from[1][n];
+      const float dz = from[2][k] - from[2][n];
+      sum += std::min(std::sqrt(dx * dx + dy * dy + dz * dz), to_edge);
+    }
+    sum -= static_cast<float>(kLookedAt - kStrayNeighbours) * to_edge;  // not the farthest ones
+    if (sum < static_cast<float>(kStrayNeighbours) * least && ++close > kStrayNeighbours / 2) return false;
+    if (n + 1 - close >= kStrayNeighbours / 2) return true;
+  }
+  return false;
+}
+
+/// Finds the neighbours of a slab's places, leaf by leaf of its tree, as they are asked for.
+class Search {
+ public:
+  Search(const Neighbourhoods& around, float reach, Surroundings& out)
+      : around_(around), tree_(around.tree()), reach_(reach), out_(out), looks_(tree_.leaves(), kNot) {}
+
+  /// Of those that may be strays within reach of the slab, and of the neighbours that these are compared with.
+  void start();
+  /// And of those that places with strays among their neighbours are compared with.
+  void go_on();
+
+ private:
+  enum Look : std::uint8_t { kNot, kWanted, kDone };
+
+  template <class Each>
+  void for_leaves(const Each& each) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree_.leaves(), 64), [&](const auto& range) {
+      for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf) each(leaf, tree_.places_of(leaf));
     });
-  };
-  const auto search = [&](Look kind) {
-    for_leaves([&](std::size_t leaf, const SampleTree::Places& places) {
-      if (looks[leaf] != kind) return;
-      std::array<Neighbour, SampleTree::kMostInLeaf * kLookedAt> found;
-      std::array<std::size_t, SampleTree::kMostInLeaf> counts;
-      tree.nearest_to_leaf(leaf, kLookedAt, reach * reach, found.data(), counts.data());
-      for (std::size_t i = 0; i < places.size(); ++i) {
-        const std::size_t p = places.begin + i;
-        out.count[p] = static_cast<std::uint8_t>(counts[i]);
-        for (std::size_t k = 0; k < counts[i]; ++k) out.neighbours[p * kLookedAt + k] = found[i * kLookedAt + k].sample;
+  }
+  template <class Each>
+  void for_suspects(const Each& each) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree_.size(), 4096), [&](const auto& range) {
+      for (std::size_t p = range.begin(); p < range.end(); ++p) {
+        if (out_.suspect[p] != kClear) each(p);
       }
     });
-  };
+  }
+  void search_wanted();
+  /// Around the places compared with their neighbours.
+  void search_around();
+
+  const Neighbourhoods& around_;
+  const SampleTree& tree_;
+  float reach_;
+  Surroundings& out_;
+  std::vector<std::uint8_t> looks_;  ///< of leaves
+};
+
+void Search::search_wanted() {
+  for_leaves([&](std::size_t leaf, const SampleTree::Places& places) {
+    if (looks_[leaf] != kWanted) return;
+    std::array<Neighbour, SampleTree::kMostInLeaf * kLookedAt> found;
+    std::array<std::size_t, SampleTree::kMostInLeaf> counts;
+    tree_.nearest_to_leaf(leaf, kLookedAt, reach_ * reach_, found.data(), counts.data());
+    for (std::size_t i = 0; i < places.size(); ++i) {
+      const std::size_t p = places.begin + i;
+      out_.count[p] = static_cast<std::uint8_t>(counts[i]);
+      for (std::size_t k = 0; k < counts[i]; ++k) out_.neighbours[p * kLookedAt + k] = found[i * kLookedAt + k].sample;
+    }
+    looks_[leaf] = kDone;
+  });
+}
+
+void Search::search_around() {
+  for (std::size_t p = 0; p < tree_.size(); ++p) {
+    if (out_.suspect[p] != kCompared) continue;
+    for (std::size_t k = 0; k < out_.count[p]; ++k) {
+      std::uint8_t& look = looks_[out_.leaf[out_.neighbours[p * kLookedAt + k]]];
+      if (look == kNot) look = kWanted;
+    }
+  }
+  search_wanted();
+}
+
+void Search::start() {
+  const Placed& samples = around_.samples();
+  resize_anew(out_.neighbours, tree_.size() * kLookedAt);
+  out_.count.assign(tree_.size(), 0);
+  out_.stray.assign(tree_.size(), kStays);
+  out_.suspect.assign(tree_.size(), kClear);
+  resize_anew(out_.leaf, tree_.size());
   for_leaves([&](std::size_t leaf, const SampleTree::Places& places) {
     bool near = false;
     for (std::size_t p = places.begin; p < places.end; ++p) {
-      out.leaf[p] = static_cast<std::uint32_t>(leaf);
-      near = near || around.is_near(p, reach);
+      out_.leaf[p] = static_cast<std::uint32_t>(leaf);
+      near = near || around_.is_near(p, reach_);
     }
     if (!near || is_plain(samples, places)) return;
-    looks[leaf] = kWanted;
-    for (std::size_t p = places.begin; p < places.end; ++p) out.suspect[p] = 1;
+    looks_[leaf] = kWanted;
+    for (std::size_t p = places.begin; p < places.end; ++p) out_.suspect[p] = kCompared;
   });
-  search(kWanted);
-  out.beside.assign(tree.size(), 0);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree.size(), 4096), [&](const auto& range) {
+  search_wanted();
+  out_.beside.assign(tree_.size(), 0);
+  for_suspects([&](std::size_t p) {
+    if (is_in_company(samples, out_, p, reach_)) out_.suspect[p] = kInCompany;
+    if (out_.count[p] >= kStrayNeighbours) return;
     std::array<Neighbour, kManyBeside> found;
-    for (std::size_t p = range.begin(); p < range.end(); ++p) {
-      if (out.suspect[p] == 0 || out.count[p] >= kStrayNeighbours) continue;
-      const float twice = 4 * reach * reach;
-      const std::size_t many = tree.nearest(static_cast<std::uint32_t>(p), kManyBeside, twice, found.data());
-      out.beside[p] = many == kManyBeside ? 1 : 0;
+    const float twice = 4 * reach_ * reach_;
+    const std::size_t many = tree_.nearest(static_cast<std::uint32_t>(p), kManyBeside, twice, found.data());
+    out_.beside[p] = many == kManyBeside ? 1 : 0;
+  });
+  search_around();
+}
+
+void Search::go_on() {
+  for_suspects([&](std::size_t p) {
+    if (!around_.is_own(p)) return;
+    for (std::size_t k = 0; k < out_.count[p]; ++k) {
+      if (out_.stray[out_.neighbours[p * kLookedAt + k]] != kStays) out_.suspect[p] = kCompared;
     }
   });
-  for (std::size_t p = 0; p < tree.size(); ++p) {
-    if (out.suspect[p] == 0) continue;
-    for (std::size_t k = 0; k < out.count[p]; ++k) {
-      std::uint8_t& look = looks[out.leaf[out.neighbours[p * kLookedAt + k]]];
-      if (look == kNot) look = kAsNeighbour;
-    }
-  }
-  search(kAsNeighbour);
+  search_around();
 }
 
 /// The median of the distances of its company; 0 where it has none.
@@ -238,9 +322,10 @@ void judge_places(const Neighbourhoods& around, float reach, float margin, Surro
   });
   std::vector<std::uint8_t> verdicts = known.stray;
   for_places([&](std::size_t p) {
-    if (known.suspect[p] == 0 || !around.is_near(p, margin)) return;
+    if (known.suspect[p] == kClear || !around.is_near(p, margin)) return;
     const Company company = company_of(known, p);
-    if (known.distance[p] < 0 || known.distance[p] > kLonely * usual_distance(known, company)) {
+    const bool compared = known.suspect[p] == kCompared;
+    if (compared && (known.distance[p] < 0 || known.distance[p] > kLonely * usual_distance(known, company))) {
       verdicts[p] = kIsLonely;
     } else if (known.beside[p] != 0 && company.count < kStrayNeighbours) {
       if (company.count < kLeastCompany || is_off_surface(samples, p, company, kLeastOnSparseSurface))
@@ -264,9 +349,11 @@ StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, const RunConte
   Surroundings known;
   while (around.advance()) {
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
-    find_neighbours(around, reach, known);
-    // Strays keep each other company: those left are judged again without the others.
+    Search search(around, reach, known);
+    search.start();
     judge_places(around, reach, reach, known);
+    // Strays keep each other company: those left are judged again without the others.
+    search.go_on();
     judge_places(around, reach, 0, known);
     for (std::size_t p = 0; p < around.tree().size(); ++p) {
       if (!around.is_own(p) || known.stray[p] == kStays) continue;
