@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 namespace lamina {
@@ -15,6 +16,22 @@ struct VertexAt {
   std::size_t i;
   [[nodiscard]] float overhang() const { return batch->overhang[i]; }
 };
+
+/// With room for the vertices of another batch and a few more.
+void make_empty(VertexBatch& batch, const VertexBatch& other) {
+  const std::size_t room = other.size() + other.size() / 16;
+  const auto clear = [room](auto& values) {
+    values.clear();
+    values.reserve(room);
+  };
+  for (auto* values : {&batch.x, &batch.y, &batch.z}) clear(*values);
+  for (auto* values : {&batch.nx, &batch.ny, &batch.nz}) clear(*values);
+  batch.attributes.resize(other.attributes.size());
+  for (auto& values : batch.attributes) clear(values);
+  batch.radius.clear();
+  if (!other.radius.empty()) batch.radius.reserve(room);
+  batch.overhang.clear();
+}
 
 void append_copy(const VertexBatch& from, std::size_t i, VertexBatch& to) {
   to.x.push_back(from.x[i]);
@@ -63,6 +80,8 @@ void RimTrimmer::push(MeshSlab slab) {
   held.first = pushed_;
   pushed_ += static_cast<std::uint32_t>(slab.vertices.size());
   held.mesh = std::move(slab);
+  const std::vector<float>& overhang = held.mesh.vertices.overhang;
+  held.rim = std::any_of(overhang.begin(), overhang.end(), [&](float o) { return !(o < level_); });
 }
 
 void RimTrimmer::finish() {
@@ -72,8 +91,18 @@ void RimTrimmer::finish() {
 bool RimTrimmer::pop(MeshSlab& out) {
   const std::size_t at = below_ ? 1 : 0;
   if (held_.size() <= at || (held_.size() == at + 1 && !finished_)) return false;
-  trim(below_ ? &held_.front() : nullptr, held_[at], held_.size() > at + 1 ? &held_[at + 1] : nullptr, out);
-  if (below_) held_.pop_front();
+  const Held* const below = below_ ? &held_.front() : nullptr;
+  const Held* const above = held_.size() > at + 1 ? &held_[at + 1] : nullptr;
+  const auto has_rim = [](const Held* held) { return held != nullptr && held->rim; };
+  if (has_rim(below) || held_[at].rim || has_rim(above)) {
+    trim(below, held_[at], above, out);
+  } else {
+    pass(below, held_[at], out);
+  }
+  if (below_) {
+    spare_ = std::move(held_.front().mesh);
+    held_.pop_front();
+  }
   below_ = true;
   return true;
 }
@@ -147,6 +176,28 @@ void RimTrimmer::cut_triangles(const Held* below, const Held& here, MeshSlab& ou
   }
 }
 
+/// Neither its edges nor those that go to the slabs around are cut.
+void RimTrimmer::pass(const Held* below, Held& here, MeshSlab& out) {
+  const auto size = static_cast<std::uint32_t>(here.mesh.vertices.size());
+  here.trimmed_first = trimmed_;
+  here.kept = size;
+  trimmed_ += size;
+  here.number.resize(size);
+  std::iota(here.number.begin(), here.number.end(), 0U);
+  out.slab = here.mesh.slab;
+  out.triangles.clear();
+  out.triangles.reserve(here.mesh.triangles.size());
+  for (const std::array<std::uint32_t, 3>& t : here.mesh.triangles) {
+    std::array<std::uint32_t, 3>& to = out.triangles.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Held& h = t[k] >= here.first ? here : *below;
+      to[k] = h.trimmed_first + h.number[t[k] - h.first];
+    }
+  }
+  std::swap(out.vertices, here.mesh.vertices);
+  here.mesh.vertices.overhang = std::exchange(out.vertices.overhang, {});
+}
+
 void RimTrimmer::trim(const Held* below, Held& here, const Held* above, MeshSlab& out) {
   const VertexBatch& from = here.mesh.vertices;
   find_cuts(below, here, above);
@@ -154,8 +205,8 @@ void RimTrimmer::trim(const Held* below, Held& here, const Held* above, MeshSlab
   here.number.assign(from.size(), kGone);
   out.slab = here.mesh.slab;
   out.triangles.clear();
-  out.vertices = {};
-  out.vertices.attributes.resize(from.attributes.size());
+  out.triangles.reserve(here.mesh.triangles.size() + here.cuts.size());
+  make_empty(out.vertices, from);
   for (std::size_t i = 0; i < from.size(); ++i) {
     if (from.overhang[i] >= level_) continue;
     here.number[i] = here.kept++;

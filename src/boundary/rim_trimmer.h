@@ -31,8 +31,11 @@ class RimTrimmer {
 
   void push(MeshSlab slab);
   void finish();  ///< no more slabs come
-  /// The next trimmed slab, false when none is ready. Its vertices have no overhang.
+  /// The next trimmed slab, false when none is ready. Its vertices have no overhang. What `out` held is gone, its
+  /// storage used again.
   bool pop(MeshSlab& out);
+  /// Storage of a slab that has gone, for one to be pushed.
+  MeshSlab spare() { return std::exchange(spare_, {}); }
 
  private:
   using Edge = std::pair<std::uint32_t, std::uint32_t>;  ///< lower number first
@@ -43,10 +46,15 @@ class RimTrimmer {
     std::vector<std::uint32_t> number;  ///< of each vertex that stays, from trimmed_first
     std::vector<Edge> cuts;             ///< ascending
     std::uint32_t kept = 0;             ///< vertices that stay
-    [[nodiscard]] std::uint32_t end() const { return first + static_cast<std::uint32_t>(mesh.vertices.size()); }
+    bool rim = false;                   ///< not all of them do
+    /// A slab without a rim, beside others without, goes as it came: what is left of it are its overhangs.
+    [[nodiscard]] std::uint32_t end() const {
+      return first + static_cast<std::uint32_t>(mesh.vertices.overhang.size());
+    }
   };
 
   void trim(const Held* below, Held& here, const Held* above, MeshSlab& out);
+  void pass(const Held* below, Held& here, MeshSlab& out);
   void find_cuts(const Held* below, Held& here, const Held* above) const;
   void add_cut_vertices(const Held* below, const Held& here, VertexBatch& out) const;
   void cut_triangles(const Held* below, const Held& here, MeshSlab& out) const;
@@ -56,6 +64,7 @@ class RimTrimmer {
   bool below_ = false;     ///< the first one held is trimmed
   bool finished_ = false;
   std::uint32_t pushed_ = 0, trimmed_ = 0;  ///< vertices
+  MeshSlab spare_;
 };
 
 }  // namespace lamina

@@ -27,7 +27,9 @@ struct Projector::Scratch {
     ProjectCounts counts;  ///< of the slab
   };
   tbb::enumerable_thread_specific<Local> local;
-  std::map<std::size_t, std::shared_ptr<const ClusteredBucket>> clustered;  ///< by number of the bucket
+  tbb::enumerable_thread_specific<ClusterScratch> clustering;
+  std::map<std::size_t, std::shared_ptr<ClusteredBucket>> clustered;  ///< by number of the bucket
+  std::vector<std::shared_ptr<ClusteredBucket>> spare;                ///< storage of forgotten ones
 
   /// The buckets of a batch in clusters; kept for the next levels, steps and slabs while they are few.
   ClusteredBatch load(const NumberedBuckets& batch, SampleFeed& feed, const Lattice& lattice);
@@ -35,13 +37,22 @@ struct Projector::Scratch {
   void forget_below(const std::vector<NumberedBuckets>& batches) {
     std::size_t lowest = std::numeric_limits<std::size_t>::max();
     for (const auto& batch : batches) lowest = std::min(lowest, batch.front());
-    clustered.erase(clustered.begin(), clustered.lower_bound(lowest));
+    constexpr std::size_t kMostSpare = 4;
+    const auto end = clustered.lower_bound(lowest);
+    for (auto at = clustered.begin(); at != end && spare.size() < kMostSpare; ++at) spare.push_back(at->second);
+    clustered.erase(clustered.begin(), end);
+  }
+  std::shared_ptr<ClusteredBucket> empty_bucket() {
+    if (spare.empty()) return std::make_shared<ClusteredBucket>();
+    std::shared_ptr<ClusteredBucket> bucket = std::move(spare.back());
+    spare.pop_back();
+    return bucket;
   }
 };
 
 ClusteredBatch Projector::Scratch::load(const NumberedBuckets& batch, SampleFeed& feed, const Lattice& lattice) {
   constexpr std::size_t kKeep = std::size_t{1} << 19;  // samples
-  ClusteredBatch out(batch.size());
+  std::vector<std::shared_ptr<ClusteredBucket>> out(batch.size());
   std::vector<std::size_t> missing;
   std::size_t kept = 0;
   for (const auto& [number, bucket] : clustered) kept += bucket->x.size();
@@ -57,14 +68,14 @@ ClusteredBatch Projector::Scratch::load(const NumberedBuckets& batch, SampleFeed
   numbers.reserve(missing.size());
   for (const std::size_t b : missing) numbers.push_back(batch[b]);
   const Batch loaded = feed.load(numbers);
-  tbb::parallel_for(std::size_t{0}, missing.size(), [&](std::size_t m) {
-    out[missing[m]] = std::make_shared<const ClusteredBucket>(cluster_samples(*loaded[m], lattice));
-  });
+  for (const std::size_t b : missing) out[b] = empty_bucket();
+  tbb::parallel_for(std::size_t{0}, missing.size(),
+                    [&](std::size_t m) { cluster_samples(*loaded[m], lattice, clustering.local(), *out[missing[m]]); });
   for (const std::size_t b : missing) {
     kept += out[b]->x.size();
     if (kept <= kKeep) clustered.emplace(batch[b], out[b]);
   }
-  return out;
+  return {out.begin(), out.end()};
 }
 
 namespace {

@@ -8,6 +8,7 @@
 #include <limits>
 #include <tuple>
 
+#include "base/resize_anew.h"
 #include "samples/block_order.h"
 
 namespace lamina {
@@ -22,10 +23,7 @@ constexpr int kClusterCells = 4;
 /// More cubes than this in a level are joined to larger ones, so that their numbers stay small.
 constexpr double kMostCubes = 1e12;
 
-struct Keyed {
-  std::uint64_t key;  ///< number of the cube
-  std::uint32_t sample;
-};
+using Keyed = ClusterScratch::Keyed;
 
 /// Cubes of a level that the bucket covers, numbered z, y, x.
 struct Cubes {
@@ -74,9 +72,11 @@ std::vector<Cubes> cubes_of(const LocalSamples& s, const Lattice& lattice) {
   return cubes;
 }
 
-std::vector<Keyed> in_order(const ActiveBucket& bucket, const Lattice& lattice) {
+/// The samples that count, by cube.
+const std::vector<Keyed>& in_order(const ActiveBucket& bucket, const Lattice& lattice, ClusterScratch& scratch) {
   const LocalSamples& s = bucket.samples;
-  std::vector<Keyed> keyed;
+  std::vector<Keyed>& keyed = scratch.keyed;
+  keyed.clear();
   if (s.size() == 0) return keyed;
   keyed.reserve(s.size());
   const std::vector<Cubes> cubes = cubes_of(s, lattice);
@@ -85,17 +85,15 @@ std::vector<Keyed> in_order(const ActiveBucket& bucket, const Lattice& lattice) 
     keyed.push_back({cubes[bucket.level[i]].number(s.x[i], s.y[i], s.z[i]), static_cast<std::uint32_t>(i)});
   }
   const Cubes& last = cubes.back();
-  std::vector<Keyed> scratch;
-  digit_sort(keyed, scratch, last.first + last.count[0] * last.count[1] * last.count[2],
+  digit_sort(keyed, scratch.other, last.first + last.count[0] * last.count[1] * last.count[2],
              [](const Keyed& k) { return k.key; });
   return keyed;
 }
 
 template <typename T>
-std::vector<T> pick(const std::vector<T>& from, const std::vector<Keyed>& order) {
-  std::vector<T> out(order.size());
+void pick(const std::vector<T>& from, const std::vector<Keyed>& order, std::vector<T>& out) {
+  resize_anew(out, order.size());
   for (std::size_t k = 0; k < order.size(); ++k) out[k] = from[order[k].sample];
-  return out;
 }
 
 std::int32_t bounded(double steps) {
@@ -209,20 +207,22 @@ void bin_bucket(const Lattice& lattice, const QueryLayers& layers, const Cluster
 
 }  // namespace
 
-ClusteredBucket cluster_samples(const ActiveBucket& bucket, const Lattice& lattice) {
-  const std::vector<Keyed> order = in_order(bucket, lattice);
+void cluster_samples(const ActiveBucket& bucket, const Lattice& lattice, ClusterScratch& scratch,
+                     ClusteredBucket& out) {
+  const std::vector<Keyed>& order = in_order(bucket, lattice, scratch);
   const LocalSamples& s = bucket.samples;
-  ClusteredBucket out;
-  out.x = pick(s.x, order);
-  out.y = pick(s.y, order);
-  out.z = pick(s.z, order);
-  out.nx = pick(s.nx, order);
-  out.ny = pick(s.ny, order);
-  out.nz = pick(s.nz, order);
-  out.support = pick(bucket.support, order);
-  out.weight = pick(bucket.weight, order);
-  out.cell.resize(order.size());
-  for (const std::vector<float>& a : s.attributes) out.attributes.push_back(pick(a, order));
+  pick(s.x, order, out.x);
+  pick(s.y, order, out.y);
+  pick(s.z, order, out.z);
+  pick(s.nx, order, out.nx);
+  pick(s.ny, order, out.ny);
+  pick(s.nz, order, out.nz);
+  pick(bucket.support, order, out.support);
+  pick(bucket.weight, order, out.weight);
+  resize_anew(out.cell, order.size());
+  out.attributes.resize(s.attributes.size());
+  for (std::size_t a = 0; a < s.attributes.size(); ++a) pick(s.attributes[a], order, out.attributes[a]);
+  out.clusters.clear();
   for (std::size_t k = 0; k < order.size(); ++k) {
     if (k == 0 || order[k].key != order[k - 1].key) {
       if (k > 0) out.clusters.back().end = static_cast<std::uint32_t>(k);
@@ -232,7 +232,6 @@ ClusteredBucket cluster_samples(const ActiveBucket& bucket, const Lattice& latti
     include(out, k, out.clusters.back());
   }
   if (!order.empty()) out.clusters.back().end = static_cast<std::uint32_t>(order.size());
-  return out;
 }
 
 TileRuns bin_clusters(const Lattice& lattice, const QueryLayers& layers, const ClusteredBatch& batch,

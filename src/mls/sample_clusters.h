@@ -28,8 +28,24 @@ struct ClusteredBucket {
   std::vector<SampleCluster> clusters;
 };
 
-/// Canonical order: clusters by level, then z, y, x; inside a cluster as in the bucket.
-ClusteredBucket cluster_samples(const ActiveBucket& bucket, const Lattice& lattice);
+/// Memory of cluster_samples(), kept from bucket to bucket.
+struct ClusterScratch {
+  struct Keyed {
+    std::uint64_t key;  ///< number of the cube
+    std::uint32_t sample;
+  };
+  std::vector<Keyed> keyed, other;
+};
+
+/// Canonical order: clusters by level, then z, y, x; inside a cluster as in the bucket. What `out` held before is gone,
+/// its storage used again.
+void cluster_samples(const ActiveBucket& bucket, const Lattice& lattice, ClusterScratch& scratch, ClusteredBucket& out);
+inline ClusteredBucket cluster_samples(const ActiveBucket& bucket, const Lattice& lattice) {
+  ClusterScratch scratch;
+  ClusteredBucket out;
+  cluster_samples(bucket, lattice, scratch, out);
+  return out;
+}
 
 using ClusteredBatch = std::vector<std::shared_ptr<const ClusteredBucket>>;
 

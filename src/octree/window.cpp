@@ -59,6 +59,7 @@ struct Window::Trees {
     CornerTree tree{false};
     std::deque<Layer> layers;  ///< block layers z_base, z_base + 1, ...
     std::int32_t z_base = 0;
+    std::vector<Layer> spare;                     ///< without leaves; tables for other layers
     Branches lower, upper;                        ///< inner nodes with retired leaves
     std::int32_t x0 = 0, y0 = 0, nx = 0, ny = 0;  ///< extent of the tables in blocks
   };
@@ -90,13 +91,17 @@ struct Window::Trees {
   void cover(Level& level, std::int32_t z) {
     if (level.layers.empty()) level.z_base = z;
     const auto entries = static_cast<std::size_t>(level.nx) * static_cast<std::size_t>(level.ny);
+    const auto empty_layer = [&] {
+      if (level.spare.empty()) return Layer{{}, 0, std::vector<CornerBlock*>(entries, nullptr)};
+      Layer layer = std::move(level.spare.back());
+      level.spare.pop_back();
+      return layer;
+    };
     while (z < level.z_base) {
-      level.layers.emplace_front().table.assign(entries, nullptr);
+      level.layers.push_front(empty_layer());
       --level.z_base;
     }
-    while (z >= level.z_base + static_cast<std::int32_t>(level.layers.size())) {
-      level.layers.emplace_back().table.assign(entries, nullptr);
-    }
+    while (z >= level.z_base + static_cast<std::int32_t>(level.layers.size())) level.layers.push_back(empty_layer());
   }
 
   CornerBlock& create(int l, const Block& b) {
@@ -142,6 +147,17 @@ struct Window::Trees {
     for (int i = 18; i < 27; ++i) {
       if (block.around[i] != nullptr) block.around[i]->around[26 - i] = nullptr;
     }
+  }
+
+  /// Takes out the lowest layer. Its tables are used again.
+  static void clear_front(Level& level) {
+    for (const Tile& t : level.layers.front().tiles) {
+      if (CornerBlock** s = slot(level, t.block)) *s = nullptr;
+    }
+    Layer& spare = level.spare.emplace_back(std::move(level.layers.front()));
+    spare.tiles.clear();
+    spare.ordered = 0;
+    level.layers.pop_front();
   }
 
   static std::span<const Tile> in_order(Layer& layer) {
@@ -243,7 +259,7 @@ void Window::retire_below(std::int32_t slab) {
         level.lower.insert(lower);
         level.upper.insert(origin & ~(static_cast<std::int32_t>(Upper::DIM) - 1));
       }
-      level.layers.pop_front();
+      Trees::clear_front(level);
       ++level.z_base;
     }
     retire_branches<Lower>(level.tree, level.lower, first);

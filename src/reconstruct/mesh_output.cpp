@@ -69,7 +69,7 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
     place_vertices({done_, *clustered_.front(), next}, frame_, settings_, mesh_.vertices);
     std::swap(mesh_.triangles, done_.triangles);
     if (rims_) {
-      rims_->smoother.push(std::exchange(mesh_, {}));
+      rims_->smoother.push(std::exchange(mesh_, rims_->trimmer.spare()));
     } else {
       pass_on(mesh_);
     }
@@ -84,9 +84,10 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
 
 void MeshOutput::trim(bool last) {
   if (last) rims_->smoother.finish();
-  while (rims_->smoother.pop(mesh_)) rims_->trimmer.push(std::exchange(mesh_, {}));
+  MeshSlab smoothed;
+  while (rims_->smoother.pop(smoothed)) rims_->trimmer.push(std::move(smoothed));
   if (last) rims_->trimmer.finish();
-  while (rims_->trimmer.pop(mesh_)) pass_on(mesh_);
+  while (rims_->trimmer.pop(trimmed_)) pass_on(trimmed_);
 }
 
 void MeshOutput::pass_on(MeshSlab& slab) {

@@ -96,6 +96,7 @@ class MeshOutput {
     RimTrimmer trimmer;
   };
   std::optional<Rims> rims_;
+  MeshSlab trimmed_;
   DistinctPositions distinct_;
   std::mutex mutex_;  ///< of spares_
   std::vector<std::shared_ptr<IsoSlab>> spares_;

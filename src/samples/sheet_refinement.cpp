@@ -33,45 +33,72 @@ SheetRefinement::SheetRefinement(const Lattice& lattice) : lattice_(lattice) {
 
 std::size_t SheetRefinement::slot_of(const Cell& block, std::uint8_t level) const {
   std::size_t at = cell_hash(block.x, block.y, block.z + (std::int64_t{level} << 32)) & (slots_.size() - 1);
-  while (slots_[at] != kNone && (blocks_[slots_[at]].at != block || blocks_[slots_[at]].level != level))
+  while (slots_[at].index != kNone && (slots_[at].at != block || slots_[at].level != level))
     at = (at + 1) & (slots_.size() - 1);
   return at;
 }
 
 std::uint32_t SheetRefinement::touch(const Cell& block, std::uint8_t level) {
   std::size_t slot = slot_of(block, level);
-  if (slots_[slot] != kNone) return slots_[slot];
+  if (slots_[slot].index != kNone) return slots_[slot].index;
   if (2 * (blocks_.size() - free_.size() + 1) > slots_.size()) {
     rehash();
     slot = slot_of(block, level);
   }
+  auto index = static_cast<std::uint32_t>(blocks_.size());
   if (free_.empty()) {
-    slots_[slot] = static_cast<std::uint32_t>(blocks_.size());
     blocks_.emplace_back();
+    shared_.emplace_back();
   } else {
-    slots_[slot] = free_.back();
+    index = free_.back();
     free_.pop_back();
-    blocks_[slots_[slot]] = {};
+    blocks_[index] = {};
   }
-  blocks_[slots_[slot]].at = block;
-  blocks_[slots_[slot]].level = level;
-  return slots_[slot];
+  slots_[slot] = {block, index, level};
+  shared_[index] = static_cast<Directions>(~0U);
+  blocks_[index].at = block;
+  blocks_[index].level = level;
+  return index;
 }
 
 /// Forgets the blocks that nothing depends on any more, and makes room until the table is at most a quarter full.
 void SheetRefinement::rehash() {
   std::vector<std::uint32_t> kept;
   kept.reserve(slots_.size() / 2);
-  for (const std::uint32_t index : slots_) {
-    if (index == kNone) continue;
-    const Block& b = blocks_[index];
-    const std::int64_t first_needed = cell_row(needed_from_, lattice_.cell_size(b.level)) - 1;
-    (kSide * (std::int64_t{b.at.z} + 1) <= first_needed ? free_ : kept).push_back(index);
+  for (const Slot& slot : slots_) {
+    if (slot.index == kNone) continue;
+    const std::int64_t first_needed = cell_row(needed_from_, lattice_.cell_size(slot.level)) - 1;
+    (kSide * (std::int64_t{slot.at.z} + 1) <= first_needed ? free_ : kept).push_back(slot.index);
   }
   std::size_t size = slots_.size();
   while (4 * (kept.size() + 1) > size) size *= 2;
-  slots_.assign(size, kNone);
-  for (const std::uint32_t index : kept) slots_[slot_of(blocks_[index].at, blocks_[index].level)] = index;
+  slots_.assign(size, {});
+  for (const std::uint32_t index : kept) {
+    const Block& b = blocks_[index];
+    slots_[slot_of(b.at, b.level)] = {b.at, index, b.level};
+  }
+}
+
+/// The normals near a direction lie within 59 degrees of it, so that any sum of them is longer than kCancelledShare of
+/// their number, with room for rounding. A cube's faces and corners: one of them is within 37 degrees of any normal.
+SheetRefinement::Directions SheetRefinement::directions_near(float x, float y, float z) {
+  constexpr float kNear = 0.515F;
+  static_assert(kNear > kCancelledShare);
+  constexpr float kNearCorner = 1.7320508F * kNear;
+  unsigned near = 0;
+  unsigned bit = 1;
+  const auto look = [&](float along, float least) {
+    near |= (along > least ? bit : 0U) | (along < -least ? bit << 1 : 0U);
+    bit <<= 2;
+  };
+  look(x, kNear);
+  look(y, kNear);
+  look(z, kNear);
+  look(x + y + z, kNearCorner);
+  look(x + y - z, kNearCorner);
+  look(x - y + z, kNearCorner);
+  look(x - y - z, kNearCorner);
+  return static_cast<Directions>(near);
 }
 
 void SheetRefinement::push(const LocalSamples& samples, const std::vector<std::uint8_t>& level,
@@ -89,7 +116,9 @@ void SheetRefinement::push(const LocalSamples& samples, const std::vector<std::u
     if (index == kNone || blocks_[index].at != block) index = touch(block, level[i]);
     constexpr int kLast = kSide - 1;
     const std::uint32_t in_block = index_in_block(cell.x & kLast, cell.y & kLast, cell.z & kLast);
-    CellNormals& c = blocks_[index].cells[in_block];
+    Block& to = blocks_[index];
+    shared_[index] &= directions_near(samples.nx[i], samples.ny[i], samples.nz[i]);
+    CellNormals& c = to.cells[in_block];
     ++c.samples;
     c.x += in_units(samples.nx[i]);
     c.y += in_units(samples.ny[i]);
@@ -101,7 +130,24 @@ void SheetRefinement::push(const LocalSamples& samples, const std::vector<std::u
 }
 
 /// Of the cells wanted.
-void SheetRefinement::decide(Block& block) const {
+void SheetRefinement::decide(std::uint32_t own) {
+  Block& block = blocks_[own];
+  Around around{};
+  Directions shared = shared_[own];
+  for (int k = 0; k < 27; ++k) {
+    const Cell at = block.at + Cell{k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1};
+    const std::uint32_t index = k == 13 ? kNone : slots_[slot_of(at, block.level)].index;
+    if (index == kNone) continue;
+    around[static_cast<std::size_t>(k)] = &blocks_[index];
+    shared &= shared_[index];
+  }
+  around[13] = &block;
+  if (shared == 0) add_up(block, around);
+  block.decided |= block.wanted;
+  block.wanted = 0;
+}
+
+void SheetRefinement::add_up(Block& block, const Around& around) {
   // The block and one cell around it, dense.
   constexpr int kRow = kSide + 2;
   std::array<CellNormals, static_cast<std::size_t>(kRow * kRow * kRow)> field{};
@@ -113,19 +159,18 @@ void SheetRefinement::decide(Block& block) const {
     return d < 0 ? std::pair{kSide - 1, kSide} : d > 0 ? std::pair{0, 1} : std::pair{0, kSide};
   };
   for (int k = 0; k < 27; ++k) {
+    const Block* const from = around[static_cast<std::size_t>(k)];
+    if (from == nullptr) continue;
     const int dx = k % 3 - 1;
     const int dy = k / 3 % 3 - 1;
     const int dz = k / 9 - 1;
-    const std::uint32_t index = slots_[slot_of(block.at + Cell{dx, dy, dz}, block.level)];
-    if (index == kNone) continue;
-    const std::array<CellNormals, kCells>& cells = blocks_[index].cells;
     const auto [x_begin, x_end] = range(dx);
     const auto [y_begin, y_end] = range(dy);
     const auto [z_begin, z_end] = range(dz);
     for (int z = z_begin; z < z_end; ++z) {
       for (int y = y_begin; y < y_end; ++y) {
-        std::copy(&cells[index_in_block(x_begin, y, z)], &cells[index_in_block(x_begin, y, z)] + (x_end - x_begin),
-                  &field[in_field(dx * kSide + x_begin, dy * kSide + y, dz * kSide + z)]);
+        const CellNormals* const row = &from->cells[index_in_block(x_begin, y, z)];
+        std::copy(row, row + (x_end - x_begin), &field[in_field(dx * kSide + x_begin, dy * kSide + y, dz * kSide + z)]);
       }
     }
   }
@@ -153,8 +198,6 @@ void SheetRefinement::decide(Block& block) const {
     const double limit = kCancelledShare * kUnit * static_cast<double>(sum.samples);
     if (square(sum.x) + square(sum.y) + square(sum.z) < limit * limit) block.finer |= std::uint64_t{1} << cell;
   }
-  block.decided |= block.wanted;
-  block.wanted = 0;
 }
 
 bool SheetRefinement::pop(std::int64_t pushed_below, std::vector<bool>& finer) {
@@ -171,7 +214,7 @@ bool SheetRefinement::pop(std::int64_t pushed_below, std::vector<bool>& finer) {
     block.wanted |= bit;
   }
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, undecided.size(), 64), [&](const auto& range) {
-    for (std::size_t k = range.begin(); k < range.end(); ++k) decide(blocks_[undecided[k]]);
+    for (std::size_t k = range.begin(); k < range.end(); ++k) decide(undecided[k]);
   });
   finer.assign(bucket.cell_of.size(), false);
   for (std::size_t i = 0; i < finer.size(); ++i) {

@@ -47,6 +47,9 @@ class SheetRefinement {
   static constexpr std::uint32_t index_in_block(int x, int y, int z) {
     return static_cast<std::uint32_t>((z * kSide + y) * kSide + x);
   }
+  /// Directions that a normal lies near, a bit each. Normals that share one do not cancel, whatever sums are made.
+  using Directions = std::uint16_t;
+  static Directions directions_near(float x, float y, float z);
   /// Cells of a level; a bit per cell.
   struct Block {
     Cell at;  ///< coordinates of its cells, divided by kSide
@@ -59,17 +62,26 @@ class SheetRefinement {
     std::int64_t low = std::numeric_limits<std::int64_t>::max();   ///< least z of the samples that count
     std::int64_t high = std::numeric_limits<std::int64_t>::min();  ///< upper end of the cells around them
   };
+  /// A place of the table: keys lie in it, so that most look-ups read no block.
+  struct Slot {
+    Cell at;
+    std::uint32_t index = kNone;
+    std::uint8_t level = 0;
+  };
   [[nodiscard]] std::size_t slot_of(const Cell& block, std::uint8_t level) const;  ///< where it is or would be
   std::uint32_t touch(const Cell& block, std::uint8_t level);
   void rehash();
-  void decide(Block& block) const;
+  using Around = std::array<const Block*, 27>;
+  void decide(std::uint32_t index);
+  static void add_up(Block& block, const Around& around);
 
   Lattice lattice_;
-  std::vector<FloorDivider> to_cell_;  ///< by level
-  std::vector<Block> blocks_;          ///< a block keeps its index until it is forgotten
-  std::vector<std::uint32_t> free_;    ///< indices of forgotten ones
-  std::vector<std::uint32_t> slots_ = std::vector<std::uint32_t>(64, kNone);  ///< a power of two, at most half full
-  std::int64_t needed_from_ = std::numeric_limits<std::int64_t>::min();       ///< z of samples still to be judged
+  std::vector<FloorDivider> to_cell_;                ///< by level
+  std::deque<Block> blocks_;                         ///< a block keeps its index until it is forgotten
+  std::vector<Directions> shared_;                   ///< by block: directions that all normals in it lie near
+  std::vector<std::uint32_t> free_;                  ///< indices of forgotten ones
+  std::vector<Slot> slots_ = std::vector<Slot>(64);  ///< a power of two, at most half full
+  std::int64_t needed_from_ = std::numeric_limits<std::int64_t>::min();  ///< z of samples still to be judged
   std::deque<WaitingBucket> waiting_;
 };
 

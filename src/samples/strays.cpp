@@ -35,12 +35,18 @@ constexpr float kPlainThickness = 0.25F;
 /// What is known of the places of a slab's tree.
 struct Surroundings {
   std::vector<float> distance;            ///< mean distance to the neighbours; negative: not looked at
-  std::vector<std::uint32_t> neighbours;  ///< kLookedAt for each place, nearest first
+  std::vector<std::uint32_t> neighbours;  ///< kLookedAt for each place searched around, nearest first
+  std::vector<std::uint32_t> row;         ///< of the place in `neighbours`
   std::vector<std::uint8_t> count;        ///< of them
   std::vector<std::uint8_t> stray;        ///< Verdict
   std::vector<std::uint8_t> suspect;      ///< Suspicion
   std::vector<std::uint8_t> beside;       ///< 1: few neighbours, but many samples not much farther away
   std::vector<std::uint32_t> leaf;        ///< of the tree
+
+  /// Of a place that has been searched around: `count` of them.
+  [[nodiscard]] const std::uint32_t* neighbours_of(std::size_t place) const {
+    return neighbours.data() + std::size_t{row[place]} * kLookedAt;
+  }
 };
 
 enum Verdict : std::uint8_t { kStays, kIsLonely, kIsOffSurface };
@@ -60,7 +66,7 @@ struct Company {
 Company company_of(const Surroundings& known, std::size_t place) {
   Company out;
   for (std::size_t k = 0; k < known.count[place] && out.count < kStrayNeighbours; ++k) {
-    const std::uint32_t n = known.neighbours[place * kLookedAt + k];
+    const std::uint32_t n = known.neighbours_of(place)[k];
     if (known.stray[n] == kStays) out.places[out.count++] = n;
   }
   return out;
@@ -159,7 +165,7 @@ bool is_plain(const Placed& s, const SampleTree::Places& places) {
 /// is in the ball and by how far each is from the ball's edge, no nearer than loneliness asks for.
 bool is_in_company(const Placed& s, const Surroundings& known, std::size_t place, float reach) {
   if (known.count[place] < kLookedAt) return false;
-  const std::uint32_t* const neighbours = &known.neighbours[place * kLookedAt];
+  const std::uint32_t* const neighbours = known.neighbours_of(place);
   std::array<std::array<float, kLookedAt>, 3> from{};  // the place
   std::array<float, kLookedAt> away{};
   for (std::size_t k = 0; k < kLookedAt; ++k) {
@@ -227,6 +233,13 @@ class Search {
 };
 
 void Search::search_wanted() {
+  auto rows = static_cast<std::uint32_t>(out_.neighbours.size() / kLookedAt);
+  for (std::size_t leaf = 0; leaf < looks_.size(); ++leaf) {
+    if (looks_[leaf] != kWanted) continue;
+    const SampleTree::Places places = tree_.places_of(leaf);
+    for (std::size_t p = places.begin; p < places.end; ++p) out_.row[p] = rows++;
+  }
+  out_.neighbours.resize(std::size_t{rows} * kLookedAt);
   for_leaves([&](std::size_t leaf, const SampleTree::Places& places) {
     if (looks_[leaf] != kWanted) return;
     std::array<Neighbour, SampleTree::kMostInLeaf * kLookedAt> found;
@@ -235,7 +248,8 @@ void Search::search_wanted() {
     for (std::size_t i = 0; i < places.size(); ++i) {
       const std::size_t p = places.begin + i;
       out_.count[p] = static_cast<std::uint8_t>(counts[i]);
-      for (std::size_t k = 0; k < counts[i]; ++k) out_.neighbours[p * kLookedAt + k] = found[i * kLookedAt + k].sample;
+      std::uint32_t* const to = &out_.neighbours[std::size_t{out_.row[p]} * kLookedAt];
+      for (std::size_t k = 0; k < counts[i]; ++k) to[k] = found[i * kLookedAt + k].sample;
     }
     looks_[leaf] = kDone;
   });
@@ -245,7 +259,7 @@ void Search::search_around() {
   for (std::size_t p = 0; p < tree_.size(); ++p) {
     if (out_.suspect[p] != kCompared) continue;
     for (std::size_t k = 0; k < out_.count[p]; ++k) {
-      std::uint8_t& look = looks_[out_.leaf[out_.neighbours[p * kLookedAt + k]]];
+      std::uint8_t& look = looks_[out_.leaf[out_.neighbours_of(p)[k]]];
       if (look == kNot) look = kWanted;
     }
   }
@@ -254,7 +268,8 @@ void Search::search_around() {
 
 void Search::start() {
   const Placed& samples = around_.samples();
-  resize_anew(out_.neighbours, tree_.size() * kLookedAt);
+  out_.neighbours.clear();
+  resize_anew(out_.row, tree_.size());
   out_.count.assign(tree_.size(), 0);
   out_.stray.assign(tree_.size(), kStays);
   out_.suspect.assign(tree_.size(), kClear);
@@ -286,7 +301,7 @@ void Search::go_on() {
   for_suspects([&](std::size_t p) {
     if (!around_.is_own(p)) return;
     for (std::size_t k = 0; k < out_.count[p]; ++k) {
-      if (out_.stray[out_.neighbours[p * kLookedAt + k]] != kStays) out_.suspect[p] = kCompared;
+      if (out_.stray[out_.neighbours_of(p)[k]] != kStays) out_.suspect[p] = kCompared;
     }
   });
   search_around();
