@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "lattice/morphology.h"
+#include "mls/neighbour_records.h"
 
 namespace lamina {
 namespace {
@@ -168,13 +169,6 @@ struct Place {
   const CornerBlock* block;
   int offset;
 
-  /// The place beside it, at most one step away on each axis.
-  [[nodiscard]] Place beside(int dx, int dy, int dz) const {
-    const int x = (offset & 7) + dx;
-    const int y = ((offset >> 3) & 7) + dy;
-    const int z = (offset >> 6) + dz;
-    return {block->around[CornerBlock::towards(x >> 3, y >> 3, z >> 3)], BlockMask::offset(x & 7, y & 7, z & 7)};
-  }
   /// The record of its own value; null where it has none that is trusted.
   [[nodiscard]] const float* trusted_record(const Window& window, int level) const {
     return block != nullptr && block->trusted.test(offset) ? record(window, level) : nullptr;
@@ -204,16 +198,15 @@ bool extended_value(const Window& window, int level, const Place& here, CornerVa
   CornerValue sum;
   float total = 0;
   for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] = 0;
-  for_neighbours([&](int dx, int dy, int dz) {
-    const float* const v = here.beside(dx, dy, dz).trusted_record(window, level);
-    if (v == nullptr) return;
+  const auto add = [&](int dx, int dy, int dz, const float* v) {
     const float w = neighbour_weight(dx, dy, dz);
     sum.distance += w * plane_of(v).seen_from(dx, dy, dz, cell);
     for (int k = 0; k < 3; ++k) sum.normal[k] += w * v[kNormalX + k];
     sum.curvature += w * v[kCurvature];
     for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] += w * v[kFirstAttribute + c];
     total += w;
-  });
+  };
+  for_records_around(*here.block, here.offset, &Projected::trusted, window.slab_layers(level), add);
   if (total <= 0) return false;
   const float inv = 1.0F / total;
   const float length =

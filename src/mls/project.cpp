@@ -27,7 +27,6 @@ struct Projector::Scratch {
     ProjectCounts counts;  ///< of the slab
   };
   tbb::enumerable_thread_specific<Local> local;
-  tbb::enumerable_thread_specific<ClusterScratch> clustering;
   std::map<std::size_t, std::shared_ptr<ClusteredBucket>> clustered;  ///< by number of the bucket
   std::vector<std::shared_ptr<ClusteredBucket>> spare;                ///< storage of forgotten ones
 
@@ -37,7 +36,7 @@ struct Projector::Scratch {
   void forget_below(const std::vector<NumberedBuckets>& batches) {
     std::size_t lowest = std::numeric_limits<std::size_t>::max();
     for (const auto& batch : batches) lowest = std::min(lowest, batch.front());
-    constexpr std::size_t kMostSpare = 4;
+    constexpr std::size_t kMostSpare = 2;
     const auto end = clustered.lower_bound(lowest);
     for (auto at = clustered.begin(); at != end && spare.size() < kMostSpare; ++at) spare.push_back(at->second);
     clustered.erase(clustered.begin(), end);
@@ -69,6 +68,7 @@ ClusteredBatch Projector::Scratch::load(const NumberedBuckets& batch, SampleFeed
   for (const std::size_t b : missing) numbers.push_back(batch[b]);
   const Batch loaded = feed.load(numbers);
   for (const std::size_t b : missing) out[b] = empty_bucket();
+  tbb::enumerable_thread_specific<ClusterScratch> clustering;  // large: not kept
   tbb::parallel_for(std::size_t{0}, missing.size(),
                     [&](std::size_t m) { cluster_samples(*loaded[m], lattice, clustering.local(), *out[missing[m]]); });
   for (const std::size_t b : missing) {

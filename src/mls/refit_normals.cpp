@@ -18,7 +18,7 @@ namespace lamina {
 /// A bucket with the normals it came with.
 struct RefitNormals::Added {
   ActiveBucket bucket;  // no attributes
-  std::shared_ptr<ClusteredBucket> clustered;
+  std::shared_ptr<const ClusteredBucket> clustered;
   std::int32_t low = 0, high = 0;  // z
 };
 
@@ -201,8 +201,7 @@ void RefitNormals::add(std::size_t bucket, const LocalSamples& samples, const st
   const auto [low, high] = std::minmax_element(s.z.begin(), s.z.end());
   added->low = *low;
   added->high = *high;
-  added->clustered = std::make_shared<ClusteredBucket>();
-  cluster_samples(added->bucket, lattice_, scratch_, *added->clustered);
+  added->clustered = std::make_shared<const ClusteredBucket>(cluster_samples(added->bucket, lattice_));
   added_[bucket] = std::move(added);
 }
 

@@ -43,7 +43,6 @@ class RefitNormals final : public NormalFilter {
   RefitSettings settings_;
   Lattice lattice_;
   Kernel kernel_;
-  ClusterScratch scratch_;
   std::map<std::size_t, std::unique_ptr<Added>> added_;
 };
 

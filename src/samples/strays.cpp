@@ -160,10 +160,11 @@ bool is_plain(const Placed& s, const SampleTree::Places& places) {
   return farthest2 <= kPlainSpread * mean2 && thickest * thickest <= kPlainThickness * mean2 * length * length;
 }
 
-/// Whether a place cannot be lonely, in whatever company of all its neighbours' own: told without a search around each
-/// of these. Nothing lies in the ball around the place but its neighbours, so that half of them have theirs, by what
-/// is in the ball and by how far each is from the ball's edge, no nearer than loneliness asks for.
-bool is_in_company(const Placed& s, const Surroundings& known, std::size_t place, float reach) {
+/// Whether a place cannot be lonely, whatever strays are found: told without a search around each of its neighbours.
+/// Half of these have their own no nearer than loneliness asks for. That is known of those that have been searched
+/// around. Of the others it follows from what is in the ball that the neighbours fill, where nothing else lies, and
+/// from how far they are from its edge.
+bool is_in_company(const Placed& s, const Surroundings& known, std::size_t place) {
   if (known.count[place] < kLookedAt) return false;
   const std::uint32_t* const neighbours = known.neighbours_of(place);
   std::array<std::array<float, kLookedAt>, 3> from{};  // the place
@@ -175,9 +176,14 @@ bool is_in_company(const Placed& s, const Surroundings& known, std::size_t place
     away[k] = std::sqrt(from[0][k] * from[0][k] + from[1][k] * from[1][k] + from[2][k] * from[2][k]);
   }
   constexpr float kSlack = 1.001F;
-  const float least = kSlack / kLonely * mean_distance(s, place, company_of(known, place), reach);
+  const float least = kSlack / kLonely * known.distance[place];
   std::size_t close = 0;  // neighbours that may have theirs nearer
   for (std::size_t n = 0; n < kStrayNeighbours; ++n) {
+    if (n - close >= kStrayNeighbours / 2) return true;
+    if (const float its = known.distance[neighbours[n]]; its >= 0) {
+      if (its < least && ++close > kStrayNeighbours / 2) return false;
+      continue;
+    }
     const float to_edge = away.back() - away[n];
     float sum = std::min(away[n], to_edge);  // to the place and to the others
     for (std::size_t k = 0; k < kLookedAt; ++k) {
@@ -188,9 +194,8 @@ bool is_in_company(const Placed& s, const Surroundings& known, std::size_t place
     }
     sum -= static_cast<float>(kLookedAt - kStrayNeighbours) * to_edge;  // not the farthest ones
     if (sum < static_cast<float>(kStrayNeighbours) * least && ++close > kStrayNeighbours / 2) return false;
-    if (n + 1 - close >= kStrayNeighbours / 2) return true;
   }
-  return false;
+  return close <= kStrayNeighbours / 2;
 }
 
 /// Finds the neighbours of a slab's places, leaf by leaf of its tree, as they are asked for.
@@ -286,8 +291,12 @@ void Search::start() {
   });
   search_wanted();
   out_.beside.assign(tree_.size(), 0);
+  out_.distance.assign(tree_.size(), -1);
   for_suspects([&](std::size_t p) {
-    if (is_in_company(samples, out_, p, reach_)) out_.suspect[p] = kInCompany;
+    if (out_.count[p] > 0) out_.distance[p] = mean_distance(samples, p, company_of(out_, p), reach_);
+  });
+  for_suspects([&](std::size_t p) {
+    if (is_in_company(samples, out_, p)) out_.suspect[p] = kInCompany;
     if (out_.count[p] >= kStrayNeighbours) return;
     std::array<Neighbour, kManyBeside> found;
     const float twice = 4 * reach_ * reach_;
