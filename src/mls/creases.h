@@ -76,6 +76,7 @@ class CreaseFinder {
   void begin_sheets();
   void split();
   void judge();
+  [[nodiscard]] unsigned varying(std::size_t group) const;
   [[nodiscard]] bool may_crease(std::uint32_t query, meshes::Vec3& mean) const;
   /// The sheets of a point as fits; how many.
   std::size_t fit_sheets(std::size_t point, const std::array<FitOutput, 3>& fits, std::array<Sheet, 3>& out,

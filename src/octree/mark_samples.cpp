@@ -112,11 +112,13 @@ void mark_samples(Window& window, std::span<const Mark> marks) {
   std::vector<FloorDivider> cells;  // by level
   cells.reserve(static_cast<std::size_t>(window.levels()));
   for (int level = 0; level < window.levels(); ++level) cells.emplace_back(window.lattice().cell_size(level));
-  BlockMarks block;
+  // By level, too: samples of several lie among each other.
+  std::vector<BlockMarks> blocks(static_cast<std::size_t>(window.levels()));
   for (const Mark& m : marks) {
     const std::int32_t a = window.lattice().cell_size(m.level);
     const FloorDivider& cell_of = cells[m.level];
     const Cell cell{cell_of(m.x), cell_of(m.y), cell_of(m.z)};
+    BlockMarks& block = blocks[m.level];
     if (!block.holds(m.level, block_of(cell))) {
       block.write_to(window);
       block.begin(m.level, block_of(cell));
@@ -130,7 +132,7 @@ void mark_samples(Window& window, std::span<const Mark> marks) {
         offset_in_block(cell),
         corners_within({inside(m.x, cell.x), inside(m.y, cell.y), inside(m.z, cell.z)}, m.active_radius * inv));
   }
-  block.write_to(window);
+  for (const BlockMarks& block : blocks) block.write_to(window);
 }
 
 }  // namespace lamina

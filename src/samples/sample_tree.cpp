@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -13,6 +14,8 @@ namespace {
 
 constexpr std::size_t kLeaf = 12;            ///< samples a leaf has at most
 constexpr std::size_t kParallel = 1u << 14;  ///< smaller ranges are built by one thread
+
+typedef std::int32_t FourInts __attribute__((vector_size(16)));  // NOLINT(modernize-use-using): attributes on typedefs
 
 }  // namespace
 
@@ -128,17 +131,24 @@ void SampleTree::assign(std::span<const std::int32_t> x, std::span<const std::in
 
 void SampleTree::build(const Subtree& tree) {
   if (tree.depth == depth_) return;
-  std::array<std::int32_t, 3> low = items_[tree.begin].at;
-  std::array<std::int32_t, 3> high = low;
+  // All three axes at once; the number goes along.
+  static_assert(sizeof(Item) == sizeof(FourInts));
+  const auto item = [this](std::size_t i) {
+    FourInts four;
+    std::memcpy(&four, &items_[i], sizeof(four));
+    return four;
+  };
+  FourInts low = item(tree.begin);
+  FourInts high = low;
   for (std::size_t i = tree.begin + 1; i < tree.end; ++i) {
-    for (std::size_t a = 0; a < 3; ++a) {
-      low[a] = std::min(low[a], items_[i].at[a]);
-      high[a] = std::max(high[a], items_[i].at[a]);
-    }
+    const FourInts at = item(i);
+    low = at < low ? at : low;
+    high = at > high ? at : high;
   }
   std::size_t axis = 0;
+  const FourInts extent = high - low;
   for (std::size_t a = 1; a < 3; ++a) {
-    if (high[a] - low[a] > high[axis] - low[axis]) axis = a;
+    if (extent[a] > extent[axis]) axis = a;
   }
   Median(items_, axis).select(tree.begin, tree.middle(), tree.end);
   nodes_[tree.node] = {items_[tree.middle()].at[axis], static_cast<int>(axis)};

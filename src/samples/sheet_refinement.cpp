@@ -48,14 +48,14 @@ std::uint32_t SheetRefinement::touch(const Cell& block, std::uint8_t level) {
   auto index = static_cast<std::uint32_t>(blocks_.size());
   if (free_.empty()) {
     blocks_.emplace_back();
-    shared_.emplace_back();
+    findings_.emplace_back();
   } else {
     index = free_.back();
     free_.pop_back();
     blocks_[index] = {};
   }
   slots_[slot] = {block, index, level};
-  shared_[index] = static_cast<Directions>(~0U);
+  findings_[index] = {};
   blocks_[index].at = block;
   blocks_[index].level = level;
   return index;
@@ -117,7 +117,7 @@ void SheetRefinement::push(const LocalSamples& samples, const std::vector<std::u
     constexpr int kLast = kSide - 1;
     const std::uint32_t in_block = index_in_block(cell.x & kLast, cell.y & kLast, cell.z & kLast);
     Block& to = blocks_[index];
-    shared_[index] &= directions_near(samples.nx[i], samples.ny[i], samples.nz[i]);
+    findings_[index].shared &= directions_near(samples.nx[i], samples.ny[i], samples.nz[i]);
     CellNormals& c = to.cells[in_block];
     ++c.samples;
     c.x += in_units(samples.nx[i]);
@@ -131,23 +131,26 @@ void SheetRefinement::push(const LocalSamples& samples, const std::vector<std::u
 
 /// Of the cells wanted.
 void SheetRefinement::decide(std::uint32_t own) {
-  Block& block = blocks_[own];
+  const Block& block = blocks_[own];
+  Findings& findings = findings_[own];
   Around around{};
-  Directions shared = shared_[own];
+  around.fill(kNone);
+  around[13] = own;
+  Directions shared = findings.shared;
   for (int k = 0; k < 27; ++k) {
     const Cell at = block.at + Cell{k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1};
     const std::uint32_t index = k == 13 ? kNone : slots_[slot_of(at, block.level)].index;
     if (index == kNone) continue;
-    around[static_cast<std::size_t>(k)] = &blocks_[index];
-    shared &= shared_[index];
+    around[static_cast<std::size_t>(k)] = index;
+    shared &= findings_[index].shared;
   }
-  around[13] = &block;
-  if (shared == 0) add_up(block, around);
-  block.decided |= block.wanted;
-  block.wanted = 0;
+  if (shared == 0) findings.finer |= cancelling(findings.wanted, around);
+  findings.decided |= findings.wanted;
+  findings.wanted = 0;
 }
 
-void SheetRefinement::add_up(Block& block, const Around& around) {
+/// Those of a block's cells around which normals cancel.
+std::uint64_t SheetRefinement::cancelling(std::uint64_t wanted, const Around& around) const {
   // The block and one cell around it, dense.
   constexpr int kRow = kSide + 2;
   std::array<CellNormals, static_cast<std::size_t>(kRow * kRow * kRow)> field{};
@@ -159,8 +162,8 @@ void SheetRefinement::add_up(Block& block, const Around& around) {
     return d < 0 ? std::pair{kSide - 1, kSide} : d > 0 ? std::pair{0, 1} : std::pair{0, kSide};
   };
   for (int k = 0; k < 27; ++k) {
-    const Block* const from = around[static_cast<std::size_t>(k)];
-    if (from == nullptr) continue;
+    const std::uint32_t index = around[static_cast<std::size_t>(k)];
+    if (index == kNone) continue;
     const int dx = k % 3 - 1;
     const int dy = k / 3 % 3 - 1;
     const int dz = k / 9 - 1;
@@ -169,12 +172,13 @@ void SheetRefinement::add_up(Block& block, const Around& around) {
     const auto [z_begin, z_end] = range(dz);
     for (int z = z_begin; z < z_end; ++z) {
       for (int y = y_begin; y < y_end; ++y) {
-        const CellNormals* const row = &from->cells[index_in_block(x_begin, y, z)];
+        const CellNormals* const row = &blocks_[index].cells[index_in_block(x_begin, y, z)];
         std::copy(row, row + (x_end - x_begin), &field[in_field(dx * kSide + x_begin, dy * kSide + y, dz * kSide + z)]);
       }
     }
   }
-  for (std::uint64_t bits = block.wanted; bits != 0; bits &= bits - 1) {
+  std::uint64_t out = 0;
+  for (std::uint64_t bits = wanted; bits != 0; bits &= bits - 1) {
     const int cell = std::countr_zero(bits);
     const int x = cell % kSide;
     const int y = cell / kSide % kSide;
@@ -196,8 +200,9 @@ void SheetRefinement::add_up(Block& block, const Around& around) {
       return whole * whole;
     };
     const double limit = kCancelledShare * kUnit * static_cast<double>(sum.samples);
-    if (square(sum.x) + square(sum.y) + square(sum.z) < limit * limit) block.finer |= std::uint64_t{1} << cell;
+    if (square(sum.x) + square(sum.y) + square(sum.z) < limit * limit) out |= std::uint64_t{1} << cell;
   }
+  return out;
 }
 
 bool SheetRefinement::pop(std::int64_t pushed_below, std::vector<bool>& finer) {
@@ -207,7 +212,7 @@ bool SheetRefinement::pop(std::int64_t pushed_below, std::vector<bool>& finer) {
   std::vector<std::uint32_t> undecided;
   for (const std::uint32_t cell : bucket.cell_of) {
     if (cell == kNone) continue;
-    Block& block = blocks_[cell / kCells];
+    Findings& block = findings_[cell / kCells];
     const std::uint64_t bit = std::uint64_t{1} << cell % kCells;
     if (((block.decided | block.wanted) & bit) != 0) continue;
     if (block.wanted == 0) undecided.push_back(cell / kCells);
@@ -219,7 +224,7 @@ bool SheetRefinement::pop(std::int64_t pushed_below, std::vector<bool>& finer) {
   finer.assign(bucket.cell_of.size(), false);
   for (std::size_t i = 0; i < finer.size(); ++i) {
     const std::uint32_t cell = bucket.cell_of[i];
-    finer[i] = cell != kNone && (blocks_[cell / kCells].finer >> cell % kCells & 1U) != 0;
+    finer[i] = cell != kNone && (findings_[cell / kCells].finer >> cell % kCells & 1U) != 0;
   }
   needed_from_ = pushed_below;
   for (const WaitingBucket& w : waiting_) needed_from_ = std::min(needed_from_, w.low);

@@ -50,12 +50,16 @@ class SheetRefinement {
   /// Directions that a normal lies near, a bit each. Normals that share one do not cancel, whatever sums are made.
   using Directions = std::uint16_t;
   static Directions directions_near(float x, float y, float z);
-  /// Cells of a level; a bit per cell.
+  /// Cells of a level.
   struct Block {
     Cell at;  ///< coordinates of its cells, divided by kSide
     std::uint8_t level = 0;
-    std::uint64_t wanted = 0, decided = 0, finer = 0;
     std::array<CellNormals, kCells> cells{};
+  };
+  /// What is known of a block's cells, a bit each.
+  struct Findings {
+    std::uint64_t wanted = 0, decided = 0, finer = 0;
+    Directions shared = static_cast<Directions>(~0U);  ///< all normals in the block lie near these
   };
   struct WaitingBucket {
     std::vector<std::uint32_t> cell_of;  ///< of each sample: index of its block * kCells + cell; kNone: does not count
@@ -71,14 +75,14 @@ class SheetRefinement {
   [[nodiscard]] std::size_t slot_of(const Cell& block, std::uint8_t level) const;  ///< where it is or would be
   std::uint32_t touch(const Cell& block, std::uint8_t level);
   void rehash();
-  using Around = std::array<const Block*, 27>;
+  using Around = std::array<std::uint32_t, 27>;  ///< indices of blocks, kNone where there is none
   void decide(std::uint32_t index);
-  static void add_up(Block& block, const Around& around);
+  [[nodiscard]] std::uint64_t cancelling(std::uint64_t wanted, const Around& around) const;
 
   Lattice lattice_;
   std::vector<FloorDivider> to_cell_;                ///< by level
   std::deque<Block> blocks_;                         ///< a block keeps its index until it is forgotten
-  std::vector<Directions> shared_;                   ///< by block: directions that all normals in it lie near
+  std::vector<Findings> findings_;                   ///< by block: most of the work reads these alone
   std::vector<std::uint32_t> free_;                  ///< indices of forgotten ones
   std::vector<Slot> slots_ = std::vector<Slot>(64);  ///< a power of two, at most half full
   std::int64_t needed_from_ = std::numeric_limits<std::int64_t>::min();  ///< z of samples still to be judged
