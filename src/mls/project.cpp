@@ -36,7 +36,7 @@ struct Projector::Scratch {
   void forget_below(const std::vector<NumberedBuckets>& batches) {
     std::size_t lowest = std::numeric_limits<std::size_t>::max();
     for (const auto& batch : batches) lowest = std::min(lowest, batch.front());
-    constexpr std::size_t kMostSpare = 2;
+    constexpr std::size_t kMostSpare = 1;
     const auto end = clustered.lower_bound(lowest);
     for (auto at = clustered.begin(); at != end && spare.size() < kMostSpare; ++at) spare.push_back(at->second);
     clustered.erase(clustered.begin(), end);

@@ -155,8 +155,6 @@ void Pruner::end_parts(const Slab& live, std::uint64_t from) {
 
 void Pruner::add(const VertexBatch& vertices, const Triangles& triangles) {
   Slab slab;
-  std::swap(slab.vertices, spare_.vertices);
-  std::swap(slab.triangles, spare_.triangles);
   slab.first = vertices_;
   slab.vertices = vertices;
   slab.triangles = triangles;
@@ -266,7 +264,6 @@ void Pruner::pass_on(Slab& slab) {
   written_ += kept;
   passed_first_ = slab.first;
   passed_number_ = std::move(number);
-  spare_ = std::move(out);
 }
 
 }  // namespace lamina

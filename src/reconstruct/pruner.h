@@ -103,7 +103,6 @@ class Pruner {
   std::uint64_t passed_first_ = 0;
   std::vector<std::uint32_t> passed_number_;
   std::uint64_t written_ = 0;
-  MeshSlab spare_;  ///< storage of the slab passed on last
 };
 
 }  // namespace lamina
