@@ -7,6 +7,7 @@
 #include <bit>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <utility>
 
 #include "base/hashing.h"
@@ -82,9 +83,8 @@ void SheetRefinement::rehash() {
 /// The normals near a direction lie within 59 degrees of it, so that any sum of them is longer than kCancelledShare of
 /// their number, with room for rounding. A cube's faces and corners: one of them is within 37 degrees of any normal.
 SheetRefinement::Directions SheetRefinement::directions_near(float x, float y, float z) {
-  constexpr float kNear = 0.515F;
-  static_assert(kNear > kCancelledShare);
-  constexpr float kNearCorner = 1.7320508F * kNear;
+  constexpr auto kNear = static_cast<float>(kCancelledShare + 0.015);
+  constexpr float kNearCorner = std::numbers::sqrt3_v<float> * kNear;
   unsigned near = 0;
   unsigned bit = 1;
   const auto look = [&](float along, float least) {

@@ -175,7 +175,7 @@ bool is_in_company(const Placed& s, const Surroundings& known, std::size_t place
     from[2][k] = static_cast<float>(s.z[neighbours[k]] - s.z[place]);
     away[k] = std::sqrt(from[0][k] * from[0][k] + from[1][k] * from[1][k] + from[2][k] * from[2][k]);
   }
-  constexpr float kSlack = 1.001F;
+  constexpr float kSlack = 1 + 1e-3F;
   const float least = kSlack / kLonely * known.distance[place];
   std::size_t close = 0;  // neighbours that may have theirs nearer
   for (std::size_t n = 0; n < kStrayNeighbours; ++n) {
