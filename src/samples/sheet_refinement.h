@@ -76,7 +76,7 @@ class SheetRefinement {
   std::uint32_t touch(const Cell& block, std::uint8_t level);
   void rehash();
   using Around = std::array<std::uint32_t, 27>;  ///< indices of blocks, kNone where there is none
-  void decide(std::uint32_t index);
+  void decide(std::uint32_t own);
   [[nodiscard]] std::uint64_t cancelling(std::uint64_t wanted, const Around& around) const;
 
   Lattice lattice_;
