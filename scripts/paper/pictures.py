@@ -31,6 +31,7 @@ def distances(program, clouds, true_mesh, diagonal, folder, work):
 
 # What is drawn of scans and scenes: the camera, to see what differs.
 SCANNED = {"tap": ["--view", "30,40", "--up", "z"], "bowl": ["--view", "30,40", "--up", "z"],
+           "part": ["--view", "30,40", "--up", "z", "--color", "none"], "dragon": ["--view", "30,15"],
            "heavy": ["--view", "30,15"], "facade": ["--view", "20,15"],
            "room": ["--zoom", "3,0.55,1.7,0.95", "--view", "200,20"],
            "KnotBadlyScanned": ["--view", "30,35"], "Facade": ["--view", "20,15"],

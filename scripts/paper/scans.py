@@ -17,7 +17,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 SCANS = {"tap": ("tap.ply", "tap_reference.ply"), "bowl": ("bowl.ply", "bowl_reference.ply"),
          "murex": ("murex_noise.ply", "murex_truth.ply"), "part": ("part_missing.ply", "part_truth.ply")}
 # No option, and all closed.
-CHOICES = {"lamina": []}
+CHOICES = {"lamina": [], "lamina --fill all": ["--fill", "all"]}
 DEPTHS = {"scans": (8, 9), "scenes": (9, 10)}  # of Poisson's octrees, after the sizes of the clouds
 FIRST_SCENES = ("dragon", "heavy", "armadillo", "facade", "room", "cad", "plate")
 MAKER = "lamina_scenes"

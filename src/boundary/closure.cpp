@@ -20,7 +20,8 @@ using Solver = Eigen::SimplicialLDLT<Sparse>;
 
 /// Sums of two cotangents: all positive, so that a membrane stays within its rim, and slivers weigh no more than twenty
 /// fair triangles.
-constexpr double kLeastWeight = 0.02, kMostWeight = 20;
+constexpr double kLeastWeight = 0.02;
+constexpr double kMostWeight = 20;
 constexpr int kMembranes = 3;
 
 /// Stiffness of a disc's edges, over all of its vertices.
