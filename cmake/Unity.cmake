@@ -1,5 +1,5 @@
 # Sources of one folder compiled together: half the compiler's work for a build from scratch. A change of one source takes
-# more: who works on one room for a day sets LAMINA_UNITY=OFF. A forgotten #include shows then, and in scripts/tidy --alone.
+# more: who works on one room for a day sets LAMINA_UNITY=OFF. A forgotten #include shows then, and in scripts/includes.
 if(DEFINED ENV{LAMINA_UNITY})
   set(LAMINA_UNITY_DEFAULT $ENV{LAMINA_UNITY})
 else()
