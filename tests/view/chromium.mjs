@@ -124,6 +124,22 @@ export class Page {
     await this.settle();
   }
 
+  /** Holds a letter's key down until so many frames are drawn. */
+  async hold(key, frames) {
+    const event = { key, code: `Key${key.toUpperCase()}` };
+    await this.send('Input.dispatchKeyEvent', { type: 'keyDown', text: key, ...event });
+    for (let i = 0; i < frames; ++i) await this.settle();
+    await this.send('Input.dispatchKeyEvent', { type: 'keyUp', ...event });
+  }
+
+  async drag([x, y], [toX, toY]) {
+    const mouse = (type, atX, atY) => this.send('Input.dispatchMouseEvent', { type, x: atX, y: atY, button: 'left', buttons: 1, clickCount: 1 });
+    await mouse('mousePressed', x, y);
+    for (let i = 1; i <= 4; ++i) await mouse('mouseMoved', x + (toX - x) * i / 4, y + (toY - y) * i / 4);
+    await mouse('mouseReleased', toX, toY);
+    await this.settle();
+  }
+
   async picture() {
     await this.settle();
     const { data } = await this.send('Page.captureScreenshot', { format: 'png' });

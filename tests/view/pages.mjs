@@ -110,6 +110,19 @@ async function lookAtMesh() {
     // A ball that fills the height: pi / 4 of the square of it.
     expect(near(colours.share, 0.66, 0.12), `mesh: fills its part of the picture (${colours.share.toFixed(2)})`);
     expect(Math.min(colours.red, colours.green, colours.blue) > 0.03, `mesh: has all three colours (${JSON.stringify(colours)})`);
+    await page.drag([594, 300], [594, 500]);
+    const above = await see('orbit');
+    expect(above.blue > 0.9 && near(above.share, colours.share, 0.02), `mesh: dragged down it is seen from above, where it is blue (${above.blue.toFixed(2)})`);
+    await page.press('f');
+    await page.press('o');
+    await page.hold('w', 12);
+    const nearer = await see('fly');
+    expect(nearer.share > 1.15 * colours.share, `mesh: flying brings it nearer (${nearer.share.toFixed(2)})`);
+    await page.press('o');
+    await page.press('f');
+    await page.press('n');
+    const normals = await see('normals');
+    expect(normals.red > 0.15 && normals.green < 0.1, `mesh: its normals have other colours (${JSON.stringify(normals)})`);
     await choose('Show', '_height');
     const scale = await page.evaluate("document.querySelector('.scale input').value + ' ' + document.querySelectorAll('.scale input')[1].value");
     const [low, high] = scale.split(' ').map(Number);
