@@ -16,6 +16,7 @@ export class Chromium {
     this.folder = mkdtempSync(join(tmpdir(), 'lamina-chromium-'));
     this.child = spawn(program, [...flags, `--user-data-dir=${this.folder}`, 'about:blank'], {
       stdio: ['ignore', 'ignore', 'ignore', 'pipe', 'pipe'],
+      detached: true,  // a process group of its own, which ends as a whole
     });
     this.asked = new Map();
     this.listeners = [];
@@ -62,9 +63,17 @@ export class Chromium {
 
   async close() {
     const ended = new Promise((resolve) => this.child.on('exit', resolve));
-    this.child.kill('SIGKILL');
+    process.kill(-this.child.pid, 'SIGKILL');
     await ended;
-    rmSync(this.folder, { recursive: true, force: true, maxRetries: 20, retryDelay: 100 });
+    // Its helpers end a little later than itself, and may still write.
+    for (let tries = 0; ; ++tries) {
+      try {
+        return rmSync(this.folder, { recursive: true, force: true });
+      } catch (error) {
+        if (tries === 100) throw error;
+        await pause(100);
+      }
+    }
   }
 }
 
