@@ -4,9 +4,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <cstring>
-#include <limits>
-#include <utility>
 #include <vector>
 
 namespace lamina {
@@ -15,29 +12,10 @@ namespace {
 constexpr std::size_t kLeaf = 12;            ///< samples a leaf has at most
 constexpr std::size_t kParallel = 1u << 14;  ///< smaller ranges are built by one thread
 
-typedef std::int32_t FourInts __attribute__((vector_size(16)));  // NOLINT(modernize-use-using): attributes on typedefs
-
 }  // namespace
 
-struct SampleTree::Query {
-  std::array<std::int32_t, 3> at;
-  std::uint32_t place = 0;
-  std::size_t wanted = 0, count = 0;
-  float bound = 0;  ///< farther samples are of no interest
-  Neighbour* found = nullptr;
+struct SampleTree::Query : NearestList {
   std::array<float, 3> outside{};  ///< by axis: how far the node in question lies from the sample
-
-  void take(Neighbour n) {
-    if (count == wanted) {
-      if (!(n < found[count - 1])) return;
-    } else {
-      ++count;
-    }
-    std::size_t i = count - 1;
-    for (; i > 0 && n < found[i - 1]; --i) found[i] = found[i - 1];
-    found[i] = n;
-    if (count == wanted) bound = found[count - 1].squared;
-  }
 };
 
 static_assert(SampleTree::kMostInLeaf >= 2 * kLeaf + 2);
@@ -51,112 +29,32 @@ struct SampleTree::LeafQuery {
   float bound = 0;                            ///< the largest of their own
 };
 
-/// Brings the item that sorting along an axis would put at `nth` there, and the smaller ones before it. Where
-/// coordinates are as good as random every second branch of std::nth_element is guessed wrong; this partition has none.
-class SampleTree::Median {
- public:
-  Median(std::vector<Item>& items, std::size_t axis) : items_(items), axis_(axis) {}
-
-  void select(std::size_t begin, std::size_t nth, std::size_t end) {
-    constexpr std::size_t kFew = 24;
-    constexpr int kMostRounds = 64;  // far more than any but made-up coordinates take
-    for (int round = 0; end - begin > kFew && round < kMostRounds; ++round) {
-      const std::size_t middle = partition(begin, end);
-      if (nth < middle) {
-        end = middle;
-      } else if (nth > middle) {
-        begin = middle + 1;
-      } else {
-        return;
-      }
-    }
-    std::nth_element(at(begin), at(nth), at(end), [this](const Item& a, const Item& b) { return key(a) < key(b); });
-  }
-
- private:
-  /// Distinct, in the order of coordinates.
-  [[nodiscard]] std::int64_t key(const Item& item) const {
-    return std::int64_t{item.at[axis_]} * kNumbers + item.number;
-  }
-  [[nodiscard]] std::vector<Item>::iterator at(std::size_t i) const {
-    return items_.begin() + static_cast<std::ptrdiff_t>(i);
-  }
-  /// About an item from near the middle; returns its place.
-  std::size_t partition(std::size_t begin, std::size_t end) {
-    const std::size_t last = end - 1;
-    std::swap(items_[ninther(begin, end)], items_[last]);
-    const std::int64_t pivot = key(items_[last]);
-    std::size_t middle = begin;
-    for (std::size_t i = begin; i < last; ++i) {
-      const Item item = items_[i];
-      items_[i] = items_[middle];
-      items_[middle] = item;
-      middle += key(item) < pivot ? 1 : 0;
-    }
-    std::swap(items_[middle], items_[last]);
-    return middle;
-  }
-  [[nodiscard]] std::size_t ninther(std::size_t begin, std::size_t end) const {
-    const std::size_t step = (end - begin) / 9;
-    const auto of_three = [this](std::size_t a, std::size_t b, std::size_t c) {
-      if (key(items_[a]) > key(items_[b])) std::swap(a, b);
-      if (key(items_[b]) > key(items_[c])) b = key(items_[a]) > key(items_[c]) ? a : c;
-      return b;
-    };
-    const auto triple = [&](std::size_t first) { return of_three(first, first + step, first + 2 * step); };
-    return of_three(triple(begin), triple(begin + 3 * step), triple(begin + 6 * step));
-  }
-
-  static constexpr std::int64_t kNumbers = std::int64_t{1} << 32;
-  std::vector<Item>& items_;
-  std::size_t axis_;
-};
-
-void SampleTree::assign(std::span<const std::int32_t> x, std::span<const std::int32_t> y,
-                        std::span<const std::int32_t> z) {
+SampleTree::SampleTree(std::span<const std::int32_t> x, std::span<const std::int32_t> y,
+                       std::span<const std::int32_t> z) {
   const std::size_t n = x.size();
-  items_.resize(n);
-  for (std::size_t i = 0; i < n; ++i) items_[i] = {{x[i], y[i], z[i]}, static_cast<std::uint32_t>(i)};
-  depth_ = 0;
+  std::vector<TreeItem> items(n);
+  for (std::size_t i = 0; i < n; ++i) items[i] = {{x[i], y[i], z[i]}, static_cast<std::uint32_t>(i)};
   while ((n >> depth_) > kLeaf) ++depth_;
   nodes_.resize((std::size_t{1} << depth_) - 1);
-  if (n > 0) build({0, 0, n, 0});
+  if (n > 0) build(items, {0, 0, n, 0});
   order_.resize(n);
   for (auto& axis : at_) axis.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    order_[i] = items_[i].number;
-    for (std::size_t a = 0; a < 3; ++a) at_[a][i] = items_[i].at[a];
+    order_[i] = items[i].number;
+    for (std::size_t a = 0; a < 3; ++a) at_[a][i] = items[i].at[a];
   }
 }
 
-void SampleTree::build(const Subtree& tree) {
+void SampleTree::build(std::span<TreeItem> items, const Subtree& tree) {
   if (tree.depth == depth_) return;
-  // All three axes at once; the number goes along.
-  static_assert(sizeof(Item) == sizeof(FourInts));
-  const auto item = [this](std::size_t i) {
-    FourInts four;
-    std::memcpy(&four, &items_[i], sizeof(four));
-    return four;
-  };
-  FourInts low = item(tree.begin);
-  FourInts high = low;
-  for (std::size_t i = tree.begin + 1; i < tree.end; ++i) {
-    const FourInts at = item(i);
-    low = at < low ? at : low;
-    high = at > high ? at : high;
-  }
-  std::size_t axis = 0;
-  const FourInts extent = high - low;
-  for (std::size_t a = 1; a < 3; ++a) {
-    if (extent[a] > extent[axis]) axis = a;
-  }
-  Median(items_, axis).select(tree.begin, tree.middle(), tree.end);
-  nodes_[tree.node] = {items_[tree.middle()].at[axis], static_cast<int>(axis)};
+  const std::size_t axis = ItemBox::around(items.subspan(tree.begin, tree.end - tree.begin)).longest_axis();
+  MedianSplit(items, axis).select(tree.begin, tree.middle(), tree.end);
+  nodes_[tree.node] = {items[tree.middle()].at[axis], static_cast<int>(axis)};
   if (tree.end - tree.begin > kParallel) {
-    tbb::parallel_invoke([&] { build(tree.lower()); }, [&] { build(tree.upper()); });
+    tbb::parallel_invoke([&] { build(items, tree.lower()); }, [&] { build(items, tree.upper()); });
   } else {
-    build(tree.lower());
-    build(tree.upper());
+    build(items, tree.lower());
+    build(items, tree.upper());
   }
 }
 
@@ -239,21 +137,7 @@ void SampleTree::search(LeafQuery& q, const Subtree& tree, float squared) const 
 
 void SampleTree::search(Query& q, const Subtree& tree, float squared) const {
   if (tree.depth == depth_) {
-    std::array<float, kMostInLeaf> d2;
-    const std::size_t begin = tree.begin;
-    const std::size_t n = tree.end - begin;
-    const std::int32_t* x = at_[0].data() + begin;
-    const std::int32_t* y = at_[1].data() + begin;
-    const std::int32_t* z = at_[2].data() + begin;
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto dx = static_cast<float>(x[i] - q.at[0]);
-      const auto dy = static_cast<float>(y[i] - q.at[1]);
-      const auto dz = static_cast<float>(z[i] - q.at[2]);
-      d2[i] = dx * dx + dy * dy + dz * dz;
-    }
-    for (std::size_t i = 0; i < n; ++i) {
-      if (d2[i] <= q.bound && begin + i != q.place) q.take({d2[i], static_cast<std::uint32_t>(begin + i)});
-    }
+    q.take_places<kMostInLeaf>(axes(), tree.begin, tree.end);
     return;
   }
   const Node& split = nodes_[tree.node];

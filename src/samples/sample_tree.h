@@ -9,15 +9,10 @@
 #include <span>
 #include <vector>
 
-namespace lamina {
+#include "samples/median_split.h"
+#include "samples/nearest_list.h"
 
-struct Neighbour {
-  float squared = 0;         ///< distance, steps^2
-  std::uint32_t sample = 0;  ///< place in the tree's order
-  friend bool operator<(const Neighbour& a, const Neighbour& b) {
-    return a.squared < b.squared || (a.squared == b.squared && a.sample < b.sample);
-  }
-};
+namespace lamina {
 
 /// Samples are given places so that those of a leaf follow one another: whoever goes through the places in order finds
 /// neighbours in the processor's cache. The order depends on the positions and their numbers alone, not on threads.
@@ -26,14 +21,8 @@ class SampleTree {
  public:
   static constexpr std::size_t kMostNeighbours = 256;
 
-  SampleTree() = default;
-  SampleTree(std::span<const std::int32_t> x, std::span<const std::int32_t> y, std::span<const std::int32_t> z) {
-    assign(x, y, z);
-    items_ = {};
-  }
-  /// Other samples instead, in the memory there is. Wants three arrays of one length below 2^32, coordinates within
-  /// +-(2^30 - 1).
-  void assign(std::span<const std::int32_t> x, std::span<const std::int32_t> y, std::span<const std::int32_t> z);
+  /// Wants three arrays of one length below 2^32, coordinates within +-(2^30 - 1).
+  SampleTree(std::span<const std::int32_t> x, std::span<const std::int32_t> y, std::span<const std::int32_t> z);
 
   [[nodiscard]] std::size_t size() const { return order_.size(); }
   /// Number, in the arrays given, of the sample at each place.
@@ -69,19 +58,15 @@ class SampleTree {
             static_cast<float>(at_[2][b] - at_[2][a])};
   }
   [[nodiscard]] const std::vector<std::int32_t>& axis(int a) const { return at_[static_cast<std::size_t>(a)]; }
+  [[nodiscard]] PlacedAxes axes() const { return {at_[0].data(), at_[1].data(), at_[2].data()}; }
 
  private:
-  struct Item {
-    std::array<std::int32_t, 3> at;
-    std::uint32_t number;
-  };
   struct Node {
     std::int32_t split = 0;  ///< samples before the middle are not above it, the others not below
     int axis = 0;
   };
   struct Query;
   struct LeafQuery;
-  class Median;
 
   /// What lies below a node: places [begin, end).
   struct Subtree {
@@ -93,7 +78,7 @@ class SampleTree {
   };
   [[nodiscard]] Subtree whole() const { return {0, 0, order_.size(), 0}; }
 
-  void build(const Subtree& tree);
+  void build(std::span<TreeItem> items, const Subtree& tree);
   void search(Query& q, const Subtree& tree, float squared) const;
   void search(LeafQuery& q, const Subtree& tree, float squared) const;
 
@@ -113,7 +98,6 @@ class SampleTree {
     if (side >= 0 || side * side <= squared) within(place, squared, visit, tree.upper());
   }
 
-  std::vector<Item> items_;                      ///< being built
   std::array<std::vector<std::int32_t>, 3> at_;  ///< by place
   std::vector<std::uint32_t> order_;
   std::vector<Node> nodes_;  ///< a heap: the children of i are 2 i + 1 and 2 i + 2; all leaves are at one depth

@@ -344,13 +344,14 @@ Noise survey_noise(const SlabStore& store, const ReadBucket& read, float radius)
   return noise;
 }
 
-RadiusSurvey survey_radii(const SlabStore& store, std::uint64_t sample_limit, std::uint32_t min_samples) {
-  const ReadBucket read = [&](std::size_t bucket, LocalSamples& out) { store.read(bucket, out); };
-  return survey_radii(store, read, sample_limit, min_samples);
+namespace {
+
+ReadBucket reader_of(const SlabStore& store) {
+  return [&store](std::size_t bucket, LocalSamples& out) { store.read(bucket, out); };
 }
 
-RadiusSurvey survey_radii(const SlabStore& store, const ReadBucket& read, std::uint64_t sample_limit,
-                          std::uint32_t min_samples) {
+RadiusSurvey survey_density(const SlabStore& store, const ReadBucket& read, std::uint64_t sample_limit,
+                            std::uint32_t min_samples) {
   RadiusSurvey survey;
   if (store.total() == 0) return survey;
   const bool given = store.layout().has_radius;
@@ -368,6 +369,22 @@ RadiusSurvey survey_radii(const SlabStore& store, const ReadBucket& read, std::u
   survey.low = quantile(radii, total, kLow);
   survey.median = quantile(radii, total, kMiddle);
   survey.high = quantile(radii, total, kHigh);
+  return survey;
+}
+
+}  // namespace
+
+RadiusSurvey survey_density(const SlabStore& store, std::uint64_t sample_limit, std::uint32_t min_samples) {
+  return survey_density(store, reader_of(store), sample_limit, min_samples);
+}
+
+RadiusSurvey survey_radii(const SlabStore& store, std::uint64_t sample_limit, std::uint32_t min_samples) {
+  return survey_radii(store, reader_of(store), sample_limit, min_samples);
+}
+
+RadiusSurvey survey_radii(const SlabStore& store, const ReadBucket& read, std::uint64_t sample_limit,
+                          std::uint32_t min_samples) {
+  RadiusSurvey survey = survey_density(store, read, sample_limit, min_samples);
   const Noise noise = survey_noise(store, read, survey.median);
   survey.noise = noise.distance;
   survey.normal_noise = noise.angle;

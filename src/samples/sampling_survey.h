@@ -31,6 +31,9 @@ struct RadiusSurvey {
 /// of its own; all-zero radii when the store is empty or all samples coincide.
 RadiusSurvey survey_radii(const SlabStore& store, std::uint64_t sample_limit, std::uint32_t min_samples = 16);
 
+/// The same without a look at the noise.
+RadiusSurvey survey_density(const SlabStore& store, std::uint64_t sample_limit, std::uint32_t min_samples = 16);
+
 inline constexpr std::uint64_t kSurveySamples = 1u << 18;  ///< whose radii are looked at before streaming
 
 /// The same where a bucket's samples come from elsewhere: `read` fills them in as SlabStore::read() does.

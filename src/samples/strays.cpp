@@ -13,7 +13,6 @@
 #include "base/resize_anew.h"
 #include "lamina/error.h"
 #include "samples/neighbourhoods.h"
-#include "samples/sample_tree.h"
 #include "samples/sampling_survey.h"
 
 namespace lamina {
@@ -31,8 +30,10 @@ constexpr float kPlainAgreement = 0.9F;
 constexpr float kPlainCosine = 0.6F;
 constexpr float kPlainSpread = 4;
 constexpr float kPlainThickness = 0.25F;
+/// Fewer lie on one plane by chance.
+constexpr std::size_t kLeastPlain = 6;
 
-/// What is known of the places of a slab's tree.
+/// What is known of the places of a slab.
 struct Surroundings {
   std::vector<float> distance;            ///< mean distance to the neighbours; negative: not looked at
   std::vector<std::uint32_t> neighbours;  ///< kLookedAt for each place searched around, nearest first
@@ -40,8 +41,8 @@ struct Surroundings {
   std::vector<std::uint8_t> count;        ///< of them
   std::vector<std::uint8_t> stray;        ///< Verdict
   std::vector<std::uint8_t> suspect;      ///< Suspicion
+  std::vector<std::uint8_t> look;         ///< Search's
   std::vector<std::uint8_t> beside;       ///< 1: few neighbours, but many samples not much farther away
-  std::vector<std::uint32_t> leaf;        ///< of the tree
 
   /// Of a place that has been searched around: `count` of them.
   [[nodiscard]] const std::uint32_t* neighbours_of(std::size_t place) const {
@@ -120,17 +121,20 @@ bool is_off_surface(const Placed& s, std::size_t place, const Company& company, 
   return static_cast<float>(along) < least * all && static_cast<float>(exact) < kLeastExact * all;
 }
 
-/// Whether the samples of a leaf lie close together on one plane and face its way: none of them can be a stray.
-bool is_plain(const Placed& s, const SampleTree::Places& places) {
-  const auto count = static_cast<float>(places.size());
+/// Which samples of a leaf may be strays: none where they lie close together on one plane and face its way; where some
+/// lie far from the others on that plane, those; else all.
+void find_doubtful(const Placed& s, const SampleLeaf& leaf, std::uint8_t* doubtful) {
+  std::fill_n(doubtful, leaf.size(), std::uint8_t{1});
+  if (leaf.size() < kLeastPlain) return;
+  const auto count = static_cast<float>(leaf.size());
   std::array<float, 3> middle{};
   std::array<float, 3> normal{};
   const auto at = [&](std::size_t i) {
-    return std::array<float, 3>{static_cast<float>(s.x[i] - s.x[places.begin]),
-                                static_cast<float>(s.y[i] - s.y[places.begin]),
-                                static_cast<float>(s.z[i] - s.z[places.begin])};
+    return std::array<float, 3>{static_cast<float>(s.x[i] - s.x[leaf.begin]),
+                                static_cast<float>(s.y[i] - s.y[leaf.begin]),
+                                static_cast<float>(s.z[i] - s.z[leaf.begin])};
   };
-  for (std::size_t i = places.begin; i < places.end; ++i) {
+  for (std::size_t i = leaf.begin; i < leaf.end; ++i) {
     const std::array<float, 3> p = at(i);
     for (std::size_t k = 0; k < 3; ++k) middle[k] += p[k] / count;
     normal[0] += s.nx[i] / count;
@@ -138,11 +142,11 @@ bool is_plain(const Placed& s, const SampleTree::Places& places) {
     normal[2] += s.nz[i] / count;
   }
   const float length = std::sqrt(normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]);
-  if (length < kPlainAgreement) return false;
+  if (length < kPlainAgreement) return;
+  std::array<float, Neighbourhoods::kMostInLeaf> away{};
   float sum2 = 0;
-  float farthest2 = 0;
   float thickest = 0;
-  for (std::size_t i = places.begin; i < places.end; ++i) {
+  for (std::size_t i = leaf.begin; i < leaf.end; ++i) {
     const std::array<float, 3> p = at(i);
     float d2 = 0;
     float off = 0;
@@ -151,13 +155,14 @@ bool is_plain(const Placed& s, const SampleTree::Places& places) {
       d2 += d * d;
       off += d * normal[k];
     }
-    if (s.nx[i] * normal[0] + s.ny[i] * normal[1] + s.nz[i] * normal[2] < kPlainCosine * length) return false;
+    if (s.nx[i] * normal[0] + s.ny[i] * normal[1] + s.nz[i] * normal[2] < kPlainCosine * length) return;
+    away[i - leaf.begin] = d2;
     sum2 += d2;
-    farthest2 = std::max(farthest2, d2);
     thickest = std::max(thickest, std::abs(off));
   }
   const float mean2 = sum2 / count;
-  return farthest2 <= kPlainSpread * mean2 && thickest * thickest <= kPlainThickness * mean2 * length * length;
+  if (thickest * thickest > kPlainThickness * mean2 * length * length) return;
+  for (std::size_t i = 0; i < leaf.size(); ++i) doubtful[i] = away[i] > kPlainSpread * mean2 ? 1 : 0;
 }
 
 /// Whether a place cannot be lonely, whatever strays are found: told without a search around each of its neighbours.
@@ -198,11 +203,10 @@ bool is_in_company(const Placed& s, const Surroundings& known, std::size_t place
   return close <= kStrayNeighbours / 2;
 }
 
-/// Finds the neighbours of a slab's places, leaf by leaf of its tree, as they are asked for.
+/// Finds the neighbours of a slab's places as they are asked for.
 class Search {
  public:
-  Search(const Neighbourhoods& around, float reach, Surroundings& out)
-      : around_(around), tree_(around.tree()), reach_(reach), out_(out), looks_(tree_.leaves(), kNot) {}
+  Search(const Neighbourhoods& around, float reach, Surroundings& out) : around_(around), reach_(reach), out_(out) {}
 
   /// Of those that may be strays within reach of the slab, and of the neighbours that these are compared with.
   void start();
@@ -213,58 +217,59 @@ class Search {
   enum Look : std::uint8_t { kNot, kWanted, kDone };
 
   template <class Each>
-  void for_leaves(const Each& each) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree_.leaves(), 64), [&](const auto& range) {
-      for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf) each(leaf, tree_.places_of(leaf));
-    });
-  }
-  template <class Each>
   void for_suspects(const Each& each) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, tree_.size(), 4096), [&](const auto& range) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, around_.samples().size(), 4096), [&](const auto& range) {
       for (std::size_t p = range.begin(); p < range.end(); ++p) {
         if (out_.suspect[p] != kClear) each(p);
       }
     });
   }
   void search_wanted();
+  void search_leaf(const SampleLeaf& leaf);
   /// Around the places compared with their neighbours.
   void search_around();
 
   const Neighbourhoods& around_;
-  const SampleTree& tree_;
   float reach_;
   Surroundings& out_;
-  std::vector<std::uint8_t> looks_;  ///< of leaves
 };
 
 void Search::search_wanted() {
   auto rows = static_cast<std::uint32_t>(out_.neighbours.size() / kLookedAt);
-  for (std::size_t leaf = 0; leaf < looks_.size(); ++leaf) {
-    if (looks_[leaf] != kWanted) continue;
-    const SampleTree::Places places = tree_.places_of(leaf);
-    for (std::size_t p = places.begin; p < places.end; ++p) out_.row[p] = rows++;
+  for (std::size_t p = 0; p < out_.look.size(); ++p) {
+    if (out_.look[p] == kWanted) out_.row[p] = rows++;
   }
   out_.neighbours.resize(std::size_t{rows} * kLookedAt);
-  for_leaves([&](std::size_t leaf, const SampleTree::Places& places) {
-    if (looks_[leaf] != kWanted) return;
-    std::array<Neighbour, SampleTree::kMostInLeaf * kLookedAt> found;
-    std::array<std::size_t, SampleTree::kMostInLeaf> counts;
-    tree_.nearest_to_leaf(leaf, kLookedAt, reach_ * reach_, found.data(), counts.data());
-    for (std::size_t i = 0; i < places.size(); ++i) {
-      const std::size_t p = places.begin + i;
-      out_.count[p] = static_cast<std::uint8_t>(counts[i]);
-      std::uint32_t* const to = &out_.neighbours[std::size_t{out_.row[p]} * kLookedAt];
-      for (std::size_t k = 0; k < counts[i]; ++k) to[k] = found[i * kLookedAt + k].sample;
-    }
-    looks_[leaf] = kDone;
+  const std::vector<SampleLeaf>& leaves = around_.leaves();
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, leaves.size(), 256), [&](const auto& range) {
+    for (std::size_t leaf = range.begin(); leaf < range.end(); ++leaf) search_leaf(leaves[leaf]);
   });
 }
 
+void Search::search_leaf(const SampleLeaf& leaf) {
+  std::array<std::uint32_t, Neighbourhoods::kMostInLeaf> places;
+  std::size_t n = 0;
+  for (std::size_t p = leaf.begin; p < leaf.end; ++p) {
+    if (out_.look[p] == kWanted) places[n++] = static_cast<std::uint32_t>(p);
+  }
+  if (n == 0) return;
+  std::array<Neighbour, Neighbourhoods::kMostInLeaf * kLookedAt> found;
+  std::array<std::size_t, Neighbourhoods::kMostInLeaf> counts;
+  around_.find_nearest({places.data(), n}, kLookedAt, found.data(), counts.data());
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::uint32_t p = places[i];
+    out_.count[p] = static_cast<std::uint8_t>(counts[i]);
+    std::uint32_t* const to = &out_.neighbours[std::size_t{out_.row[p]} * kLookedAt];
+    for (std::size_t k = 0; k < counts[i]; ++k) to[k] = found[i * kLookedAt + k].sample;
+    out_.look[p] = kDone;
+  }
+}
+
 void Search::search_around() {
-  for (std::size_t p = 0; p < tree_.size(); ++p) {
+  for (std::size_t p = 0; p < around_.samples().size(); ++p) {
     if (out_.suspect[p] != kCompared) continue;
     for (std::size_t k = 0; k < out_.count[p]; ++k) {
-      std::uint8_t& look = looks_[out_.leaf[out_.neighbours_of(p)[k]]];
+      std::uint8_t& look = out_.look[out_.neighbours_of(p)[k]];
       if (look == kNot) look = kWanted;
     }
   }
@@ -273,35 +278,27 @@ void Search::search_around() {
 
 void Search::start() {
   const Placed& samples = around_.samples();
+  const std::size_t places = samples.size();
   out_.neighbours.clear();
-  resize_anew(out_.row, tree_.size());
-  out_.count.assign(tree_.size(), 0);
-  out_.stray.assign(tree_.size(), kStays);
-  out_.suspect.assign(tree_.size(), kClear);
-  resize_anew(out_.leaf, tree_.size());
-  for_leaves([&](std::size_t leaf, const SampleTree::Places& places) {
-    bool near = false;
-    for (std::size_t p = places.begin; p < places.end; ++p) {
-      out_.leaf[p] = static_cast<std::uint32_t>(leaf);
-      near = near || around_.is_near(p, reach_);
-    }
-    if (!near || is_plain(samples, places)) return;
-    looks_[leaf] = kWanted;
-    for (std::size_t p = places.begin; p < places.end; ++p) out_.suspect[p] = kCompared;
-  });
+  resize_anew(out_.row, places);
+  out_.count.assign(places, 0);
+  out_.stray.assign(places, kStays);
+  out_.suspect.assign(places, kClear);
+  out_.look.assign(places, kNot);
+  for (std::size_t p = 0; p < places; ++p) {
+    if (!around_.is_doubtful(p) || !around_.is_near(p, reach_)) continue;
+    out_.look[p] = kWanted;
+    out_.suspect[p] = kCompared;
+  }
   search_wanted();
-  out_.beside.assign(tree_.size(), 0);
-  out_.distance.assign(tree_.size(), -1);
+  out_.beside.assign(places, 0);
+  out_.distance.assign(places, -1);
   for_suspects([&](std::size_t p) {
     if (out_.count[p] > 0) out_.distance[p] = mean_distance(samples, p, company_of(out_, p), reach_);
   });
   for_suspects([&](std::size_t p) {
     if (is_in_company(samples, out_, p)) out_.suspect[p] = kInCompany;
-    if (out_.count[p] >= kStrayNeighbours) return;
-    std::array<Neighbour, kManyBeside> found;
-    const float twice = 4 * reach_ * reach_;
-    const std::size_t many = tree_.nearest(static_cast<std::uint32_t>(p), kManyBeside, twice, found.data());
-    out_.beside[p] = many == kManyBeside ? 1 : 0;
+    if (out_.count[p] < kStrayNeighbours) out_.beside[p] = around_.count_within_twice(p) >= kManyBeside ? 1 : 0;
   });
   search_around();
 }
@@ -364,12 +361,12 @@ void judge_places(const Neighbourhoods& around, float reach, float margin, Surro
 }  // namespace
 
 StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, const RunContext& run, Reasons* reasons) {
-  const RadiusSurvey radii = survey_radii(store, kSurveyed);
+  const RadiusSurvey radii = survey_density(store, kSurveyed);
   constexpr double kMostReach = 1 << 27;
   const auto reach = static_cast<float>(std::clamp(kStrayReach * double{radii.median}, 1.0, kMostReach));
   StrayCounts counts;
   const KeepMasks before = masks;
-  Neighbourhoods around(store, before, 3 * static_cast<std::int64_t>(reach));
+  Neighbourhoods around(store, before, reach, find_doubtful);
   Surroundings known;
   while (around.advance()) {
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
@@ -379,7 +376,7 @@ StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, const RunConte
     // Strays keep each other company: those left are judged again without the others.
     search.go_on();
     judge_places(around, reach, 0, known);
-    for (std::size_t p = 0; p < around.tree().size(); ++p) {
+    for (std::size_t p = 0; p < around.samples().size(); ++p) {
       if (!around.is_own(p) || known.stray[p] == kStays) continue;
       const std::uint32_t b = around.samples().bucket[p];
       const std::uint32_t number = around.samples().number[p];

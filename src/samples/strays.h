@@ -47,8 +47,8 @@ struct StrayCounts {
 };
 
 /// Clears the masks of stray samples; those they find cleared are not there. Where many go, those left are tested
-/// again. `reasons`: where wanted, is told of each. Depends on the cloud alone. Memory: some 150 bytes for each sample
-/// of three dozen spacings of the cloud's height.
+/// again. `reasons`: where wanted, is told of each. Depends on the cloud alone. Memory: some 60 bytes for each sample
+/// of twelve dozen spacings of the cloud's height.
 StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, const RunContext& run, Reasons* reasons = nullptr);
 
 }  // namespace lamina

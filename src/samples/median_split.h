@@ -1,0 +1,113 @@
+// Halving samples along an axis, for trees over their positions.
+#pragma once
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <utility>
+
+namespace lamina {
+
+/// A sample in a tree that is being built.
+struct TreeItem {
+  std::array<std::int32_t, 3> at;
+  std::uint32_t number;
+};
+
+typedef std::int32_t FourInts __attribute__((vector_size(16)));  // NOLINT(modernize-use-using): attributes on typedefs
+
+/// A box of samples, all three axes at once; the fourth lane is anything.
+struct ItemBox {
+  FourInts low, high;
+
+  /// Around one sample or more.
+  static ItemBox around(std::span<const TreeItem> items) {
+    static_assert(sizeof(TreeItem) == sizeof(FourInts));
+    const auto item = [&](std::size_t i) {
+      FourInts four;
+      std::memcpy(&four, &items[i], sizeof(four));
+      return four;
+    };
+    ItemBox box{item(0), item(0)};
+    for (std::size_t i = 1; i < items.size(); ++i) {
+      const FourInts at = item(i);
+      box.low = at < box.low ? at : box.low;
+      box.high = at > box.high ? at : box.high;
+    }
+    return box;
+  }
+  [[nodiscard]] std::size_t longest_axis() const {
+    const FourInts extent = high - low;
+    std::size_t axis = 0;
+    for (std::size_t a = 1; a < 3; ++a) {
+      if (extent[a] > extent[axis]) axis = a;
+    }
+    return axis;
+  }
+};
+
+/// Brings the item that sorting along an axis would put at `nth` there, and the smaller ones before it. Where
+/// coordinates are as good as random every second branch of std::nth_element is guessed wrong; this partition has none.
+class MedianSplit {
+ public:
+  MedianSplit(std::span<TreeItem> items, std::size_t axis) : items_(items), axis_(axis) {}
+
+  void select(std::size_t begin, std::size_t nth, std::size_t end) {
+    constexpr std::size_t kFew = 24;
+    constexpr int kMostRounds = 64;  // far more than any but made-up coordinates take
+    for (int round = 0; end - begin > kFew && round < kMostRounds; ++round) {
+      const std::size_t middle = partition(begin, end);
+      if (nth < middle) {
+        end = middle;
+      } else if (nth > middle) {
+        begin = middle + 1;
+      } else {
+        return;
+      }
+    }
+    std::nth_element(at(begin), at(nth), at(end),
+                     [this](const TreeItem& a, const TreeItem& b) { return key(a) < key(b); });
+  }
+
+ private:
+  /// Distinct, in the order of coordinates.
+  [[nodiscard]] std::int64_t key(const TreeItem& item) const {
+    return std::int64_t{item.at[axis_]} * kNumbers + item.number;
+  }
+  [[nodiscard]] std::span<TreeItem>::iterator at(std::size_t i) const {
+    return items_.begin() + static_cast<std::ptrdiff_t>(i);
+  }
+  /// About an item from near the middle; returns its place.
+  std::size_t partition(std::size_t begin, std::size_t end) {
+    const std::size_t last = end - 1;
+    std::swap(items_[ninther(begin, end)], items_[last]);
+    const std::int64_t pivot = key(items_[last]);
+    std::size_t middle = begin;
+    for (std::size_t i = begin; i < last; ++i) {
+      const TreeItem item = items_[i];
+      items_[i] = items_[middle];
+      items_[middle] = item;
+      middle += key(item) < pivot ? 1 : 0;
+    }
+    std::swap(items_[middle], items_[last]);
+    return middle;
+  }
+  [[nodiscard]] std::size_t ninther(std::size_t begin, std::size_t end) const {
+    const std::size_t step = (end - begin) / 9;
+    const auto of_three = [this](std::size_t a, std::size_t b, std::size_t c) {
+      if (key(items_[a]) > key(items_[b])) std::swap(a, b);
+      if (key(items_[b]) > key(items_[c])) b = key(items_[a]) > key(items_[c]) ? a : c;
+      return b;
+    };
+    const auto triple = [&](std::size_t first) { return of_three(first, first + step, first + 2 * step); };
+    return of_three(triple(begin), triple(begin + 3 * step), triple(begin + 6 * step));
+  }
+
+  static constexpr std::int64_t kNumbers = std::int64_t{1} << 32;
+  std::span<TreeItem> items_;
+  std::size_t axis_;
+};
+
+}  // namespace lamina
