@@ -10,8 +10,6 @@
 #include <numbers>
 #include <utility>
 
-#include "base/hashing.h"
-
 namespace lamina {
 namespace {
 
@@ -32,52 +30,32 @@ SheetRefinement::SheetRefinement(const Lattice& lattice) : lattice_(lattice) {
   for (int level = 0; level < lattice.levels; ++level) to_cell_.emplace_back(lattice.cell_size(level));
 }
 
-std::size_t SheetRefinement::slot_of(const Cell& block, std::uint8_t level) const {
-  std::size_t at = cell_hash(block.x, block.y, block.z + (std::int64_t{level} << 32)) & (slots_.size() - 1);
-  while (slots_[at].index != kNone && (slots_[at].at != block || slots_[at].level != level))
-    at = (at + 1) & (slots_.size() - 1);
-  return at;
+/// Whether samples still to be judged lie in or beside a cube of so many cells a side.
+bool SheetRefinement::is_needed(const Cell& at, int cells, std::uint8_t level) const {
+  const std::int64_t first_needed = cell_row(needed_from_, lattice_.cell_size(level)) - 1;
+  return cells * (std::int64_t{at.z} + 1) > first_needed;
 }
 
 std::uint32_t SheetRefinement::touch(const Cell& block, std::uint8_t level) {
-  std::size_t slot = slot_of(block, level);
-  if (slots_[slot].index != kNone) return slots_[slot].index;
-  if (2 * (blocks_.size() - free_.size() + 1) > slots_.size()) {
-    rehash();
-    slot = slot_of(block, level);
-  }
-  auto index = static_cast<std::uint32_t>(blocks_.size());
-  if (free_.empty()) {
+  const auto [index, is_new] =
+      block_table_.touch(block, level, [this](const Cell& at, std::uint8_t l) { return is_needed(at, kSide, l); });
+  if (!is_new) return index;
+  if (index == blocks_.size()) {
     blocks_.emplace_back();
     findings_.emplace_back();
   } else {
-    index = free_.back();
-    free_.pop_back();
     blocks_[index] = {};
   }
-  slots_[slot] = {block, index, level};
-  findings_[index] = {};
   blocks_[index].at = block;
   blocks_[index].level = level;
+  const Cell cell{block.x >> kDistrictBits, block.y >> kDistrictBits, block.z >> kDistrictBits};
+  const auto district = district_table_.touch(
+      cell, level, [this](const Cell& at, std::uint8_t l) { return is_needed(at, kSide << kDistrictBits, l); });
+  districts_.resize(district_table_.size(), kAllDirections);
+  if (district.is_new) districts_[district.index] = kAllDirections;
+  findings_[index] = {};
+  findings_[index].district = district.index;
   return index;
-}
-
-/// Forgets the blocks that nothing depends on any more, and makes room until the table is at most a quarter full.
-void SheetRefinement::rehash() {
-  std::vector<std::uint32_t> kept;
-  kept.reserve(slots_.size() / 2);
-  for (const Slot& slot : slots_) {
-    if (slot.index == kNone) continue;
-    const std::int64_t first_needed = cell_row(needed_from_, lattice_.cell_size(slot.level)) - 1;
-    (kSide * (std::int64_t{slot.at.z} + 1) <= first_needed ? free_ : kept).push_back(slot.index);
-  }
-  std::size_t size = slots_.size();
-  while (4 * (kept.size() + 1) > size) size *= 2;
-  slots_.assign(size, {});
-  for (const std::uint32_t index : kept) {
-    const Block& b = blocks_[index];
-    slots_[slot_of(b.at, b.level)] = {b.at, index, b.level};
-  }
 }
 
 /// The normals near a direction lie within 59 degrees of it, so that any sum of them is longer than kCancelledShare of
@@ -117,7 +95,12 @@ void SheetRefinement::push(const LocalSamples& samples, const std::vector<std::u
     constexpr int kLast = kSide - 1;
     const std::uint32_t in_block = index_in_block(cell.x & kLast, cell.y & kLast, cell.z & kLast);
     Block& to = blocks_[index];
-    findings_[index].shared &= directions_near(samples.nx[i], samples.ny[i], samples.nz[i]);
+    Findings& findings = findings_[index];
+    if (const Directions near = directions_near(samples.nx[i], samples.ny[i], samples.nz[i]);
+        (findings.shared & ~near) != 0) {
+      findings.shared &= near;
+      districts_[findings.district] &= near;
+    }
     CellNormals& c = to.cells[in_block];
     ++c.samples;
     c.x += in_units(samples.nx[i]);
@@ -129,24 +112,43 @@ void SheetRefinement::push(const LocalSamples& samples, const std::vector<std::u
   }
 }
 
+/// What the normals in the districts of a block and of the blocks around it share.
+SheetRefinement::Directions SheetRefinement::shared_around(const Block& block) const {
+  const auto beside = [](std::int32_t at) { return std::pair{(at - 1) >> kDistrictBits, (at + 1) >> kDistrictBits}; };
+  const auto [x_begin, x_end] = beside(block.at.x);
+  const auto [y_begin, y_end] = beside(block.at.y);
+  const auto [z_begin, z_end] = beside(block.at.z);
+  Directions shared = kAllDirections;
+  for (std::int32_t z = z_begin; z <= z_end; ++z) {
+    for (std::int32_t y = y_begin; y <= y_end; ++y) {
+      for (std::int32_t x = x_begin; x <= x_end; ++x) {
+        const std::uint32_t district = district_table_.find({x, y, z}, block.level);
+        if (district != kNone) shared &= districts_[district];
+      }
+    }
+  }
+  return shared;
+}
+
 /// Of the cells wanted.
 void SheetRefinement::decide(std::uint32_t own) {
   const Block& block = blocks_[own];
   Findings& findings = findings_[own];
+  const std::uint64_t wanted = std::exchange(findings.wanted, 0);
+  findings.decided |= wanted;
+  if (shared_around(block) != 0) return;
   Around around{};
   around.fill(kNone);
   around[13] = own;
   Directions shared = findings.shared;
   for (int k = 0; k < 27; ++k) {
     const Cell at = block.at + Cell{k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1};
-    const std::uint32_t index = k == 13 ? kNone : slots_[slot_of(at, block.level)].index;
+    const std::uint32_t index = k == 13 ? kNone : block_table_.find(at, block.level);
     if (index == kNone) continue;
     around[static_cast<std::size_t>(k)] = index;
     shared &= findings_[index].shared;
   }
-  if (shared == 0) findings.finer |= cancelling(findings.wanted, around);
-  findings.decided |= findings.wanted;
-  findings.wanted = 0;
+  if (shared == 0) findings.finer |= cancelling(wanted, around);
 }
 
 /// Those of a block's cells around which normals cancel.

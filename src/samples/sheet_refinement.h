@@ -8,6 +8,7 @@
 
 #include "base/floor_divide.h"
 #include "lattice/lattice.h"
+#include "samples/cell_table.h"
 #include "store/slab_store.h"
 
 namespace lamina {
@@ -33,7 +34,7 @@ class SheetRefinement {
   bool pop(std::int64_t pushed_below, std::vector<bool>& finer);
 
  private:
-  static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
+  static constexpr std::uint32_t kNone = CellTable::kNone;
   /// The samples in a cell. Sums of integers do not depend on their order; of more than 2^22 samples they wrap, and say
   /// nothing.
   struct CellNormals {
@@ -49,7 +50,11 @@ class SheetRefinement {
   }
   /// Directions that a normal lies near, a bit each. Normals that share one do not cancel, whatever sums are made.
   using Directions = std::uint16_t;
+  static constexpr auto kAllDirections = static_cast<Directions>(~0U);
   static Directions directions_near(float x, float y, float z);
+  /// Blocks along a side of a district: where the normals of the districts around a block share a direction, as they do
+  /// nearly everywhere, they need not be looked at block by block.
+  static constexpr int kDistrictBits = 2;
   /// Cells of a level.
   struct Block {
     Cell at;  ///< coordinates of its cells, divided by kSide
@@ -59,32 +64,27 @@ class SheetRefinement {
   /// What is known of a block's cells, a bit each.
   struct Findings {
     std::uint64_t wanted = 0, decided = 0, finer = 0;
-    Directions shared = static_cast<Directions>(~0U);  ///< all normals in the block lie near these
+    Directions shared = kAllDirections;  ///< all normals in the block lie near these
+    std::uint32_t district = kNone;
   };
   struct WaitingBucket {
     std::vector<std::uint32_t> cell_of;  ///< of each sample: index of its block * kCells + cell; kNone: does not count
     std::int64_t low = std::numeric_limits<std::int64_t>::max();   ///< least z of the samples that count
     std::int64_t high = std::numeric_limits<std::int64_t>::min();  ///< upper end of the cells around them
   };
-  /// A place of the table: keys lie in it, so that most look-ups read no block.
-  struct Slot {
-    Cell at;
-    std::uint32_t index = kNone;
-    std::uint8_t level = 0;
-  };
-  [[nodiscard]] std::size_t slot_of(const Cell& block, std::uint8_t level) const;  ///< where it is or would be
+  [[nodiscard]] bool is_needed(const Cell& at, int cells, std::uint8_t level) const;
   std::uint32_t touch(const Cell& block, std::uint8_t level);
-  void rehash();
+  [[nodiscard]] Directions shared_around(const Block& block) const;
   using Around = std::array<std::uint32_t, 27>;  ///< indices of blocks, kNone where there is none
   void decide(std::uint32_t own);
   [[nodiscard]] std::uint64_t cancelling(std::uint64_t wanted, const Around& around) const;
 
   Lattice lattice_;
-  std::vector<FloorDivider> to_cell_;                ///< by level
-  std::deque<Block> blocks_;                         ///< a block keeps its index until it is forgotten
-  std::vector<Findings> findings_;                   ///< by block: most of the work reads these alone
-  std::vector<std::uint32_t> free_;                  ///< indices of forgotten ones
-  std::vector<Slot> slots_ = std::vector<Slot>(64);  ///< a power of two, at most half full
+  std::vector<FloorDivider> to_cell_;  ///< by level
+  std::deque<Block> blocks_;           ///< a block keeps its index until it is forgotten
+  std::vector<Findings> findings_;     ///< by block: most of the work reads these alone
+  std::vector<Directions> districts_;  ///< what all normals in a district lie near
+  CellTable block_table_, district_table_;
   std::int64_t needed_from_ = std::numeric_limits<std::int64_t>::min();  ///< z of samples still to be judged
   std::deque<WaitingBucket> waiting_;
 };
