@@ -101,8 +101,8 @@ constexpr void for_neighbours(const F& f) {
   }
 }
 [[gnu::always_inline]] constexpr float neighbour_weight(int dx, int dy, int dz) {
-  const int m = (dx != 0) + (dy != 0) + (dz != 0);
-  return 1.0F / static_cast<float>(m * m);
+  constexpr std::array<float, 4> kWeights{0.0F, 1.0F, 1.0F / 4, 1.0F / 9};  // by m: a division would be slow
+  return kWeights[static_cast<std::size_t>((dx != 0) + (dy != 0) + (dz != 0))];
 }
 /// Of one corner (float) or of eight side by side (a vector); lengths in steps. Always inlined: an instance of its own
 /// would be one for all kinds of processor.

@@ -15,6 +15,16 @@ constexpr int kLeanBits = 10;
 constexpr float kLeanSteps = 511;
 constexpr std::uint32_t kLeanMask = (1U << kLeanBits) - 1;
 
+/// What the bits of a component stand for.
+constexpr auto kLeanOfBits = [] {
+  std::array<float, kLeanMask + 1> out{};
+  for (std::uint32_t bits = 0; bits <= kLeanMask; ++bits) {
+    const auto steps = static_cast<std::int32_t>(bits << (32 - kLeanBits)) >> (32 - kLeanBits);
+    out[bits] = static_cast<float>(steps) / kLeanSteps;
+  }
+  return out;
+}();
+
 float dot(const std::array<float, 3>& a, const float* b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
@@ -39,31 +49,23 @@ float packed_lean(const std::array<float, 3>& lean) {
 
 std::array<float, 3> unpacked_lean(float packed) {
   const auto bits = std::bit_cast<std::uint32_t>(packed);
-  // One division of four lanes instead of three.
-  typedef float Four __attribute__((vector_size(16)));  // NOLINT(modernize-use-using): attributes on typedefs
-  const auto steps = [bits](int k) {
-    return static_cast<float>(static_cast<std::int32_t>(bits << (32 - kLeanBits * (k + 1))) >> (32 - kLeanBits));
-  };
-  const Four lean = Four{steps(0), steps(1), steps(2), 0} / kLeanSteps;
-  return {lean[0], lean[1], lean[2]};
+  return {kLeanOfBits[bits & kLeanMask], kLeanOfBits[bits >> kLeanBits & kLeanMask],
+          kLeanOfBits[bits >> (2 * kLeanBits) & kLeanMask]};
 }
 
-float overhang(const Window& window, int level, const Cell& corner, const std::array<float, 3>& normal, float trim) {
-  const CornerBlock* const block = window.probe(level, block_of(corner));
-  const int here = offset_in_block(corner);
-  const int slab_layers = window.slab_layers(level);
-  const CornerValues& values = block->values[static_cast<std::size_t>(window.slab_in_leaf(level, here >> 6))];
+float overhang(const CornerBlock& block, int offset, int slab_layers, const std::array<float, 3>& normal, float trim) {
+  const CornerValues& values = block.values[static_cast<std::size_t>((offset >> 6) / slab_layers)];
   const float* own = nullptr;
-  if (block->seen.test(here) && values.count > 0) own = values.of(block->value_index(here, slab_layers));
+  if (block.seen.test(offset) && values.count > 0) own = values.of(block.value_index(offset, slab_layers));
   std::array<float, 3> sum{};
   float total = 0;
   if (own != nullptr) {
     sum = unpacked_lean(own[kLean]);
     total = 1;
     const float alone = across(sum, normal);
-    if (alone < kUpright * trim && block->trusted.test(here)) return alone;
+    if (alone < kUpright * trim && block.trusted.test(offset)) return alone;
   }
-  for_records_around(*block, here, &Projected::seen, slab_layers, [&](int dx, int dy, int dz, const float* v) {
+  for_records_around(block, offset, &Projected::seen, slab_layers, [&](int dx, int dy, int dz, const float* v) {
     if (dot(normal, v + kNormalX) < kSameSheet) return;
     std::array<float, 3> lean = unpacked_lean(v[kLean]);
     if (own == nullptr) {

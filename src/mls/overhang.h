@@ -7,7 +7,7 @@
 #pragma once
 #include <array>
 
-#include "octree/window.h"
+#include "octree/corner_block.h"
 
 namespace lamina {
 
@@ -26,8 +26,9 @@ float packed_lean(const std::array<float, 3>& lean);
 std::array<float, 3> unpacked_lean(float packed);
 
 /// The length, along the surface, of the mean lean of a corner and its neighbours on the same sheet (support radii); 1
-/// where there are none. `corner` is the finest level's that holds it, `normal` its own. The slabs around must be
-/// projected. That of a corner that is upright for a cut at `trim` is its own lean.
-float overhang(const Window& window, int level, const Cell& corner, const std::array<float, 3>& normal, float trim);
+/// where there are none. `block` and `offset`: the corner in the finest level that holds it, whose slabs have so many
+/// layers in a leaf; `normal`: its own. The slabs around must be projected. That of a corner that is upright for a cut
+/// at `trim` is its own lean.
+float overhang(const CornerBlock& block, int offset, int slab_layers, const std::array<float, 3>& normal, float trim);
 
 }  // namespace lamina
