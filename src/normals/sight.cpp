@@ -64,7 +64,9 @@ Sight look_from(const PatchNode& node, const Occupancy& around, const std::array
       way += free;
       ways += 1;
     }
-    (side > 0 ? sight.front : sight.back) = {static_cast<float>(open / looks), static_cast<float>(way / ways)};
+    View& view = side > 0 ? sight.front : sight.back;
+    view.open = static_cast<float>(open / looks);
+    view.way = static_cast<float>(way / ways);
   }
   return sight;
 }

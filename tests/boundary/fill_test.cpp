@@ -193,14 +193,14 @@ TEST(Fill, IsOccupiedByVerticesInItOnly) {
 /// A boundary loop on the saddle z = (x^2 - y^2) / 2, at `radius` from its middle and as noisy as is said.
 Loop saddle_loop(std::uint32_t n, double radius, double noise) {
   std::mt19937 random(7);
-  std::normal_distribution<> normal(0, noise);
+  std::normal_distribution<> normal;  // a deviation of 0 is none that it knows
   Loop loop = sphere_loop(n, 0.3, 0.1);
   for (std::uint32_t i = 0; i < n; ++i) {
-    const double a = kTurn * i / n, d = radius + 2 * normal(random);
+    const double a = kTurn * i / n, d = radius + 2 * noise * normal(random);
     const double x = d * std::cos(a), y = d * std::sin(a);
     const Eigen::Vector3d up = Eigen::Vector3d(-x, y, 1).normalized();
     BoundaryVertex& v = loop.vertices[i];
-    v.position = {x, y, (x * x - y * y) / 2 + normal(random)};
+    v.position = {x, y, (x * x - y * y) / 2 + noise * normal(random)};
     for (std::size_t k = 0; k < 3; ++k) v.normal[k] = static_cast<float>(up[static_cast<Eigen::Index>(k)]);
     loop.facing[i] = {up.x(), up.y(), up.z()};
   }
