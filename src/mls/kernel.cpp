@@ -19,18 +19,9 @@ void CornerField::clear(int begin, int end) {
   std::fill(any.begin() + begin * kRows, any.begin() + (end + 2) * kRows, 0);
 }
 
-void CornerField::put(int x, int y, int z, const TangentPlane<float>& plane) {
-  const int row = (z + 1) * kRows + y + 1;
-  if (any[row] == 0) {
-    for (auto* a : {&distance, &nx, &ny, &nz, &trusted}) std::fill_n(a->begin() + row * kRow, kRow, 0.0F);
-    any[row] = 1;
-  }
-  const int at = row * kRow + x + 1;
-  distance[at] = plane.distance;
-  nx[at] = plane.nx;
-  ny[at] = plane.ny;
-  nz[at] = plane.nz;
-  trusted[at] = 1.0F;
+void CornerField::begin_row(int row) {
+  for (auto* a : {&distance, &nx, &ny, &nz, &trusted}) std::fill_n(a->begin() + row * kRow, kRow, 0.0F);
+  any[row] = 1;
 }
 
 std::vector<Kernel> available_kernels() {

@@ -127,7 +127,19 @@ struct CornerField {
 
   /// Layers [begin - 1, end] have none.
   void clear(int begin, int end);
-  void put(int x, int y, int z, const TangentPlane<float>& plane);
+  void put(int x, int y, int z, const TangentPlane<float>& plane) {
+    const int row = (z + 1) * kRows + y + 1;
+    if (any[row] == 0) begin_row(row);
+    const int at = row * kRow + x + 1;
+    distance[at] = plane.distance;
+    nx[at] = plane.nx;
+    ny[at] = plane.ny;
+    nz[at] = plane.nz;
+    trusted[at] = 1.0F;
+  }
+
+ private:
+  void begin_row(int row);
 };
 
 /// What the trusted ones among 26 neighbours say about eight corners, a bit each.

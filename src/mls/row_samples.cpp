@@ -33,7 +33,6 @@ void RowSamples::select(const Lattice& lattice, const QueryLayers& layers, const
   const float z_middle = 0.5F * (z_first + z_last);
   const float z_half = 0.5F * (z_last - z_first) + margin;
 
-  found_.resize(found_.capacity());
   std::size_t n = 0;
   struct Strip {
     std::array<float, kStrip> x, y, z, support;
@@ -72,20 +71,22 @@ void RowSamples::select(const Lattice& lattice, const QueryLayers& layers, const
       }
     }
   }
-  found_.resize(n);
+  count_ = n;
 }
 
 void RowSamples::place(const Lattice& lattice, int level, std::span<const Run> runs, float band) {
   const float inv = 1.0F / static_cast<float>(lattice.cell_size(level));
   const std::size_t attributes = runs.empty() ? 0 : runs.front().from->attributes.size();
-  samples_.resize(found_.size(), attributes);
+  // Longer than that they may stay: what lies behind the ranges is not looked at.
+  if (samples_.x.size() < count_ || samples_.attributes.size() != attributes) samples_.resize(count_, attributes);
+  const std::span<const Found> found(found_.data(), count_);
   row_begin_.assign(kRows * kRows + 1, 0);
-  for (const Found& f : found_) ++row_begin_[static_cast<std::size_t>(f.row) + 1];
+  for (const Found& f : found) ++row_begin_[static_cast<std::size_t>(f.row) + 1];
   for (std::size_t r = 0; r < kRows * kRows; ++r) row_begin_[r + 1] += row_begin_[r];
   std::array<std::uint32_t, kRows * kRows> cursor{};
   std::copy_n(row_begin_.begin(), kRows * kRows, cursor.begin());
   max_support_ = 0;
-  for (const Found& f : found_) {
+  for (const Found& f : found) {
     const std::uint32_t to = cursor[static_cast<std::size_t>(f.row)]++;
     const ClusteredBucket& from = *runs[f.run].from;
     samples_.x[to] = f.x;
@@ -101,7 +102,7 @@ void RowSamples::place(const Lattice& lattice, int level, std::span<const Run> r
     max_support_ = std::max(max_support_, f.support);
   }
   samples_.banded = false;
-  for (std::size_t k = 0; k < found_.size(); ++k) {
+  for (std::size_t k = 0; k < count_; ++k) {
     const float limit = band * samples_.inv_band2[k] * inv;
     samples_.inv_support2[k] = 1.0F / (samples_.support[k] * samples_.support[k]);
     samples_.inv_band2[k] = 1.0F / (limit * limit);

@@ -19,7 +19,9 @@ class RowSamples {
   /// Takes the samples that can reach a point of the block. `band`: ProjectSettings::band.
   void gather(const Lattice& lattice, const QueryLayers& layers, const Block& block, std::span<const Run> runs,
               float band);
+  /// The arrays may be longer than size().
   [[nodiscard]] const TileSamples& samples() const { return samples_; }
+  [[nodiscard]] std::size_t size() const { return count_; }
   /// Ranges of samples within the largest support of a box (cells relative to the tile); `out` has kRows entries.
   int ranges(float y_lo, float y_hi, float z_lo, float z_hi, SampleRange* out) const;
 
@@ -35,7 +37,8 @@ class RowSamples {
 
   TileSamples samples_;
   float max_support_ = 0;
-  std::vector<Found> found_;
+  std::vector<Found> found_;  ///< the first `count_` of them
+  std::size_t count_ = 0;
   std::vector<std::uint32_t> row_begin_;
 };
 

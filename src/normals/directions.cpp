@@ -164,7 +164,7 @@ class DirectionFinder {
     Moments m;
     m.count = 1;
     tree_.within(place, settings_.radius * settings_.radius,
-                 [&](Neighbour n) { m.add(tree_.offset(place, n.sample)); });
+                 [&](const Neighbour&, const std::array<float, 3>& offset) { m.add(offset); });
     const Plane wide = fit_plane(m);
     return is_line(wide) ? nearest : wide;
   }

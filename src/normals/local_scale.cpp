@@ -51,7 +51,7 @@ std::uint8_t choose_level(const SampleTree& tree, const FirstFit& first) {
     if (squared > first.bound) break;
     Moments m;
     m.count = 1;
-    tree.within(first.place, squared, [&](Neighbour n) { m.add(tree.offset(first.place, n.sample)); });
+    tree.within(first.place, squared, [&](const Neighbour&, const std::array<float, 3>& offset) { m.add(offset); });
     const Estimate next{fit_plane(m), 0};
     const Plane& last = estimates[level].plane;
     if (!next.plane.valid() || is_slim(next.plane, m.count)) break;
@@ -78,8 +78,9 @@ float reach_of_level(float first_squared, std::uint8_t level) {
 Plane plane_within(const SampleTree& tree, std::uint32_t place, float squared) {
   Moments m;
   m.count = 1;
-  tree.within(place, squared,
-              [&](Neighbour n) { m.add(tree.offset(place, n.sample), 1 - double{n.squared} / double{squared}); });
+  tree.within(place, squared, [&](const Neighbour& n, const std::array<float, 3>& offset) {
+    m.add(offset, 1 - double{n.squared} / double{squared});
+  });
   return fit_plane(m);
 }
 

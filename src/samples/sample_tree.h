@@ -45,8 +45,8 @@ class SampleTree {
   /// which counts[i] are filled.
   void nearest_to_leaf(std::size_t leaf, std::size_t k, float bound, Neighbour* found, std::size_t* counts) const;
 
-  /// Calls visit(neighbour) for every sample within the squared distance but the one at `place`, in the order of
-  /// places.
+  /// Calls visit(neighbour, offset) for every sample within the squared distance but the one at `place`, in the order
+  /// of places; `offset` is that of offset().
   template <class Visit>
   void within(std::uint32_t place, float squared, const Visit& visit) const {
     if (!order_.empty()) within(place, squared, visit, whole());
@@ -85,10 +85,20 @@ class SampleTree {
   template <class Visit>
   void within(std::uint32_t place, float squared, const Visit& visit, const Subtree& tree) const {
     if (tree.depth == depth_) {
-      for (std::size_t i = tree.begin; i < tree.end; ++i) {
-        const std::array<float, 3> d = offset(place, static_cast<std::uint32_t>(i));
-        const float d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-        if (d2 <= squared && i != place) visit(Neighbour{d2, static_cast<std::uint32_t>(i)});
+      // Distances of the whole leaf first: several at once.
+      const std::size_t n = tree.end - tree.begin;
+      std::array<std::array<float, kMostInLeaf>, 3> d;
+      std::array<float, kMostInLeaf> d2;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const std::int32_t* const at = at_[a].data() + tree.begin;
+        const std::int32_t from = at_[a][place];
+        for (std::size_t i = 0; i < n; ++i) d[a][i] = static_cast<float>(at[i] - from);
+      }
+      for (std::size_t i = 0; i < n; ++i) d2[i] = d[0][i] * d[0][i] + d[1][i] * d[1][i] + d[2][i] * d[2][i];
+      for (std::size_t i = 0; i < n; ++i) {
+        if (d2[i] > squared || tree.begin + i == place) continue;
+        visit(Neighbour{d2[i], static_cast<std::uint32_t>(tree.begin + i)},
+              std::array<float, 3>{d[0][i], d[1][i], d[2][i]});
       }
       return;
     }

@@ -123,7 +123,7 @@ void find_samples(benchmark::State& state, const Scene& scene, bool gather) {
           const TileRuns bins = bin_clusters(lattice, layers, batch, blocks);
           for (std::size_t t = 0; t < tiles.size(); ++t) {
             if (gather) rows.gather(lattice, layers, tiles[t].block, bins.of(t), ProjectSettings{}.band);
-            found += gather ? rows.samples().x.size() : bins.of(t).size();
+            found += gather ? rows.size() : bins.of(t).size();
           }
         }
       }

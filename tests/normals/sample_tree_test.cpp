@@ -97,7 +97,8 @@ TEST(SampleTree, FindsAllWithinADistance) {
     }
     std::sort(expected.begin(), expected.end());
     std::vector<std::uint32_t> found;
-    tree.within(place, squared, [&](Neighbour n) { found.push_back(n.sample); });
+    tree.within(place, squared,
+                [&](const Neighbour& n, const std::array<float, 3>& /*offset*/) { found.push_back(n.sample); });
     ASSERT_EQ(found, expected) << place;
   }
 }
