@@ -144,8 +144,8 @@ void CellLayer::search(Query& query, const Cell& cell, const Subtree& tree, cons
   if (tree.depth == 0) {
     query.bound = 0;
     for (std::size_t i = 0; i < query.count; ++i) {
-      query.own[i].take_places<kMostInLeaf>(at, tree.begin, tree.end);
-      query.bound = std::max(query.bound, query.own[i].bound);
+      query.own[i].take<kMostInLeaf>(at, tree.begin, tree.end);
+      query.bound = std::max(query.bound, query.own[i].bound());
     }
     return;
   }

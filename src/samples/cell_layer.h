@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "samples/median_split.h"
-#include "samples/nearest_list.h"
+#include "samples/nearest_few.h"
 
 namespace lamina {
 
@@ -64,7 +64,7 @@ class CellLayer {
 
   /// Samples close together, each with the nearest found so far, and the box around them.
   struct Query {
-    std::array<NearestList, kMostInLeaf> own;
+    std::array<NearestFew, kMostInLeaf> own;
     std::size_t count = 0;
     ItemBox box;
     float bound = 0;  ///< the largest of their own

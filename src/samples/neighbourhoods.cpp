@@ -142,8 +142,7 @@ const CellLayer* Neighbourhoods::cells_of(std::int64_t layer) const {
   return found == layers_.end() || found->second.places.size() == 0 ? nullptr : &found->second.cells;
 }
 
-void Neighbourhoods::find_nearest(std::span<const std::uint32_t> places, std::size_t k, Neighbour* found,
-                                  std::size_t* counts) const {
+void Neighbourhoods::find_nearest(std::span<const std::uint32_t> places, Nearest* found) const {
   CellLayer::Query query;
   query.count = places.size();
   query.bound = reach_ * reach_;
@@ -151,12 +150,7 @@ void Neighbourhoods::find_nearest(std::span<const std::uint32_t> places, std::si
   for (std::size_t i = 0; i < query.count; ++i) {
     const std::uint32_t place = places[i];
     items[i] = {{samples_.x[place], samples_.y[place], samples_.z[place]}, 0};
-    NearestList& own = query.own[i];
-    own.at = items[i].at;
-    own.place = place;
-    own.wanted = k;
-    own.bound = query.bound;
-    own.found = found + i * k;
+    query.own[i].start(items[i].at, place, query.bound);
   }
   query.box = ItemBox::around({items.data(), query.count});
   const std::int32_t x = cell_of_(items[0].at[0]);
@@ -168,7 +162,7 @@ void Neighbourhoods::find_nearest(std::span<const std::uint32_t> places, std::si
     if (layer == nullptr) continue;
     for (const std::int32_t dy : {0, -1, 1}) layer->search(query, x, y + dy, samples_.axes());
   }
-  for (std::size_t i = 0; i < query.count; ++i) counts[i] = query.own[i].count;
+  for (std::size_t i = 0; i < query.count; ++i) found[i].count = query.own[i].write(found[i].places);
 }
 
 std::size_t Neighbourhoods::count_within_twice(std::size_t place) const {

@@ -2,6 +2,7 @@
 #pragma once
 #include <tbb/enumerable_thread_specific.h>
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <map>
@@ -42,9 +43,14 @@ class Neighbourhoods {
     const auto by = static_cast<std::int64_t>(margin);
     return samples_.z[place] >= first_ * side_ - by && samples_.z[place] < end_ * side_ + by;
   }
-  /// For places of one leaf the `k` nearest others within reach, nearest first, equally near ones by place: `found`
-  /// gets k entries for each, of which counts[i] are filled. Of the first and the last layers not all are there.
-  void find_nearest(std::span<const std::uint32_t> places, std::size_t k, Neighbour* found, std::size_t* counts) const;
+  /// For places of one leaf the nearest others within reach, kNeighbours at most, nearest first, equally near ones by
+  /// place. Of the first and the last layers not all are there.
+  static constexpr std::size_t kNeighbours = NearestFew::kFew;
+  struct Nearest {
+    std::array<std::uint32_t, kNeighbours> places;
+    std::size_t count = 0;
+  };
+  void find_nearest(std::span<const std::uint32_t> places, Nearest* found) const;
   /// How many others lie within twice the reach.
   [[nodiscard]] std::size_t count_within_twice(std::size_t place) const;
 

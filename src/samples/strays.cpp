@@ -22,7 +22,7 @@ constexpr std::uint64_t kSurveyed = 1u << 16;  ///< samples the spacing is taken
 /// How far neighbours are looked for, in median density radii (two spacings each).
 constexpr double kStrayReach = 6;
 /// Neighbours looked for, so that enough are left when some of them are strays.
-constexpr std::size_t kLookedAt = 16;
+constexpr std::size_t kLookedAt = Neighbourhoods::kNeighbours;
 /// Most samples are on a surface beyond doubt, and a dozen of them together tell so without a search: their mean normal
 /// is so long, each lies within this cosine of it, none is farther from their middle than so many times (squared) the
 /// usual, and none farther from their plane than this share (squared) of it.
@@ -253,14 +253,12 @@ void Search::search_leaf(const SampleLeaf& leaf) {
     if (out_.look[p] == kWanted) places[n++] = static_cast<std::uint32_t>(p);
   }
   if (n == 0) return;
-  std::array<Neighbour, Neighbourhoods::kMostInLeaf * kLookedAt> found;
-  std::array<std::size_t, Neighbourhoods::kMostInLeaf> counts;
-  around_.find_nearest({places.data(), n}, kLookedAt, found.data(), counts.data());
+  std::array<Neighbourhoods::Nearest, Neighbourhoods::kMostInLeaf> found;
+  around_.find_nearest({places.data(), n}, found.data());
   for (std::size_t i = 0; i < n; ++i) {
     const std::uint32_t p = places[i];
-    out_.count[p] = static_cast<std::uint8_t>(counts[i]);
-    std::uint32_t* const to = &out_.neighbours[std::size_t{out_.row[p]} * kLookedAt];
-    for (std::size_t k = 0; k < counts[i]; ++k) to[k] = found[i * kLookedAt + k].sample;
+    out_.count[p] = static_cast<std::uint8_t>(found[i].count);
+    std::copy_n(found[i].places.begin(), found[i].count, &out_.neighbours[std::size_t{out_.row[p]} * kLookedAt]);
     out_.look[p] = kDone;
   }
 }

@@ -36,7 +36,8 @@ void all_doubtful(const Placed& /*samples*/, const SampleLeaf& leaf, std::uint8_
   std::fill_n(doubtful, leaf.size(), std::uint8_t{1});
 }
 
-float squared_between(const LocalSamples& s, std::size_t a, const Placed& p, std::size_t place) {
+template <typename Samples>
+float squared_between(const Samples& s, std::size_t a, const Placed& p, std::size_t place) {
   const auto dx = static_cast<float>(s.x[a] - p.x[place]);
   const auto dy = static_cast<float>(s.y[a] - p.y[place]);
   const auto dz = static_cast<float>(s.z[a] - p.z[place]);
@@ -57,7 +58,6 @@ class Neighbours : public testing::TestWithParam<std::int32_t> {};
 /// Whatever the buckets' height: every sample is a slab's own once, and its neighbours are those of any search.
 TEST_P(Neighbours, AreTheNearestOfAll) {
   constexpr float kReach = 9'000;
-  constexpr std::size_t kWanted = 8;
   const LocalSamples s = uneven_cloud();
   const SlabStore store = make_store(s, GetParam());
   KeepMasks masks(store.buckets());
@@ -73,17 +73,17 @@ TEST_P(Neighbours, AreTheNearestOfAll) {
         EXPECT_TRUE(around.is_doubtful(p));
       }
       own += places.size();
-      std::vector<Neighbour> found(kWanted * places.size());
-      std::vector<std::size_t> counts(places.size());
-      if (!places.empty()) around.find_nearest(places, kWanted, found.data(), counts.data());
+      std::vector<Neighbourhoods::Nearest> found(places.size());
+      if (!places.empty()) around.find_nearest(places, found.data());
       for (std::size_t i = 0; i < places.size(); ++i) {
         const std::vector<float> truth = distances(s, around.samples(), places[i]);
         const auto within = [&](float reach) {
           return static_cast<std::size_t>(std::upper_bound(truth.begin(), truth.end(), reach * reach) - truth.begin());
         };
-        ASSERT_EQ(counts[i], std::min(kWanted, within(kReach)));
-        for (std::size_t k = 0; k < counts[i]; ++k) ASSERT_EQ(found[i * kWanted + k].squared, truth[k]);
-        if (counts[i] == kWanted) continue;
+        ASSERT_EQ(found[i].count, std::min(Neighbourhoods::kNeighbours, within(kReach)));
+        for (std::size_t k = 0; k < found[i].count; ++k)
+          ASSERT_EQ(squared_between(around.samples(), found[i].places[k], around.samples(), places[i]), truth[k]);
+        if (found[i].count == Neighbourhoods::kNeighbours) continue;
         ++few;
         ASSERT_EQ(around.count_within_twice(places[i]), within(2 * kReach));
       }
