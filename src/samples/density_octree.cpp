@@ -1,13 +1,14 @@
 #include "samples/density_octree.h"
 
-#include <tbb/parallel_sort.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <span>
+#include <vector>
+
+#include "samples/block_order.h"
 
 namespace lamina {
 namespace {
@@ -41,14 +42,17 @@ class DensityOctree {
     const auto relative = [&](std::int32_t z) { return static_cast<double>(z) - static_cast<double>(origin_[2]); };
     bottom_ = cut.below ? 0 : -infinity;
     top_ = cut.above ? relative(*std::max_element(points.z.begin(), points.z.end())) + 1 : infinity;
-    keys_.resize(points.size());
-    for (std::size_t i = 0; i < keys_.size(); ++i) {
+    std::vector<Keyed> order(points.size());
+    for (std::size_t i = 0; i < order.size(); ++i) {
+      order[i] = {0, static_cast<std::uint32_t>(i)};
       for (std::size_t axis = 0; axis < 3; ++axis) {
         const std::int64_t offset = static_cast<std::int64_t>((*arrays[axis])[i]) - origin_[axis];
-        keys_[i] |= spread_bits(static_cast<std::uint64_t>(offset) >> shift_) << axis;
+        order[i].key |= spread_bits(static_cast<std::uint64_t>(offset) >> shift_) << axis;
       }
     }
-    tbb::parallel_sort(keys_.begin(), keys_.end());
+    std::vector<Keyed> scratch;
+    digit_sort(order, scratch, (std::uint64_t{1} << (3 * kKeyBits)) - 1, [](const Keyed& k) { return k.key; });
+    take_distinct(points, order);
   }
 
   /// Radii of all samples.
@@ -57,6 +61,33 @@ class DensityOctree {
   }
 
  private:
+  struct Keyed {
+    std::uint64_t key;
+    std::uint32_t sample;
+  };
+
+  /// Keys of the samples in order. Samples at the place of another say nothing of the spacing: half a cloud at one
+  /// place would hide the other half's.
+  void take_distinct(const LocalSamples& points, const std::vector<Keyed>& order) {
+    keys_.reserve(order.size());
+    std::vector<std::array<std::int32_t, 3>> places;  // of one key
+    for (std::size_t begin = 0; begin < order.size();) {
+      std::size_t end = begin + 1;
+      while (end < order.size() && order[end].key == order[begin].key) ++end;
+      std::size_t distinct = 1;
+      if (end - begin > 1) {
+        places.clear();
+        for (std::size_t k = begin; k < end; ++k) {
+          const std::uint32_t i = order[k].sample;
+          places.push_back({points.x[i], points.y[i], points.z[i]});
+        }
+        std::sort(places.begin(), places.end());
+        distinct = static_cast<std::size_t>(std::unique(places.begin(), places.end()) - places.begin());
+      }
+      keys_.insert(keys_.end(), distinct, order[begin].key);
+      begin = end;
+    }
+  }
   /// A cell of side 2^height (in shifted steps) with the keys in it.
   void visit(std::span<const std::uint64_t> cell, int height, std::vector<WeightedRadius>& out) const {
     std::uint64_t unrefined = cell.size();
@@ -95,20 +126,6 @@ class DensityOctree {
   std::vector<std::uint64_t> keys_;
 };
 
-/// Samples at the place of another say nothing of the spacing: half a cloud at one place would hide the other half's.
-void drop_coincident(LocalSamples& s) {
-  std::vector<std::array<std::int32_t, 3>> places(s.size());
-  for (std::size_t i = 0; i < places.size(); ++i) places[i] = {s.x[i], s.y[i], s.z[i]};
-  tbb::parallel_sort(places.begin(), places.end());
-  places.erase(std::unique(places.begin(), places.end()), places.end());
-  for (auto* axis : {&s.x, &s.y, &s.z}) axis->resize(places.size());
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    s.x[i] = places[i][0];
-    s.y[i] = places[i][1];
-    s.z[i] = places[i][2];
-  }
-}
-
 }  // namespace
 
 std::uint64_t samples_of(const std::vector<WeightedRadius>& radii) {
@@ -125,12 +142,9 @@ float quantile(const std::vector<WeightedRadius>& sorted, std::uint64_t total, d
   return sorted.back().radius;
 }
 
-std::vector<WeightedRadius> density_radii(LocalSamples samples, CutEnds cut, std::uint32_t min_samples) {
+std::vector<WeightedRadius> density_radii(const LocalSamples& samples, CutEnds cut, std::uint32_t min_samples) {
   std::vector<WeightedRadius> radii;
-  if (samples.size() > 0) {
-    drop_coincident(samples);
-    DensityOctree(samples, cut, min_samples).find_radii(radii);
-  }
+  if (samples.size() > 0) DensityOctree(samples, cut, min_samples).find_radii(radii);
   std::sort(radii.begin(), radii.end(), [](auto& a, auto& b) { return a.radius < b.radius; });
   return radii;
 }

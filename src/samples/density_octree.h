@@ -20,7 +20,7 @@ struct CutEnds {
 
 /// Radii (steps) of the samples, shortest first: 2 sqrt(A / N) of the smallest cells that hold `min_samples`, without
 /// bounds by neighbours. Samples at the place of another count once. Only positions are looked at.
-std::vector<WeightedRadius> density_radii(LocalSamples samples, CutEnds cut, std::uint32_t min_samples);
+std::vector<WeightedRadius> density_radii(const LocalSamples& samples, CutEnds cut, std::uint32_t min_samples);
 
 std::uint64_t samples_of(const std::vector<WeightedRadius>& radii);
 /// The radius below which a share of `total` samples lies; `sorted` is not empty.
