@@ -10,7 +10,8 @@ MILLION = 1_000_000
 # A cloud is made once by `lamina scatter` and kept in the work folder under its name.
 Cloud = collections.namedtuple("Cloud", "shape count colour")
 # One measured run; cases of several groups that are the same run are measured once.
-Case = collections.namedtuple("Case", "group name cloud options threads")
+# `raw`: with --raw, which chooses nothing, so that a case differs from the others by its options alone.
+Case = collections.namedtuple("Case", "group name cloud options threads raw")
 
 DRAGON = "dragon_vrip.ply.gz"
 
@@ -26,9 +27,11 @@ def cases(size, threads, large, data):
     scan = "dragon" if os.path.exists(os.path.join(data, DRAGON)) else "statue"
     out = []
 
-    def add(group, name, where, *options, on=threads):
-        out.append(Case(group, name, where, options, on))
+    def add(group, name, where, *options, on=threads, raw=True):
+        out.append(Case(group, name, where, options, on, raw))
 
+    for millions in (1, 4):
+        add("default", f"{scan} {millions} M, no option", cloud(scan, millions), raw=False)
     for millions in (1, 4):
         add("model", f"{scan} {millions} M", cloud(scan, millions))
     for millions in (1, 4, 16) + ((100,) if large else ()):
