@@ -150,7 +150,7 @@ TEST(TileSamples, HoldWhatReachesTheTile) {
         }
         rows.gather(lattice, layers, b, bins.of(t), 1.75F);
         std::multiset<Name> in;
-        for (std::size_t k = 0; k < rows.samples().x.size(); ++k) in.insert(name_of(rows.samples().attributes, k));
+        for (std::size_t k = 0; k < rows.size(); ++k) in.insert(name_of(rows.samples().attributes, k));
         held += in.size();
         const double cell = lattice.cell_size(level);
         const double shift = static_cast<double>(layers.shift);
@@ -225,10 +225,10 @@ TEST(TileSamples, RowsHoldSamplesInCells) {
     RowSamples rows;
     rows.gather(lattice, layers, block, runs, 1.75F);
     const TileSamples& t = rows.samples();
-    ASSERT_GT(t.x.size(), 20U);
+    ASSERT_GT(rows.size(), 20U);
     const double a = lattice.cell_size(level);
     double largest = 0;
-    for (std::size_t k = 0; k < t.x.size(); ++k) {
+    for (std::size_t k = 0; k < rows.size(); ++k) {
       const auto& [bucket, i] = places.at(name_of(t.attributes, k));
       const double support = static_cast<double>(bucket->support[i]) / a;
       const double band = 1.75 * lattice.cell_size(bucket->level[i]) / a;
