@@ -2,7 +2,6 @@
 // beside edit/point_tree.h, which asks for the one nearest of any positions: here every sample asks for its k nearest,
 // so leaves hold a dozen samples side by side and distances are sums of floats.
 #pragma once
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -32,19 +31,6 @@ class SampleTree {
   /// than the squared distance `bound`; nearest first, equally near ones by place. Returns how many there are.
   std::size_t nearest(std::uint32_t place, std::size_t k, float bound, Neighbour* found) const;
 
-  /// Leaves are numbered in the order of their places; none is empty unless the tree is.
-  [[nodiscard]] std::size_t leaves() const { return order_.empty() ? 0 : std::size_t{1} << depth_; }
-  /// Places [begin, end).
-  struct Places {
-    std::size_t begin = 0, end = 0;
-    [[nodiscard]] std::size_t size() const { return end - begin; }
-  };
-  [[nodiscard]] Places places_of(std::size_t leaf) const;
-  static constexpr std::size_t kMostInLeaf = 26;
-  /// nearest() for all samples of a leaf at once, which takes a third of the time: `found` gets k places for each, of
-  /// which counts[i] are filled.
-  void nearest_to_leaf(std::size_t leaf, std::size_t k, float bound, Neighbour* found, std::size_t* counts) const;
-
   /// Calls visit(neighbour, offset) for every sample within the squared distance but the one at `place`, in the order
   /// of places; `offset` is that of offset().
   template <class Visit>
@@ -66,7 +52,7 @@ class SampleTree {
     int axis = 0;
   };
   struct Query;
-  struct LeafQuery;
+  static constexpr std::size_t kMostInLeaf = 26;
 
   /// What lies below a node: places [begin, end).
   struct Subtree {
@@ -80,7 +66,6 @@ class SampleTree {
 
   void build(std::span<TreeItem> items, const Subtree& tree);
   void search(Query& q, const Subtree& tree, float squared) const;
-  void search(LeafQuery& q, const Subtree& tree, float squared) const;
 
   template <class Visit>
   void within(std::uint32_t place, float squared, const Visit& visit, const Subtree& tree) const {
