@@ -25,6 +25,7 @@ if(LAMINA_SANITIZE)
   if(LAMINA_SANITIZE MATCHES thread)
     # TBB's library is not instrumented: its orders are told to the sanitizer.
     target_compile_options(lamina_flags INTERFACE -include ${PROJECT_SOURCE_DIR}/tests/tsan/annotated_tbb.h)
+    target_link_options(lamina_flags INTERFACE -Wl,--version-script=${PROJECT_SOURCE_DIR}/tests/tsan/exports)
   endif()
 endif()
 
