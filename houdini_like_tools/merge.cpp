@@ -11,6 +11,7 @@
 #include "common/console.h"
 #include "common/help.h"
 #include "common/inputs.h"
+#include "common/option_values.h"
 #include "common/outputs.h"
 #include "common/text.h"
 #include "lamina/chunk.h"
@@ -94,19 +95,25 @@ void merge_grids(const MergeOptions& o, const std::vector<PointInput>& inputs, c
 
 void merge_chunks(const MergeOptions& o, const RunContext& context) {
   std::for_each(o.outputs.begin(), o.outputs.end(), require_mesh_name);
-  const MergedParts merged = merge_parts(o.inputs, o.outputs, context,
-                                         o.simplify.given() ? simplify_settings(o.simplify) : SimplifySettings{});
+  std::optional<SimplifySettings> simplify;
+  if (o.simplify.deviation == 0.0) {
+    simplify.emplace();
+  } else if (o.simplify.given()) {
+    simplify = simplify_settings(o.simplify);
+  }
+  const MergedParts merged = merge_parts(o.inputs, o.outputs, context, simplify);
   context.info(fmt::format("{} vertices, {} triangles of {} parts", count_text(merged.vertices),
                            count_text(merged.triangles), merged.parts));
   context.info(describe(merged.holes));
-  if (o.simplify.given()) report_simplified(merged.simplified, shown_name(o.output), context);
+  if (merged.simplified.triangles_before > 0) report_simplified(merged.simplified, shown_name(o.output), context);
 }
 
 void run_merge(const MergeOptions& o) {
   const RunContext context = make_context(o.run, o.output);
   if (std::any_of(o.inputs.begin(), o.inputs.end(), is_part)) return merge_chunks(o, context);
   if (o.simplify.given())
-    throw Error(ExitCode::usage, "--error, --triangles and --ratio are for the parts of a mesh; see 'lamina simplify'");
+    throw Error(ExitCode::usage,
+                "--error, --triangles, --ratio and --deviation are for the parts of a mesh; see 'lamina simplify'");
   if (o.outputs.size() > 1)
     throw Error(ExitCode::usage, "several --output are for the parts of a mesh; name one, and convert it");
   const auto word = [](FileContent content) {
@@ -168,6 +175,13 @@ void add_merge(CLI::App& app) {
   add_bad_samples(*tool, o->bad, "Points and vertices");
   add_precision(*tool, o->precision);
   add_simplify_goal(*tool, o->simplify, "Parts of a mesh");
+  auto* deviation = add_number_or_auto(*tool, "--deviation", "auto",
+                                       "Leave out triangles where the surface is flat, as lamina surface does; 0: all "
+                                       "triangles stay; auto: as the parts "
+                                       "say",
+                                       [o](const std::optional<double>& number) { o->simplify.deviation = number; });
+  deviation->option_text("K|auto [auto]")->group("Parts of a mesh");
+  for (const char* other : {"--error", "--triangles", "--ratio"}) deviation->excludes(tool->get_option(other));
   add_run_options(*tool, o->run);
   add_notes(
       *tool,

@@ -68,14 +68,17 @@ void run_simplify(const SimplifyOptions& o) {
 }  // namespace
 
 SimplifySettings simplify_settings(const SimplifyGoal& goal) {
-  if (!goal.given()) throw Error(ExitCode::usage, "one of --error, --triangles and --ratio says how far to simplify");
+  if (!goal.given())
+    throw Error(ExitCode::usage, "one of --error, --triangles and --ratio, or --deviation, says how far to simplify");
   if (goal.error && !(*goal.error > 0 && std::isfinite(*goal.error)))
     throw Error(ExitCode::usage, fmt::format("--error {:g}: is a length above 0", *goal.error));
   if (goal.ratio && !(*goal.ratio > 0 && *goal.ratio <= 1))
     throw Error(ExitCode::usage, fmt::format("--ratio {:g}: is a share above 0 and up to 1", *goal.ratio));
   if (goal.triangles && *goal.triangles == 0)
     throw Error(ExitCode::usage, "--triangles 0: at least one triangle has to stay");
-  return {goal.triangles.value_or(0), goal.error.value_or(0), goal.ratio.value_or(0)};
+  if (goal.deviation && !(*goal.deviation > 0 && *goal.deviation <= 1))
+    throw Error(ExitCode::usage, fmt::format("--deviation {:g}: is above 0 and up to 1", *goal.deviation));
+  return {goal.triangles.value_or(0), goal.error.value_or(0), goal.ratio.value_or(0), goal.deviation.value_or(0)};
 }
 
 void report_simplified(const SimplifyStats& stats, const std::string& name, const RunContext& context) {
@@ -122,6 +125,11 @@ void add_simplify(CLI::App& app) {
       ->allow_extra_args(false)
       ->group("Output");
   add_simplify_goal(*tool, o->goal, "Goal");
+  auto* deviation = tool->add_option("--deviation", o->goal.deviation,
+                                     "Triangles go where the surface is flat: within K lengths of an edge there, root "
+                                     "mean square, up to 1; 0.01 to 0.05 are no loss for most meshes. Boundaries stay");
+  deviation->type_name("K")->group("Goal");
+  for (const char* other : {"--error", "--triangles", "--ratio"}) deviation->excludes(tool->get_option(other));
   add_bad_samples(*tool, o->bad, "Vertices");
   add_run_options(*tool, o->run);
   add_notes(

@@ -163,7 +163,8 @@ void run_surface(SurfaceOptions& o) {
                              static_cast<double>(stats.samples_read) / stats.cpu * 1e-6,
                              static_cast<double>(stats.peak_memory) * 1e-6));
     if (!parts.chunk) context.info(describe(stats.holes));
-    if (settings.simplify.wanted() && !parts.chunk) report_simplified(stats.simplified, settings.input, context);
+    if (stats.simplified.triangles_before > 0 && !parts.chunk)
+      report_simplified(stats.simplified, settings.input, context);
     const VolumeExportStats& v = stats.volume;
     if (v.voxel > 0) context.info(fmt::format("{} voxels of {:.4g}", count_text(v.voxels), v.voxel));
     if (v.files.size() == 1) context.info(fmt::format("{}: {}", v.files[0], bytes_text(v.bytes)));
@@ -299,7 +300,17 @@ void add_surface_options(CLI::App& tool, SurfaceOptions& o) {
                 "shift and the .vdb's metadata shift name it")
       ->group(mesh);
 
-  add_simplify_goal(tool, o.simplify, "Simplification");
+  const std::string simplification = "Simplification";
+  add_simplify_goal(tool, o.simplify, simplification);
+  auto* deviation = add_number_or_auto(
+      tool, "--deviation", "0",
+      "Leave out triangles where the surface is flat: within K lengths of an edge there, root mean square; boundaries "
+      "stay, and so does detail of colours and other attributes; 0: all triangles stay; auto: by the cloud's noise, "
+      "0.01 "
+      "to 0.05",
+      [&s](const std::optional<double>& number) { s.deviation = number; });
+  deviation->option_text("K|auto [0]")->group(simplification);
+  for (const char* other : {"--error", "--triangles", "--ratio"}) deviation->excludes(tool.get_option(other));
   add_volume_options(tool, s.volume);
   const std::string tiles = "Tiles";
   tool.add_option("--tiles", s.tiles.folder,

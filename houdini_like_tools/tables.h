@@ -25,10 +25,10 @@ namespace lamina::tools {
 /// How far a mesh is to be simplified: one of these.
 struct SimplifyGoal {
   std::optional<std::uint64_t> triangles;
-  std::optional<double> ratio, error;
-  [[nodiscard]] bool given() const { return triangles || ratio || error; }
+  std::optional<double> ratio, error, deviation;
+  [[nodiscard]] bool given() const { return triangles || ratio || error || deviation; }
 };
-/// --error, --triangles, --ratio.
+/// --error, --triangles, --ratio; --deviation is the tool's own affair, and excludes these.
 void add_simplify_goal(CLI::App& tool, SimplifyGoal& goal, const std::string& group);
 /// Throws Error(usage) where none is given, or out of range.
 SimplifySettings simplify_settings(const SimplifyGoal& goal);

@@ -114,6 +114,7 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
   j["watertight"] = s.plan.watertight;
   j["trim"] = s.plan.trim;
   j["features"] = s.plan.features;
+  j["deviation"] = s.plan.deviation;
   j["blurred_normals"] = s.plan.blurred_normals;
   j["close_holes"] = s.plan.longest_rim;
   j["finest_cell"] = s.plan.finest_cell;
@@ -165,7 +166,7 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
                    {"kept_isovertices", s.clusters.kept_isovertices},
                    {"resolved", s.clusters.resolved}};
   j["holes"] = holes_json(s.holes);
-  if (settings.simplify.wanted()) {
+  if (s.simplified.triangles_before > 0) {
     j["simplified"] = {{"triangles_before", s.simplified.triangles_before},
                        {"triangles_after", s.simplified.triangles_after},
                        {"reached", s.simplified.reached},

@@ -15,7 +15,11 @@ struct SimplifySettings {
   std::uint64_t triangles = 0;  ///< how many are wanted, >= 1
   double error = 0;             ///< how far it may get from what it was, > 0, in mesh units
   double ratio = 0;             ///< of the triangles that stay, > 0 and up to 1
-  [[nodiscard]] bool wanted() const { return triangles > 0 || error != 0 || ratio != 0; }
+  /// > 0 and at most 1: triangles go where the surface is flat, that is, where the root mean square distance of the new
+  /// vertex from the planes of those it stands for is no more than so many lengths of an edge there. Boundaries stay as
+  /// they are, and no attribute changes by more than a quarter of its standard deviation.
+  double deviation = 0;
+  [[nodiscard]] bool wanted() const { return triangles > 0 || error != 0 || ratio != 0 || deviation != 0; }
 };
 
 struct SimplifyStats {
@@ -23,7 +27,7 @@ struct SimplifyStats {
   std::uint64_t vertices_after = 0;
   std::uint64_t contractions = 0;
   bool reached = false;  ///< no more triangles than wanted; else no contraction was left that keeps shape and topology.
-                         ///< With `error`: true
+                         ///< With `error` and `deviation`: true
   double deviation = 0;  ///< largest root mean square distance of a new vertex from the planes it stands for
 };
 

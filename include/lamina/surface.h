@@ -112,8 +112,11 @@ struct SurfaceSettings {
   /// stores, which were cleaned when they were made.
   std::string rejected;
   SimplifySettings simplify;  ///< how far the finished mesh is simplified, before it appears; nothing: it is not
-  VolumeExport volume;        ///< grids to write beside the mesh
-  TileSettings tiles;         ///< 3D Tiles to write beside the mesh; their coordinate system is the input's
+  /// Where `simplify` says nothing: SimplifySettings::deviation, 0 to 1; 0: all triangles stay. Unset: by the noise of
+  /// the cloud.
+  std::optional<double> deviation = 0;
+  VolumeExport volume;  ///< grids to write beside the mesh
+  TileSettings tiles;   ///< 3D Tiles to write beside the mesh; their coordinate system is the input's
 };
 
 /// What the settings mean for this cloud. Lengths in the input's units.
@@ -135,6 +138,7 @@ struct SurfacePlan {
   bool watertight = false;     ///< as given or chosen
   double trim = 0;             ///< R, as given or chosen
   bool features = false;       ///< as given or chosen
+  double deviation = 0;        ///< as given or chosen
   bool sharpen = false;        ///< blurred normals are found again
   double longest_rim = 0;      ///< R, of boundary loops to be closed: close_holes as given or chosen
   double finest_cell = 0;

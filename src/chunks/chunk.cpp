@@ -51,7 +51,8 @@ ChunkStats run_chunk(const SurfaceSettings& settings, const Chunk& chunk, Job& j
   stats.slabs = span.size();
   stats.all_slabs = plan.slabs.size();
   PartSlabs parts({{chunk.number, span, settings.output}}, chunk.count,
-                  job_hash(settings, kept_input_id(settings.input), plan), plan.holes, mesh_layout(plan));
+                  job_hash(settings, kept_input_id(settings.input), plan), plan.holes, plan.simplify.deviation,
+                  mesh_layout(plan));
   if (!span.empty()) {
     stats.overlap_slabs = plan.stages_of(span).of(Stage::project).size() - stats.slabs;
     stats.samples = samples_in(plan, store, span);

@@ -142,7 +142,7 @@ std::vector<std::byte> encode_addition(const std::vector<std::array<std::uint32_
 }
 
 MergedParts merge_parts(const std::vector<std::string>& paths, const std::vector<std::string>& outputs,
-                        const RunContext& run, const SimplifySettings& simplify) {
+                        const RunContext& run, const std::optional<SimplifySettings>& wanted) {
   const std::string& output = outputs.at(0);
   const std::vector<PartReader> parts = open_parts(paths);
   MergedParts merged;
@@ -168,6 +168,7 @@ MergedParts merge_parts(const std::vector<std::string>& paths, const std::vector
   layout.more_paths.assign(outputs.begin() + 1, outputs.end());
   layout.tmp_dir = run.tmp_dir;
   require_outputs(layout);
+  const SimplifySettings simplify = wanted ? *wanted : SimplifySettings{.deviation = parts.front().info().deviation};
   if (simplify.wanted()) simplify::require_goal(simplify);
   OutputFile file(simplify.wanted() ? simplify::unsimplified_path(layout) : staging_path(layout), run.tmp_dir);
   const std::uint64_t own_vertices = merged.vertices;

@@ -67,6 +67,7 @@ nlohmann::json to_json(const PartInfo& info) {
           {"watertight", static_cast<int>(info.holes.watertight)},
           {"mark_filled", info.holes.mark},
           {"fill_all", info.holes.all},
+          {"deviation", info.deviation},
           {"vertices", info.vertices},
           {"triangles", info.triangles},
           {"below", to_json(info.below)},
@@ -88,6 +89,7 @@ PartInfo info_from(const nlohmann::json& j) {
   info.comments = j.at("comments").get<std::vector<std::string>>();
   info.holes = {j.at("close_holes").get<double>(), static_cast<Watertight>(j.at("watertight").get<int>()),
                 j.at("mark_filled").get<bool>(), j.at("fill_all").get<bool>()};
+  info.deviation = j.at("deviation").get<double>();
   info.vertices = j.at("vertices").get<std::uint64_t>();
   info.triangles = j.at("triangles").get<std::uint64_t>();
   info.below = mark_from(j.at("below"));

@@ -31,6 +31,7 @@ struct PartInfo {
   AttributeLayout attributes;
   std::vector<std::string> comments;
   HoleSettings holes;
+  double deviation = 0;  ///< SimplifySettings::deviation of the mesh that the parts make
   std::uint64_t vertices = 0, triangles = 0;
   SlabMark below;  ///< the slab before the first, as this part's run has it
   SlabMark last;   ///< the last slab

@@ -16,7 +16,7 @@ std::string mesh_settings(const SurfaceSettings& settings) {
                normal_search, guess_trade, radius_scale, density, clean, max_radius, blend, refit, steps,
                step_tolerance, fit, diffuse, cell, levels, boundary, cluster, chord, vertex_levels, vertex_curvature,
                vertex_filled, close_holes, watertight, fill_all, trim, features, prune_triangles, prune_size, local,
-               window, dry_run, rejected, simplify, volume, tiles] = settings;
+               window, dry_run, rejected, simplify, deviation, volume, tiles] = settings;
   // Jobs of several runs refuse these: require_mesh_alone().
   (void)prune_triangles, (void)prune_size, (void)local, (void)tiles, (void)open, (void)receiver, (void)rejected;
   (void)input, (void)more_inputs, (void)output, (void)more_outputs, (void)normals, (void)normal_search,
@@ -33,12 +33,13 @@ std::string mesh_settings(const SurfaceSettings& settings) {
       "{}\nmax_radius {}\n"
       "blend {}\nrefit {}\nsteps {}\nstep_tolerance {}\nfit {}\ndiffuse {}\ncell {}\nlevels {}\nboundary {}\ncluster "
       "{}\n"
-      "chord {}\nlevel {}\ncurvature {}\nfilled {}\nclose_holes {}\nwatertight {}\nfill_all {}\ntrim {}\nfeatures {}\n",
+      "chord {}\nlevel {}\ncurvature {}\nfilled {}\nclose_holes {}\nwatertight {}\nfill_all {}\ntrim {}\nfeatures {}\n"
+      "deviation {}\n",
       reading.columns, reading.project_degrees, to_string(reading.select), frame_word, static_cast<int>(bad_samples),
       normals_words(settings), cleaning_words(clean), radius_scale, density, to_string(max_radius), number(blend),
       number(refit), steps, step_tolerance, static_cast<int>(fit), diffuse, cell ? to_string(*cell) : "auto", levels,
       boundary, static_cast<int>(cluster), chord, vertex_levels, vertex_curvature, vertex_filled, number(close_holes),
-      word(watertight), fill_all, number(trim), word(features));
+      word(watertight), fill_all, number(trim), word(features), number(deviation));
 }
 
 std::uint64_t job_hash(const SurfaceSettings& settings, const std::string& input_id, const ReconstructionPlan& plan) {

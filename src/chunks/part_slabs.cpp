@@ -34,9 +34,14 @@ void make_relative(const std::vector<std::array<std::uint32_t, 3>>& triangles, s
   }
 }
 
-PartSlabs::PartSlabs(std::vector<Part> parts, int count, std::uint64_t job, const HoleSettings& holes,
+PartSlabs::PartSlabs(std::vector<Part> parts, int count, std::uint64_t job, const HoleSettings& holes, double deviation,
                      MeshSinkSettings layout)
-    : parts_(std::move(parts)), count_(count), job_(job), holes_(holes), layout_(std::move(layout)) {}
+    : parts_(std::move(parts)),
+      count_(count),
+      job_(job),
+      holes_(holes),
+      deviation_(deviation),
+      layout_(std::move(layout)) {}
 
 void PartSlabs::open() {
   writer_.emplace(parts_[at_].path, layout_);
@@ -46,6 +51,7 @@ void PartSlabs::open() {
   info_.count = count_;
   info_.span = parts_[at_].span;
   info_.holes = holes_;
+  info_.deviation = deviation_;
   info_.below = previous_;
   first_ = numbered_;
   finder_ = boundary::BoundaryFinder(first_, below_);

@@ -19,8 +19,9 @@ class PartSlabs : public SlabSink {
     SlabSpan span;
     std::string path;
   };
-  /// `job`, `count`, `holes`: of every part (PartInfo).
-  PartSlabs(std::vector<Part> parts, int count, std::uint64_t job, const HoleSettings& holes, MeshSinkSettings layout);
+  /// `job`, `count`, `holes`, `deviation`: of every part (PartInfo).
+  PartSlabs(std::vector<Part> parts, int count, std::uint64_t job, const HoleSettings& holes, double deviation,
+            MeshSinkSettings layout);
 
   /// Slabs below the first part only tell what it stands on.
   void write(const MeshSlab& slab) override;
@@ -38,6 +39,7 @@ class PartSlabs : public SlabSink {
   int count_;
   std::uint64_t job_;
   HoleSettings holes_;
+  double deviation_;
   MeshSinkSettings layout_;
   std::size_t at_ = 0;  ///< part that the next slab may belong to
   std::optional<PartWriter> writer_;

@@ -128,7 +128,7 @@ class ResumableRun {
     if (folder_.resumed()) job_.run.info(fmt::format("{}: {} of {} parts are done", folder_.path(), done, count));
     if (left.empty()) return;
     const SlabSpan span{left.front().span.begin, plan.slabs.end};
-    PartSlabs slabs(std::move(left), count, hash, plan.holes, mesh_layout(plan));
+    PartSlabs slabs(std::move(left), count, hash, plan.holes, plan.simplify.deviation, mesh_layout(plan));
     if (!span.empty()) sweep(plan, cloud, span, {slabs}, job_);
     slabs.finish();
   }
@@ -142,7 +142,9 @@ class ResumableRun {
   void join() {
     try {
       job_.watch.time("commit", [&] {
-        const MergedParts merged = merge_parts(parts_, output_names(settings_), job_.run, settings_.simplify);
+        const MergedParts merged =
+            merge_parts(parts_, output_names(settings_), job_.run,
+                        settings_.simplify.wanted() ? std::optional(settings_.simplify) : std::nullopt);
         job_.stats.vertices = merged.vertices;
         job_.stats.triangles = merged.triangles;
         job_.stats.holes = merged.holes;

@@ -1,6 +1,7 @@
 #include "reconstruct/choose_support.h"
 
 #include <algorithm>
+#include <cmath>
 #include <numbers>
 
 #include "reconstruct/constants.h"
@@ -36,6 +37,12 @@ void choose_for_even(bool cell_given, StageSettings& out) {
 }
 
 }  // namespace
+
+double choose_deviation(const RadiusSurvey& survey) {
+  constexpr double kStep = 1e-4;  // so that what is told as an option gives the same mesh
+  const double wanted = kCleanDeviation + kNoiseDeviation * static_cast<double>(survey.noise);
+  return kStep * std::round(std::min(wanted, kMostDeviation) / kStep);
+}
 
 StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& survey, const PointSourceInfo& info) {
   StageSettings out;

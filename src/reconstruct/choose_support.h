@@ -25,4 +25,8 @@ struct StageSettings {
 /// A function of settings and survey alone, so that all parts of a job choose the same.
 StageSettings choose_support(const SurfaceSettings& settings, const RadiusSurvey& survey, const PointSourceInfo& info);
 
+/// SimplifySettings::deviation of a mesh of such samples: noise says how much of what is not flat is none of the
+/// surface's.
+double choose_deviation(const RadiusSurvey& survey);
+
 }  // namespace lamina

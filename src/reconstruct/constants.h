@@ -58,6 +58,12 @@ inline constexpr double kLongestRim = 300;
 inline constexpr std::uint64_t kSpeckShare = 2000;
 inline constexpr std::uint64_t kMostSpeck = 500;
 
+/// How far the mesh may be off its planes where triangles go (SimplifySettings::deviation): of clean samples, what each
+/// radius of median residual adds, and the most.
+inline constexpr double kCleanDeviation = 0.01;
+inline constexpr double kNoiseDeviation = 0.1;
+inline constexpr double kMostDeviation = 0.05;
+
 /// The size of most cells in units of the largest the median radius allows: with 0.64 the radii of an evenly sampled
 /// surface (which scatter by 0.75 to 1.25 around their median) all ask for the same level.
 inline constexpr double kMainCell = 0.7;

@@ -98,16 +98,17 @@ double refit_memory(const ReconstructionPlan& plan, double per_step) {
 
 /// Behind the sweep: the mesh as it was waits, and regions of it, with quadrics.
 void add_simplification(const ReconstructionPlan& plan, const SlabStore& store, ExpectedCost& cost) {
-  constexpr double kProgram = 60e6, kRegions = 84, kPlain = 2.2e-6, kWithin = 20e-6;
+  constexpr double kProgram = 60e6, kRegions = 84, kPlain = 2.2e-6, kWithin = 20e-6, kFlat = 0.9e-6;
   const double triangles = expected_triangles(plan);
   const auto count = static_cast<std::uint64_t>(triangles);
   cost.memory =
       std::max(cost.memory, static_cast<std::uint64_t>(kProgram) + simplify::memory_for(plan.simplify, count));
   const double vertex = static_cast<double>(vertex_record_bytes(plan.mesh_attributes, plan.double_positions));
-  const double regions = count > simplify::kRegionTriangles ? kRegions : 0;
+  const bool in_regions = plan.simplify.deviation == 0 && count > simplify::kRegionTriangles;
+  const double regions = in_regions ? kRegions : 0;
   cost.disk = std::max(cost.disk, store.disk_bytes() + static_cast<std::uint64_t>(
                                                            (kFaceRecordBytes + 0.5 * vertex + regions) * triangles));
-  cost.cpu_seconds += (plan.simplify.error > 0 ? kWithin : kPlain) * triangles;
+  cost.cpu_seconds += (plan.simplify.error > 0 ? kWithin : plan.simplify.deviation > 0 ? kFlat : kPlain) * triangles;
 }
 
 double mesh_memory(const ReconstructionPlan& plan, const SlabStore& store, double per_slab) {

@@ -202,6 +202,7 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
   plan.volume.shift = cloud.shift;
   plan.volume.crs = cloud.info.crs;
   plan.simplify = s.simplify;
+  if (!s.simplify.wanted()) plan.simplify.deviation = s.deviation ? *s.deviation : choose_deviation(plan.radius);
   plan.tiles = s.tiles;
   plan.tiles.crs = cloud.shift ? std::string() : cloud.info.crs;  // shifted coordinates are not those of the system
   if (!cloud.info.crs.empty()) plan.comments.push_back("crs " + cloud.info.crs);
@@ -240,6 +241,7 @@ void check_settings(const SurfaceSettings& s) {
   require(s.window >= 1 && s.window <= 1024, "--window", "in 1..1024");
   require_sane(s.clean);
   if (s.simplify.wanted()) simplify::require_goal(s.simplify);
+  require(s.deviation.value_or(0) >= 0 && s.deviation.value_or(0) <= 1, "--deviation", "auto or in 0..1, in edges");
   check_volume_export(s.volume);
   require(!s.input.empty(), "the input", "a point file");
   require(!s.receiver || s.tiles.folder.empty(), "--tiles", "left out where the mesh goes to no file");
@@ -331,6 +333,7 @@ SurfacePlan summary_of(const ReconstructionPlan& p) {
   out.refine_sheets = p.feed.refine_sheets;
   out.watertight = p.holes.watertight != Watertight::no;
   out.trim = p.vertices.trim;
+  out.deviation = p.simplify.deviation;
   out.longest_rim = p.holes.longest;
   out.finest_cell = p.lattice.cell * step;
   out.levels = p.lattice.levels;

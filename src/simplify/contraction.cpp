@@ -10,7 +10,6 @@ namespace {
 using namespace meshes;
 
 constexpr double kLeastCosine = 0.2;  ///< a triangle turns no farther at one contraction
-constexpr double kSliver = 0.05;      ///< no contraction makes triangles worse than this (1: equilateral)
 
 /// Four times the squared area of a triangle over the square of the sum of its squared sides: 1/12 where it is
 /// equilateral, 0 where it has no area.
@@ -37,8 +36,8 @@ Placed place_edge(const Quadric& sum, const Vec3& a, const Vec3& b) {
   return at_a <= at_b ? Placed{a, std::max(0.0, at_a)} : Placed{b, std::max(0.0, at_b)};
 }
 
-bool keeps_shape(const Stars& stars, std::span<const Vec3> positions, std::uint32_t u, std::uint32_t v,
-                 const Vec3& to) {
+bool keeps_shape(const Stars& stars, std::span<const Vec3> positions, std::uint32_t u, std::uint32_t v, const Vec3& to,
+                 double sliver) {
   for (const auto& [vertex, other] : {std::pair{u, v}, std::pair{v, u}}) {
     const Vec3& from = positions[vertex];
     for (const std::uint32_t triangle : stars.around(vertex)) {
@@ -50,7 +49,7 @@ bool keeps_shape(const Stars& stars, std::span<const Vec3> positions, std::uint3
       const double along = dot(before, after);
       const Shape shape = shape_of(to, p, q, after);
       if (!(along > 0 && along * along > kLeastCosine * kLeastCosine * dot(before, before) * shape.area)) return false;
-      if (!shape.at_least(kSliver) && shape.worse_than(shape_of(from, p, q, before))) return false;
+      if (!shape.at_least(sliver) && shape.worse_than(shape_of(from, p, q, before))) return false;
     }
   }
   return true;

@@ -14,9 +14,12 @@ namespace {
 
 using namespace meshes;
 
-constexpr double kMostOfPass = 0.33;       ///< of the vertices that a pass may take
-constexpr double kMoreEdges = 1.4;         ///< than chance asks for: cheap edges lie side by side
-constexpr double kIdlePass = 0.01;         ///< of the triangles: a pass over all edges that takes fewer is the last
+constexpr double kMostOfPass = 0.33;    ///< of the vertices that a pass may take
+constexpr double kMoreEdges = 1.4;      ///< than chance asks for: cheap edges lie side by side
+constexpr double kIdlePass = 0.01;      ///< of the triangles: a pass over all edges that takes fewer is the last
+constexpr float kFirstBudget = 0.1F;    ///< thinning: share of the budget in the first pass, for the cheapest edges
+constexpr double kThinSliver = 0.35;    ///< thinning makes no triangles worse than this (1: equilateral)
+constexpr double kLastThinning = 0.05;  ///< of the triangles: a pass of the whole budget that takes fewer is the last
 constexpr std::size_t kPassBlock = 1'024;  ///< triangles whose edges are sorted together: they fit a core's cache
 constexpr std::size_t kSampleStep = 32;    ///< one of so many triangles says what edges cost
 constexpr double kEdgesOfVertex = 3;
@@ -59,6 +62,8 @@ float cost_of(std::uint64_t key) {
 Matching::Result Matching::reduce(TriangleMesh& mesh, std::span<const std::uint8_t> locked, std::uint64_t wanted,
                                   const RunContext& run) {
   begin(mesh, locked);
+  add_planes();
+  survey_rings();
   double more = kMoreEdges;
   while (size_ > wanted) {
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
@@ -78,6 +83,29 @@ Matching::Result Matching::reduce(TriangleMesh& mesh, std::span<const std::uint8
   return {size_, std::sqrt(deviation2_)};
 }
 
+Matching::Result Matching::thin(ThinPart& part, std::span<const float> tolerances, const RunContext& run) {
+  begin(part.mesh, part.locked);
+  sliver_ = kThinSliver;
+  for (std::size_t v = 0; v < positions_.size(); ++v) quadrics_[v] = part.quadrics[v].moved(positions_[v]);
+  survey_rings();
+  for (std::uint32_t v = 0; v < positions_.size(); ++v) locked_[v] |= static_cast<std::uint8_t>(stars_.boundary(v));
+  for (bool first = true;; first = false) {
+    if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+    held_ = locked_;
+    const std::uint64_t there = size_;
+    thin_pass(part, tolerances, first ? kFirstBudget : 1);
+    stars_.tidy();
+    if (!first) {  // an edge costs the same until one of its ends moves
+      for (std::size_t v = 0; v < news_.size(); ++v) news_[v] = static_cast<std::uint8_t>(held_[v] & ~locked_[v]);
+    }
+    if (!first && static_cast<double>(there - size_) <= kLastThinning * static_cast<double>(there)) break;
+  }
+  part.mesh.triangles = stars_.release();
+  part.locked = locked_;
+  for (std::size_t v = 0; v < positions_.size(); ++v) part.quadrics[v] = quadrics_[v].moved(-1 * positions_[v]);
+  return {size_, std::sqrt(deviation2_)};
+}
+
 void Matching::begin(TriangleMesh& mesh, std::span<const std::uint8_t> locked) {
   mesh_ = &mesh;
   centre_ = middle_of(mesh.positions);
@@ -85,10 +113,14 @@ void Matching::begin(TriangleMesh& mesh, std::span<const std::uint8_t> locked) {
   for (const Vec3& at : mesh.positions) positions_.push_back(at - centre_);
   size_ = mesh.triangles.size();
   deviation2_ = 0;
+  sliver_ = kSliver;
+  news_.assign(positions_.size(), 1);
   stars_.reset(std::move(mesh.triangles), positions_.size());
   locked_.assign(locked.begin(), locked.end());
   quadrics_.assign(positions_.size(), {});
-  add_planes();
+}
+
+void Matching::survey_rings() {
   ways_.assign(positions_.size(), {});
   for (std::uint32_t v = 0; v < positions_.size(); ++v) survey_ring(v);
   free_ = static_cast<std::uint64_t>(std::count(locked_.begin(), locked_.end(), 0));
@@ -151,7 +183,7 @@ void Matching::gather(std::size_t begin, std::size_t end, std::size_t step) {
       ask_for(quadrics_[u]);
       ask_for(positions_[u]);
       const unsigned rim = unsigned{stars_.boundary(u)} & unsigned{stars_.boundary(v)};
-      const auto free = static_cast<unsigned>((held_[u] | held_[v]) == 0);
+      const auto free = static_cast<unsigned>((held_[u] | held_[v]) == 0) & unsigned{(news_[u] | news_[v]) != 0};
       *out = {u, v};
       out += free & (static_cast<unsigned>(u < v) | rim);
     }
@@ -159,8 +191,9 @@ void Matching::gather(std::size_t begin, std::size_t end, std::size_t step) {
   edges_.resize(static_cast<std::size_t>(out - edges_.data()));
 }
 
-/// What is in edges_ into the queue, where it costs no more than that.
-void Matching::price(float dearest) {
+/// What is in edges_ into the queue, where it costs no more than dearest(u, v).
+template <class Limit>
+void Matching::price(const Limit& dearest) {
   queue_.resize(edges_.size());
   std::uint64_t* out = queue_.data();
   for (std::size_t e = 0; e < edges_.size(); ++e) {
@@ -168,7 +201,7 @@ void Matching::price(float dearest) {
     Quadric sum = quadrics_[u];
     sum += quadrics_[v];
     *out = queue_key(place_edge(sum, positions_[u], positions_[v]).cost, e);
-    out += static_cast<unsigned>(cost_of(*out) <= dearest);  // without a branch, as above
+    out += static_cast<unsigned>(cost_of(*out) <= dearest(u, v));  // without a branch, as above
   }
   queue_.resize(static_cast<std::size_t>(out - queue_.data()));
 }
@@ -178,30 +211,61 @@ float Matching::limit(double share) {
   constexpr float kAny = std::numeric_limits<float>::max();
   if (share >= 1) return kAny;
   gather(0, stars_.triangles().size(), kSampleStep);
-  price(kAny);
+  price([](std::uint32_t, std::uint32_t) { return kAny; });
   if (queue_.empty()) return kAny;
   const auto place = queue_.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(queue_.size()));
   std::nth_element(queue_.begin(), place, queue_.end());
   return cost_of(*place);
 }
 
+template <class Use>
+void Matching::take_queue(const Use& use) {
+  std::sort(queue_.begin(), queue_.end());
+  for (std::size_t i = 0; i < queue_.size(); ++i) {
+    const auto [next, beside] = edges_[static_cast<std::uint32_t>(queue_[std::min(i + kAhead, queue_.size() - 1)])];
+    stars_.ask_for(next);
+    stars_.ask_for(beside);
+    const auto [u, v] = edges_[static_cast<std::uint32_t>(queue_[i])];
+    if (held_[u] == 0 && held_[v] == 0) use(std::min(u, v), std::max(u, v));
+  }
+}
+
 void Matching::pass(float dearest, std::uint64_t wanted) {
   const std::size_t count = stars_.triangles().size();
   for (std::size_t begin = 0; begin < count && size_ > wanted; begin += kPassBlock) {
     gather(begin, std::min(begin + kPassBlock, count), 1);
-    price(dearest);
-    std::sort(queue_.begin(), queue_.end());
-    for (std::size_t i = 0; i < queue_.size() && size_ > wanted; ++i) {
-      const auto [next, beside] = edges_[static_cast<std::uint32_t>(queue_[std::min(i + kAhead, queue_.size() - 1)])];
-      stars_.ask_for(next);
-      stars_.ask_for(beside);
-      const auto [u, v] = edges_[static_cast<std::uint32_t>(queue_[i])];
-      if (held_[u] == 0 && held_[v] == 0) contract(std::min(u, v), std::max(u, v));
-    }
+    price([&](std::uint32_t, std::uint32_t) { return dearest; });
+    take_queue([&](std::uint32_t u, std::uint32_t v) {
+      if (size_ > wanted) contract(u, v);
+    });
   }
 }
 
-void Matching::contract(std::uint32_t u, std::uint32_t v) {
+void Matching::thin_pass(ThinPart& part, std::span<const float> tolerances, float share) {
+  const auto alike = [&](std::uint32_t u, std::uint32_t v) {
+    for (std::size_t a = 0; a < tolerances.size(); ++a) {
+      const auto &low = part.low[a], &high = part.high[a];
+      if (std::max(high[u], high[v]) - std::min(low[u], low[v]) > tolerances[a]) return false;
+    }
+    return true;
+  };
+  const std::size_t count = stars_.triangles().size();
+  for (std::size_t begin = 0; begin < count; begin += kPassBlock) {
+    gather(begin, std::min(begin + kPassBlock, count), 1);
+    price([&](std::uint32_t u, std::uint32_t v) { return share * (part.budgets[u] + part.budgets[v]); });
+    take_queue([&](std::uint32_t u, std::uint32_t v) {
+      if (!alike(u, v) || !contract(u, v)) return;
+      part.budgets[u] += part.budgets[v];
+      for (std::size_t a = 0; a < tolerances.size(); ++a) {
+        part.low[a][u] = std::min(part.low[a][u], part.low[a][v]);
+        part.high[a][u] = std::max(part.high[a][u], part.high[a][v]);
+      }
+    });
+  }
+}
+
+/// False where that would change the topology, or fold the surface.
+bool Matching::contract(std::uint32_t u, std::uint32_t v) {
   if (!mesh_->normals.empty()) {
     ask_for(mesh_->normals[u]);
     ask_for(mesh_->normals[v]);
@@ -210,11 +274,11 @@ void Matching::contract(std::uint32_t u, std::uint32_t v) {
     ask_for(values[u]);
     ask_for(values[v]);
   }
-  if (!stars_.contractible(u, v)) return;
+  if (!stars_.contractible(u, v)) return false;
   Quadric sum = quadrics_[u];
   sum += quadrics_[v];
   const Placed to = place_edge(sum, positions_[u], positions_[v]);
-  if (!keeps_shape(stars_, positions_, u, v, to.at)) return;
+  if (!keeps_shape(stars_, positions_, u, v, to.at, sliver_)) return false;
   const double weight = sum.weight();
   if (weight > 0) deviation2_ = std::max(deviation2_, to.cost / weight);
   const double share = share_along(positions_[u], positions_[v], to.at);
@@ -229,6 +293,7 @@ void Matching::contract(std::uint32_t u, std::uint32_t v) {
   held_[u] = held_[v] = 1;
   --free_;
   size_ -= static_cast<std::uint64_t>(stars_.contract(u, v));
+  return true;
 }
 
 }  // namespace lamina::simplify

@@ -9,10 +9,20 @@
 #include "lamina/mesh.h"
 #include "lamina/run.h"
 #include "meshes/vec3.h"
+#include "simplify/contraction.h"
 #include "simplify/quadric.h"
 #include "simplify/stars.h"
 
 namespace lamina::simplify {
+
+/// Triangles to be thinned out where the surface is flat, with what their vertices stand for.
+struct ThinPart {
+  TriangleMesh mesh;
+  std::vector<std::uint8_t> locked;  ///< vertices that stay as they are; behind thin() those at an open side, too
+  std::vector<Quadric> quadrics;     ///< of the vertices, each about its own place
+  std::vector<float> budgets;        ///< what contracting the vertices may cost, summed up as their quadrics are
+  std::vector<std::vector<float>> low, high;  ///< range of each attribute over what a vertex stands for
+};
 
 /// Works on a whole mesh in one thread, block by block of its triangles, which lie near each other in a mesh that was
 /// streamed or merged of such. Keeps its memory for the next mesh.
@@ -27,6 +37,9 @@ class Matching {
   /// they are, and so do those of edges with more than two triangles, or with two that face opposite sides. Vertices
   /// that have gone stay in the arrays. Throws Error(internal) when cancelled.
   Result reduce(TriangleMesh& mesh, std::span<const std::uint8_t> locked, std::uint64_t wanted, const RunContext& run);
+  /// Contracts what costs no more than its budget, unless an attribute's range would exceed its tolerance. Vertices at
+  /// an open side stay, too. Throws as reduce().
+  Result thin(ThinPart& part, std::span<const float> tolerances, const RunContext& run);
 
  private:
   struct Edge {
@@ -38,14 +51,20 @@ class Matching {
   };
 
   void begin(TriangleMesh& mesh, std::span<const std::uint8_t> locked);
+  void survey_rings();
   void add_planes();
   void survey_ring(std::uint32_t vertex);
   void add_wall(std::uint32_t from, std::uint32_t to, std::uint32_t beside);
   void gather(std::size_t begin, std::size_t end, std::size_t step);
-  void price(float dearest);
+  template <class Limit>
+  void price(const Limit& dearest);
   [[nodiscard]] float limit(double share);
   void pass(float dearest, std::uint64_t wanted);
-  void contract(std::uint32_t u, std::uint32_t v);
+  void thin_pass(ThinPart& part, std::span<const float> tolerances, float share);
+  bool contract(std::uint32_t u, std::uint32_t v);
+  /// Calls use(u, v), u < v, for edges of the queue, the cheapest first, of which no end is held.
+  template <class Use>
+  void take_queue(const Use& use);
 
   TriangleMesh* mesh_ = nullptr;
   meshes::Vec3 centre_{};                ///< far from it quadrics lose their digits
@@ -53,10 +72,12 @@ class Matching {
   std::vector<Quadric> quadrics_;
   std::vector<std::uint8_t> locked_;
   std::vector<std::uint8_t> held_;  ///< in this pass: locked, or contracted already
+  std::vector<std::uint8_t> news_;  ///< edges at these vertices are offered: others were too dear in a pass before
   Stars stars_;
   std::uint64_t size_ = 0;  ///< triangles
   std::uint64_t free_ = 0;  ///< vertices that are there and not locked
   double deviation2_ = 0;
+  double sliver_ = kSliver;
 
   std::vector<Ways> ways_;            ///< of edges to the vertex that is looked at
   std::vector<Edge> edges_;           ///< of a block

@@ -42,7 +42,7 @@ void append(TriangleMesh& all, const TriangleMesh& piece) {
   add(all.triangles, piece.triangles);
 }
 
-SimplifyStats simplify_in_regions(TriangleMesh& mesh, const SimplifySettings& settings, const RunContext& run) {
+SimplifyStats simplify_in_blocks(TriangleMesh& mesh, const SimplifySettings& settings, const RunContext& run) {
   meshes::HeldMesh blocks(mesh);
   TriangleMesh fewer;
   fewer.layout = mesh.layout;
@@ -59,8 +59,9 @@ SimplifyStats simplify_in_regions(TriangleMesh& mesh, const SimplifySettings& se
 SimplifyStats simplify_mesh(TriangleMesh& mesh, const SimplifySettings& settings, const RunContext& run) {
   simplify::require_goal(settings);
   SimplifyStats stats;
-  if (mesh.triangles.size() > simplify::kRegionTriangles) {
-    with_threads(run.threads, [&] { stats = simplify_in_regions(mesh, settings, run); });
+  if (settings.deviation > 0) require_manifold(mesh, run);
+  if (settings.deviation > 0 || mesh.triangles.size() > simplify::kRegionTriangles) {
+    with_threads(run.threads, [&] { stats = simplify_in_blocks(mesh, settings, run); });
     return stats;
   }
   require_manifold(mesh, run);

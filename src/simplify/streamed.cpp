@@ -25,6 +25,7 @@
 #include "simplify/part.h"
 #include "simplify/regions.h"
 #include "simplify/rounds.h"
+#include "simplify/thinning.h"
 
 namespace lamina::simplify {
 namespace {
@@ -342,7 +343,8 @@ class StreamedSimplifier {
 }  // namespace
 
 std::uint64_t memory_for(const SimplifySettings& settings, std::uint64_t triangles) {
-  constexpr std::uint64_t kBuffers = 200U << 20;
+  constexpr std::uint64_t kBuffers = 200U << 20, kThinBytes = 250;
+  if (settings.deviation > 0) return kThinBytes * std::min<std::uint64_t>(triangles, 2 * kThinBlock);
   const std::uint64_t each = settings.error > 0 ? 650 : 450;
   return each * std::min(triangles, kRegionTriangles) + (triangles > kRegionTriangles ? kBuffers : 0);
 }
@@ -351,6 +353,7 @@ SimplifyStats simplify_blocks(MeshBlocks& mesh, const SimplifySettings& settings
                               const std::function<void(TriangleMesh)>& take, const RunContext& run,
                               std::uint64_t region) {
   require_goal(settings);
+  if (settings.deviation > 0) return thin_blocks(mesh, settings.deviation, take, run);
   if (mesh.triangles() > region) return StreamedSimplifier(mesh, settings, region, tmp_dir, run).simplify(take);
   TriangleMesh whole = read_whole(mesh);
   const SimplifyStats stats = simplify_mesh(whole, settings, run);
