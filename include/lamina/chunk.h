@@ -55,13 +55,13 @@ bool is_part(const std::string& path);
 
 /// Joins all parts of one reconstruction, given in any order, into one mesh, closes its holes, and writes it under each
 /// name of `outputs`, at least one (format by its ending; "-" is standard output). It is simplified first as
-/// `simplify` says; where that is unset, as the run would have done that made the parts. Memory grows with the boundary
+/// `wanted` says; where that is unset, as the run would have done that made the parts. Memory grows with the boundary
 /// of a part, not with the mesh. run.tmp_dir is for what goes to standard output (empty: the system's). Throws
 /// Error(unreadable) naming the part that is missing, given twice, truncated, damaged, of another run or of a version
 /// this program does not know; Error(empty) when no part has surface; Error(budget) when the mesh has more than 2^32 -
 /// 1 vertices or cannot be written.
 MergedParts merge_parts(const std::vector<std::string>& paths, const std::vector<std::string>& outputs,
-                        const RunContext& run, const std::optional<SimplifySettings>& simplify = std::nullopt);
+                        const RunContext& run, const std::optional<SimplifySettings>& wanted = std::nullopt);
 
 struct Checkpoint {
   std::string directory;  ///< holds the store and the finished parts; made where it is not there, removed at the end
