@@ -76,6 +76,7 @@ void choose_what_is_not_given(const SurfaceOptions& o, SurfaceSettings& settings
     if (!given("--blend")) settings.blend = SurfaceSettings{}.blend;
     if (!given("--prune")) settings.prune_triangles = 0;
     if (!given("--close-holes")) settings.close_holes = SurfaceSettings{}.close_holes;
+    if (!given("--deviation")) settings.deviation = SurfaceSettings{}.deviation;
     return;
   }
   if (reads_store(o)) return;
@@ -205,6 +206,7 @@ void add_surface_options(CLI::App& tool, SurfaceOptions& o) {
   o.tool = &tool;
   s.blend.reset();
   s.prune_triangles.reset();
+  s.deviation.reset();
   add_preset(tool, o.preset, "Trade");
 
   const std::string samples = "Samples";
@@ -243,8 +245,10 @@ void add_surface_options(CLI::App& tool, SurfaceOptions& o) {
   add_normals_choice(tool, s.normals, "Normals");
   add_normals_options(tool, s.normal_search, "Normals");
 
-  tool.add_flag("--raw", o.raw,
-                "Choose nothing: the file's normals, all samples, --blend 1.2, --prune 0, where these are not given")
+  tool.add_flag(
+          "--raw", o.raw,
+          "Choose nothing: the file's normals, all samples, --blend 1.2, --prune 0, --deviation 0, where these are not "
+          "given")
       ->excludes(tool.get_option("--preset"))
       ->group("Fit");
   add_fit_options(tool, s);
@@ -303,13 +307,12 @@ void add_surface_options(CLI::App& tool, SurfaceOptions& o) {
   const std::string simplification = "Simplification";
   add_simplify_goal(tool, o.simplify, simplification);
   auto* deviation = add_number_or_auto(
-      tool, "--deviation", "0",
+      tool, "--deviation", "auto",
       "Leave out triangles where the surface is flat: within K lengths of an edge there, root mean square; boundaries "
       "stay, and so does detail of colours and other attributes; 0: all triangles stay; auto: by the cloud's noise, "
-      "0.01 "
-      "to 0.05",
+      "0.01 to 0.05; with --raw 0",
       [&s](const std::optional<double>& number) { s.deviation = number; });
-  deviation->option_text("K|auto [0]")->group(simplification);
+  deviation->option_text("K|auto [auto]")->group(simplification);
   for (const char* other : {"--error", "--triangles", "--ratio"}) deviation->excludes(tool.get_option(other));
   add_volume_options(tool, s.volume);
   const std::string tiles = "Tiles";

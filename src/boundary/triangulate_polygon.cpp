@@ -124,7 +124,7 @@ Edge edge_of(std::uint32_t a, std::uint32_t b) {
 }
 
 /// What is left of a polygon while its ears are cut off: corners that stick out, whose chord no other corner is in the
-/// way of.
+/// way of. The widest goes first, so that no sliver is left at the end which could not go.
 class Ears {
  public:
   Ears(const std::vector<Vec2>& points, const std::vector<std::uint32_t>& polygon,
@@ -136,50 +136,72 @@ class Ears {
       before_.push_back((i + n - 1) % n);
       edges_.insert(edge_of(polygon[i], polygon[(i + 1) % n]));
     }
+    for (std::size_t i = 0; i < n; ++i) width_.push_back(width_of(i));
   }
   /// False where corners are left that are no ears.
   bool cut(std::vector<PlaneTriangle>& out) {
-    std::size_t left = polygon_.size();
     std::size_t at = 0;
-    for (std::size_t tries = 0; left > 3; ++tries) {
-      if (tries > left) return false;
-      if (!is_ear(at)) {
-        at = next_[at];
+    for (std::size_t left = polygon_.size(); left > 3; --left) {
+      at = find_widest();
+      if (!(width_[at] > 0)) {
+        look_again();
+        at = find_widest();
+        if (!(width_[at] > 0)) return false;
+      }
+      const std::size_t from = before_[at], to = next_[at];
+      const Edge chord = edge_of(polygon_[from], polygon_[to]);
+      // One that another triangle has by now.
+      if (!edges_.insert(chord).second) {
+        width_[at] = 0;
+        ++left;
         continue;
       }
-      out.push_back({polygon_[before_[at]], polygon_[at], polygon_[next_[at]]});
-      edges_.insert(edge_of(polygon_[before_[at]], polygon_[next_[at]]));
-      next_[before_[at]] = next_[at];
-      before_[next_[at]] = before_[at];
-      // Not its neighbour, lest all ears be cut from one corner.
-      at = next_[next_[at]];
-      --left;
-      tries = 0;
+      out.push_back({polygon_[from], polygon_[at], polygon_[to]});
+      next_[from] = to;
+      before_[to] = from;
+      width_[at] = kGone;
+      width_[from] = width_of(from);
+      width_[to] = width_of(to);
+      at = to;
     }
     out.push_back({polygon_[before_[at]], polygon_[at], polygon_[next_[at]]});
-    return is_proper(point(before_[at]), point(at), point(next_[at]));
+    return twice_area(point(before_[at]), point(at), point(next_[at])) > 0;
   }
 
  private:
+  static constexpr double kGone = -1;
+
   [[nodiscard]] const Vec2& point(std::size_t corner) const { return points_[polygon_[corner]]; }
-  [[nodiscard]] bool is_ear(std::size_t at) const {
+  [[nodiscard]] std::size_t find_widest() const {
+    return static_cast<std::size_t>(std::max_element(width_.begin(), width_.end()) - width_.begin());
+  }
+  /// What was in an ear's way may have gone with an ear elsewhere.
+  void look_again() {
+    for (std::size_t i = 0; i < width_.size(); ++i) {
+      if (width_[i] >= 0) width_[i] = width_of(i);
+    }
+  }
+  /// Height over length of the triangle that goes with an ear; 0: it is none.
+  [[nodiscard]] double width_of(std::size_t at) const {
     const std::size_t from = before_[at], to = next_[at];
     const Vec2 &a = point(from), &b = point(at), &c = point(to);
     const Edge chord = edge_of(polygon_[from], polygon_[to]);
-    if (!is_proper(a, b, c) || edges_.contains(chord) || !allowed_(chord[0], chord[1])) return false;
+    const double twice = twice_area(a, b, c);
+    if (!(twice > 0) || edges_.contains(chord) || !allowed_(chord[0], chord[1])) return 0;
     for (std::size_t i = next_[to]; i != from; i = next_[i]) {
       const std::uint32_t v = polygon_[i];
       if (v == polygon_[from] || v == polygon_[at] || v == polygon_[to]) continue;
       const Vec2& p = point(i);
-      if (twice_area(a, b, p) >= 0 && twice_area(b, c, p) >= 0 && twice_area(c, a, p) >= 0) return false;
+      if (twice_area(a, b, p) >= 0 && twice_area(b, c, p) >= 0 && twice_area(c, a, p) >= 0) return 0;
     }
-    return true;
+    return twice / std::max({(b - a).squaredNorm(), (c - b).squaredNorm(), (a - c).squaredNorm()});
   }
   const std::vector<Vec2>& points_;
   const std::vector<std::uint32_t>& polygon_;
   const std::function<bool(std::uint32_t, std::uint32_t)>& allowed_;
   std::vector<std::size_t> next_, before_;
-  std::set<Edge> edges_;  ///< of the polygon and of all triangles
+  std::vector<double> width_;  ///< of each corner; kGone: it was cut off
+  std::set<Edge> edges_;       ///< of the polygon and of all triangles
 };
 
 /// d lies in the circle around the anticlockwise triangle abc.

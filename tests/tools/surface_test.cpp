@@ -48,6 +48,25 @@ class SurfaceTool : public ::testing::Test {
   const std::string mesh_ = folder_ / "mesh.ply", tmp_ = folder_ / "tmp", stats_ = folder_ / "stats.json";
 };
 
+// Without an option cells are finer, and triangles go where that is flat: fewer of them, within a thousandth.
+TEST_F(SurfaceTool, WhereItIsFlatTrianglesGo) {
+  test::write_cloud(test::sphere_cloud(20'000), cloud_);
+  const auto made = [this](const std::vector<std::string>& options) {
+    EXPECT_EQ(run(options).code, 0);
+    TriangleMesh mesh = read_mesh(mesh_);
+    EXPECT_TRUE(test::check_mesh(mesh.triangles).is_closed_manifold());
+    return mesh;
+  };
+  const TriangleMesh thinned = made({"--stats", stats_}), all = made({"--deviation", "0"});
+  const auto stats = nlohmann::json::parse(test::read_file(stats_));
+  EXPECT_EQ(stats.at("triangles"), thinned.triangles.size());
+  EXPECT_GT(stats.at("simplified").at("triangles_before"), all.triangles.size());
+  EXPECT_LT(thinned.triangles.size(), 0.8 * static_cast<double>(all.triangles.size()));
+  EXPECT_LT(test::deviation(thinned, test::distance_to_sphere).largest, 2e-3);
+  made({"--raw", "--stats", stats_});
+  EXPECT_EQ(nlohmann::json::parse(test::read_file(stats_)).at("deviation"), 0);
+}
+
 TEST_F(SurfaceTool, MakesAMeshAndSaysSo) {
   const auto outcome = run({});
   EXPECT_EQ(outcome.code, 0);

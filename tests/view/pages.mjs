@@ -204,7 +204,7 @@ async function lookAtBoundary() {
   const file = (name) => join(folder, name);
   run('scatter', '--shape', 'amphora', '--scan', '12', '--count', '60000', '-o', file('amphora.ply'));
   try {
-    run('surface', file('amphora.ply'), '-o', file('amphora_mesh.ply'), '--tiles', file('amphora'));
+    run('surface', file('amphora.ply'), '-o', file('amphora_mesh.ply'), '--deviation', '0', '--tiles', file('amphora'));
   } catch {
     return;
   }
