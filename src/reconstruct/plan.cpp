@@ -16,6 +16,7 @@
 #include "reconstruct/choose_support.h"
 #include "reconstruct/constants.h"
 #include "reconstruct/cost.h"
+#include "simplify/goal.h"
 
 namespace lamina {
 namespace {
