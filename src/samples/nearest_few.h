@@ -34,15 +34,7 @@ class NearestFew {
   void take(const PlacedAxes& from, std::size_t begin, std::size_t end) {
     std::array<float, kMost> d2;
     const std::size_t n = end - begin;
-    const std::int32_t* const x = from.x + begin;
-    const std::int32_t* const y = from.y + begin;
-    const std::int32_t* const z = from.z + begin;
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto dx = static_cast<float>(x[i] - at_[0]);
-      const auto dy = static_cast<float>(y[i] - at_[1]);
-      const auto dz = static_cast<float>(z[i] - at_[2]);
-      d2[i] = dx * dx + dy * dy + dz * dz;
-    }
+    squared_distances(from, begin, n, at_, d2.data());
     const float bound = this->bound();
     std::array<double, kMost> near;
     std::size_t count = 0;

@@ -21,6 +21,20 @@ struct PlacedAxes {
   const std::int32_t* z = nullptr;
 };
 
+/// Of the `count` samples from `begin` on to a position, in steps^2.
+inline void squared_distances(const PlacedAxes& from, std::size_t begin, std::size_t count,
+                              const std::array<std::int32_t, 3>& at, float* squared) {
+  const std::int32_t* const x = from.x + begin;
+  const std::int32_t* const y = from.y + begin;
+  const std::int32_t* const z = from.z + begin;
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto dx = static_cast<float>(x[i] - at[0]);
+    const auto dy = static_cast<float>(y[i] - at[1]);
+    const auto dz = static_cast<float>(z[i] - at[2]);
+    squared[i] = dx * dx + dy * dy + dz * dz;
+  }
+}
+
 /// Those of one sample, nearest first, equally near ones by place.
 struct NearestList {
   std::array<std::int32_t, 3> at{};
@@ -46,15 +60,7 @@ struct NearestList {
   void take_places(const PlacedAxes& from, std::size_t begin, std::size_t end) {
     std::array<float, kMost> d2;
     const std::size_t n = end - begin;
-    const std::int32_t* const x = from.x + begin;
-    const std::int32_t* const y = from.y + begin;
-    const std::int32_t* const z = from.z + begin;
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto dx = static_cast<float>(x[i] - at[0]);
-      const auto dy = static_cast<float>(y[i] - at[1]);
-      const auto dz = static_cast<float>(z[i] - at[2]);
-      d2[i] = dx * dx + dy * dy + dz * dz;
-    }
+    squared_distances(from, begin, n, at, d2.data());
     for (std::size_t i = 0; i < n; ++i) {
       if (d2[i] <= bound && begin + i != place) take({d2[i], static_cast<std::uint32_t>(begin + i)});
     }
