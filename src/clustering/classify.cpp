@@ -1,4 +1,4 @@
-#include "clustering/classify.h"
+#include "clustering/steps.h"
 
 #include <algorithm>
 #include <bit>

@@ -4,11 +4,9 @@
 #include <deque>
 #include <utility>
 
-#include "clustering/classify.h"
 #include "clustering/clusterer.h"
-#include "clustering/count.h"
-#include "clustering/number.h"
 #include "clustering/record.h"
+#include "clustering/steps.h"
 
 namespace lamina {
 

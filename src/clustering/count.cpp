@@ -1,4 +1,4 @@
-#include "clustering/count.h"
+#include "clustering/steps.h"
 
 #include "base/resize_anew.h"
 #include "clustering/record.h"

@@ -1,4 +1,4 @@
-#include "clustering/number.h"
+#include "clustering/steps.h"
 
 #include <algorithm>
 

@@ -8,7 +8,7 @@
 #include "render/ray_field.h"
 #include "render/shade.h"
 #include "vdb/grids.h"
-#include "volume/fog.h"
+#include "volume/volume_data.h"
 
 namespace lamina::render_detail {
 namespace {

@@ -9,7 +9,7 @@
 #include "render/shade.h"
 #include "vdb/grids.h"
 #include "vdb/vdb_file.h"
-#include "volume/level_set.h"
+#include "volume/volume_data.h"
 
 namespace lamina::render_detail {
 namespace {

@@ -1,4 +1,4 @@
-#include "volume/fog.h"
+#include "volume/volume_data.h"
 
 #include <fmt/format.h>
 #include <openvdb/tools/LevelSetUtil.h>
@@ -14,7 +14,6 @@
 #include "lamina/error.h"
 #include "lattice/morphology.h"
 #include "vdb/vdb_file.h"
-#include "volume/level_set.h"
 
 namespace lamina::volume {
 namespace {

@@ -1,4 +1,4 @@
-#include "volume/level_set.h"
+#include "volume/volume_data.h"
 
 #include <fmt/format.h>
 #include <openvdb/tools/VolumeToMesh.h>

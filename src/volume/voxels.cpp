@@ -10,8 +10,7 @@
 #include "base/run.h"
 #include "lamina/error.h"
 #include "vdb/grids.h"
-#include "volume/fog.h"
-#include "volume/level_set.h"
+#include "volume/volume_data.h"
 
 namespace lamina {
 namespace {

@@ -12,7 +12,7 @@
 #include "support/program.h"
 #include "vdb/grids.h"
 #include "vdb/vdb_file.h"
-#include "volume/fog.h"
+#include "volume/volume_data.h"
 
 namespace lamina {
 namespace {

@@ -8,7 +8,7 @@
 #include "lamina/render.h"
 #include "render/draw.h"
 #include "vdb/grids.h"
-#include "volume/level_set.h"
+#include "volume/volume_data.h"
 
 namespace lamina {
 namespace {

@@ -1,4 +1,4 @@
-#include "volume/fog.h"
+#include "volume/volume_data.h"
 
 #include <gtest/gtest.h>
 #include <openvdb/tools/LevelSetSphere.h>

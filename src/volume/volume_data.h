@@ -1,9 +1,20 @@
-// What a FogVolume (volume.h) holds, and how the inside of an open level set is told before it becomes one.
+// What a LevelSet and a FogVolume (volume.h) hold, and how the inside of an open level set is told before it becomes
+// fog.
 #pragma once
+#include <string>
+
 #include "lamina/volume.h"
 #include "vdb/grids.h"
 
 namespace lamina {
+
+struct LevelSet::Data {
+  openvdb::FloatGrid::ConstPtr grid;
+  openvdb::Vec3SGrid::ConstPtr colours;  ///< the file's grid Cd, sRGB in 0..1; null where there is none
+  std::string name;
+  std::string path;  ///< it came from, for messages; may be empty
+  bool open = false;
+};
 
 struct FogVolume::Data {
   openvdb::FloatGrid::ConstPtr grid;
