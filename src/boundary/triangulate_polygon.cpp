@@ -143,11 +143,13 @@ class Ears {
     std::size_t at = 0;
     for (std::size_t left = polygon_.size(); left > 3; --left) {
       at = find_widest();
-      if (!(width_[at] > 0)) {
+      for (const bool any : {false, true}) {
+        if (width_[at] > 0) break;
+        any_chord_ = any_chord_ || any;
         look_again();
         at = find_widest();
-        if (!(width_[at] > 0)) return false;
       }
+      if (!(width_[at] > 0)) return false;
       const std::size_t from = before_[at], to = next_[at];
       const Edge chord = edge_of(polygon_[from], polygon_[to]);
       // One that another triangle has by now.
@@ -187,7 +189,7 @@ class Ears {
     const Vec2 &a = point(from), &b = point(at), &c = point(to);
     const Edge chord = edge_of(polygon_[from], polygon_[to]);
     const double twice = twice_area(a, b, c);
-    if (!(twice > 0) || edges_.contains(chord) || !allowed_(chord[0], chord[1])) return 0;
+    if (!(twice > 0) || edges_.contains(chord) || (!any_chord_ && !allowed_(chord[0], chord[1]))) return 0;
     for (std::size_t i = next_[to]; i != from; i = next_[i]) {
       const std::uint32_t v = polygon_[i];
       if (v == polygon_[from] || v == polygon_[at] || v == polygon_[to]) continue;
@@ -202,6 +204,7 @@ class Ears {
   std::vector<std::size_t> next_, before_;
   std::vector<double> width_;  ///< of each corner; kGone: it was cut off
   std::set<Edge> edges_;       ///< of the polygon and of all triangles
+  bool any_chord_ = false;     ///< too few others are left
 };
 
 /// d lies in the circle around the anticlockwise triangle abc.
@@ -272,6 +275,34 @@ void flip_all(const std::vector<Vec2>& points, std::vector<PlaneTriangle>& trian
   for (int pass = 0; pass < kMostPasses && flip_once(points, triangles, allowed);) ++pass;
 }
 
+/// Splits edges within that are not allowed in their middle.
+void split_forbidden(std::vector<Vec2>& points, std::vector<double>& scale, std::vector<PlaneTriangle>& triangles,
+                     const std::function<bool(std::uint32_t, std::uint32_t)>& allowed) {
+  const std::vector<Side> sides = sides_of(triangles);
+  std::vector<bool> touched(triangles.size(), false);
+  bool again = false;
+  for (std::size_t i = 0; i + 1 < sides.size(); ++i) {
+    const auto [a, b] = sides[i].edge;
+    const std::array<std::uint32_t, 2> beside{sides[i].triangle, sides[i + 1].triangle};
+    if (sides[i + 1].edge != sides[i].edge || allowed(a, b)) continue;
+    if (touched[beside[0]] || touched[beside[1]]) {
+      again = true;
+      continue;
+    }
+    const auto middle = static_cast<std::uint32_t>(points.size());
+    points.push_back(0.5 * (points[a] + points[b]));
+    scale.push_back(0.5 * (scale[a] + scale[b]));
+    for (const std::uint32_t t : beside) {
+      touched[t] = true;
+      PlaneTriangle half = triangles[t];
+      std::replace(triangles[t].begin(), triangles[t].end(), a, middle);
+      std::replace(half.begin(), half.end(), b, middle);
+      triangles.push_back(half);
+    }
+  }
+  if (again) split_forbidden(points, scale, triangles, allowed);
+}
+
 /// Splits triangles that are too large at their centre; whether any was.
 bool split_large(std::vector<Vec2>& points, std::vector<double>& scale, std::vector<PlaneTriangle>& triangles) {
   const std::size_t count = triangles.size();
@@ -330,6 +361,7 @@ std::optional<std::vector<PlaneTriangle>> triangulate_by_ears(
 void refine_triangles(std::vector<Vec2>& points, std::vector<double>& scale, std::vector<PlaneTriangle>& triangles,
                       const std::function<bool(std::uint32_t, std::uint32_t)>& allowed) {
   constexpr int kMostRounds = 40;
+  split_forbidden(points, scale, triangles, allowed);
   flip_all(points, triangles, allowed);
   for (int round = 0; round < kMostRounds && split_large(points, scale, triangles); ++round)
     flip_all(points, triangles, allowed);

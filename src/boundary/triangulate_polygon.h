@@ -32,14 +32,15 @@ std::optional<std::vector<PlaneTriangle>> triangulate_by_area(
 
 /// Some triangulation of a polygon of the plane, anticlockwise, by cutting off ears (n^2 steps): for those too long to
 /// plan, before edges are flipped. `polygon`: its corners, numbers of `points`, which may run along an edge there and
-/// back. Nothing where chords that are not allowed leave none.
+/// back. Takes chords that are not allowed only where no other ear is left: refine_triangles() splits them. Nothing
+/// where none is left at all.
 std::optional<std::vector<PlaneTriangle>> triangulate_by_ears(
     const std::vector<Eigen::Vector2d>& points, const std::vector<std::uint32_t>& polygon,
     const std::function<bool(std::uint32_t, std::uint32_t)>& allowed);
 
 /// Adds points inside until triangles are about as large as the edges of the polygon around them (Liepa 2003), larger
-/// ones farther inside, and flips edges to Delaunay's in the plane. `points`: the polygon's corners, then what is
-/// added; `scale`: the length of edges wanted at each.
+/// ones farther inside, and flips edges to Delaunay's in the plane; splits edges inside that are not allowed. `points`:
+/// the polygon's corners, then what is added; `scale`: the length of edges wanted at each.
 void refine_triangles(std::vector<Eigen::Vector2d>& points, std::vector<double>& scale,
                       std::vector<PlaneTriangle>& triangles,
                       const std::function<bool(std::uint32_t, std::uint32_t)>& allowed);

@@ -26,9 +26,9 @@ void choose_for_noise(const RadiusSurvey& survey, bool cell_given, StageSettings
 }
 
 /// What an even, clean sampling allows: the narrowest support, and finer cells between sheets.
-void choose_for_even(bool cell_given, bool thins, StageSettings& out) {
+void choose_for_even(bool cell_given, double cell, StageSettings& out) {
   out.feed.blend = 1;
-  out.feed.cell = {thins ? kThinnedCell : kChosenCell, Length::Unit::sample_radius};
+  out.feed.cell = {cell, Length::Unit::sample_radius};
   out.projection.trusted_offset = kEvenTrust;
   out.projection.trusted_samples = kEvenTrustedSamples;
   if (cell_given) return;
@@ -52,7 +52,8 @@ StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& surve
   } else if (survey.noise > kNoisy) {
     choose_for_noise(survey, s.cell.has_value(), out);
   } else if (survey.high < kEven * survey.low) {
-    choose_for_even(s.cell.has_value(), !s.simplify.wanted() && s.deviation.value_or(kCleanDeviation) > 0, out);
+    const bool thins = !s.simplify.wanted() && s.deviation.value_or(kCleanDeviation) > 0;
+    choose_for_even(s.cell.has_value(), thins && survey.noise <= kSharp ? kThinnedCell : kChosenCell, out);
     // A closed mesh. Normals come with samples of a surface, which ends where they do; positions alone say nothing of
     // wide gaps among them.
     out.holes.watertight = info.found_normals ? Watertight::any_loops : Watertight::short_loops;

@@ -34,9 +34,9 @@ inline constexpr float kEven = 3;
 /// Largest leaf cell (sample radii) where it is chosen: no more than 1.3 M triangles of a million samples.
 inline constexpr double kChosenCell = 0.892;
 
-/// The same of an even, clean cloud whose mesh loses triangles where it is flat: it has no more of them then, and is
-/// nearer to the truth.
-inline constexpr double kThinnedCell = 0.8;
+/// The same of an even cloud with next to no noise (kSharp), which has detail to show, whose mesh loses triangles where
+/// it is flat: it has no more of them then, and is nearer to the truth.
+inline constexpr double kThinnedCell = 0.84;
 
 /// How far (cells) from its nearest sample a corner keeps a value: less on noise, whose outermost samples would make
 /// sheets of their own; more where cells between two sheets are half as large, so that values reach as far as before.

@@ -81,7 +81,24 @@ TEST(TriangulateByEars, KeepsOffChordsThatAreNotAllowed) {
     EXPECT_EQ(
         std::set<std::uint32_t>(t.begin(), t.end()).count(1) + std::set<std::uint32_t>(t.begin(), t.end()).count(3),
         2U);
-  EXPECT_FALSE(triangulate_by_ears(square, {0, 1, 2, 3}, [](auto, auto) { return false; }));
+}
+
+// Where the mesh has an edge already a filling may not have one: a vertex on it makes two of it.
+TEST(TriangulateByEars, ChordsThatAreNotAllowedAreSplitInTheEnd) {
+  std::vector<Vec2> points{{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+  const auto rim_only = [](std::uint32_t i, std::uint32_t j) { return std::max(i, j) >= 4 || (i + j) % 2 == 1; };
+  auto triangles = triangulate_by_ears(points, {0, 1, 2, 3}, rim_only);
+  ASSERT_TRUE(triangles);
+  std::vector<double> scale(4, 10);
+  refine_triangles(points, scale, *triangles, rim_only);
+  EXPECT_EQ(points.size(), 5U);
+  EXPECT_EQ(scale.size(), 5U);
+  double sum = 0;
+  for (const PlaneTriangle& t : *triangles) {
+    sum += area_of({points[t[0]], points[t[1]], points[t[2]]});
+    for (std::size_t k = 0; k < 3; ++k) EXPECT_TRUE(rim_only(t[k], t[(k + 1) % 3]));
+  }
+  EXPECT_DOUBLE_EQ(sum, 1);
 }
 
 }  // namespace
