@@ -48,6 +48,7 @@ void run_store(SortOptions& o) {
   settings.more_inputs.assign(o.inputs.begin() + 1, o.inputs.end());
   settings.reading = o.points;
   settings.bad_samples = o.settings.bad_samples;
+  if (o.tool->count("--align") == 0) settings.align = true;
   if (o.tool->count("--strays") == 0) settings.clean.strays = true;
   const RunContext context = make_context(o.run);
   const SurfaceStats stats = write_store(settings, o.store, context);
@@ -72,6 +73,7 @@ void run_sort(SortOptions& o) {
 void add_reading(CLI::App& tool, CLI::Option& store, SurfaceSettings& reading, std::optional<Trade>& preset) {
   const std::size_t before = tool.get_options().size();
   add_preset(tool, preset, "Store");
+  add_align(tool, reading.align, "Cleaning of the store");
   add_clean_options(tool, reading.clean, "Cleaning of the store");
   add_normals_choice(tool, reading.normals, "Normals of the store");
   add_normals_options(tool, reading.normal_search, "Normals of the store");

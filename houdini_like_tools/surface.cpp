@@ -80,6 +80,7 @@ void choose_what_is_not_given(const SurfaceOptions& o, SurfaceSettings& settings
     return;
   }
   if (reads_store(o)) return;
+  if (!given("--align")) settings.align = true;
   if (!given("--strays")) settings.clean.strays = launch().size == 1;
 }
 
@@ -236,6 +237,7 @@ void add_surface_options(CLI::App& tool, SurfaceOptions& o) {
              "Discard samples with a larger radius as undersampled; r is the median radius here; 0: none")
       ->group(samples);
 
+  add_align(tool, s.align, samples);
   add_clean_options(tool, s.clean, "Cleaning");
   tool.add_option("--rejected", s.rejected,
                   "Write the samples left out by these steps, strays above all, to a point file, with their attributes "

@@ -59,6 +59,13 @@ void add_clean_options(CLI::App& app, CleanSettings& s, const std::string& group
       ->group(group);
 }
 
+void add_align(CLI::App& tool, bool& align, const std::string& group) {
+  tool.add_flag("--align,!--keep-poses", align,
+                "Move scans that disagree a little, each as a whole, until they agree: files, the scans of a PTX or "
+                "E57, values of an attribute scan; --keep-poses: leave them where they are")
+      ->group(group);
+}
+
 void add_normals_choice(CLI::App& tool, std::optional<NormalsChoice>& normals, const std::string& group) {
   tool.add_option(
           "--normals", normals,

@@ -14,6 +14,9 @@ namespace lamina::tools {
 /// --clip, --every, --merge, --outliers, --neighbours, --spacing.
 void add_clean_options(CLI::App& app, CleanSettings& settings, const std::string& group);
 
+/// --align.
+void add_align(CLI::App& tool, bool& align, const std::string& group);
+
 /// --normals.
 void add_normals_choice(CLI::App& tool, std::optional<NormalsChoice>& normals, const std::string& group);
 

@@ -106,7 +106,8 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
   j["noise_p90"] = s.plan.high_noise;
   j["noisiest"] = {{"noise", s.plan.worst_noise}, {"position", s.plan.noisiest}};
   j["normal_noise"] = s.plan.normal_noise;
-  j["scans"] = {{"count", s.plan.scans}, {"overlap", s.plan.overlap}};
+  j["scans"] = {{"count", s.plan.scans},       {"overlap", s.plan.overlap},    {"places", s.alignment.places},
+                {"apart", s.alignment.before}, {"aligned", s.alignment.after}, {"moved", s.alignment.farthest}};
   j["blend"] = s.plan.blend;
   j["refit"] = s.plan.refit;
   j["cell"] = to_string(s.plan.cell);

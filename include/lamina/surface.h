@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "lamina/align.h"
 #include "lamina/clean.h"
 #include "lamina/clustering.h"
 #include "lamina/frame.h"
@@ -52,8 +53,10 @@ struct SurfaceSettings {
   /// normal it is dropped. A store's stay.
   std::optional<NormalsChoice> normals;
   NormalsSettings normal_search;  ///< how normals are found; its mode and bad_samples are those of this job
-  bool guess_trade = false;       ///< say what the cloud is taken for; normals that are found face as is usual there
-  double radius_scale = 1;        ///< > 0: multiplies every sample's radius, given or estimated
+  /// Scans that disagree a little are moved until they agree (align_scans()); a store's stay as they are.
+  bool align = false;
+  bool guess_trade = false;    ///< say what the cloud is taken for; normals that are found face as is usual there
+  double radius_scale = 1;     ///< > 0: multiplies every sample's radius, given or estimated
   std::uint32_t density = 16;  ///< samples a counting cell must hold to give a radius (Cuccuru et al. 2009, 3.1), >= 2
   CleanSettings clean;         ///< what is left out before radii are estimated
   Length max_radius;           ///< samples with a larger radius are discarded as undersampled; 0: none
@@ -173,6 +176,7 @@ struct SurfaceStats {
   SurfacePlan plan;
   std::uint64_t samples_read = 0;
   std::string crs;  ///< coordinate reference system of the input (PointSourceInfo::crs)
+  ScanAlignment alignment;
   CleanCounts cleaned;
   PruneCounts pruned;
   std::array<double, 3> shift{};          ///< SurfaceSettings::local: add it to the coordinates written

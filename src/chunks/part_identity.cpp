@@ -13,7 +13,7 @@ std::string mesh_settings(const SurfaceSettings& settings) {
   // Every setting by name: one that is added must be dealt with here, or this does not compile. What follows `chord`
   // does not change the mesh; names of files are not settings of it.
   const auto& [input, more_inputs, open, reading, output, more_outputs, receiver, frame, bad_samples, normals,
-               normal_search, guess_trade, radius_scale, density, clean, max_radius, blend, refit, steps,
+               normal_search, align, guess_trade, radius_scale, density, clean, max_radius, blend, refit, steps,
                step_tolerance, fit, diffuse, cell, levels, boundary, cluster, chord, vertex_levels, vertex_curvature,
                vertex_filled, close_holes, watertight, fill_all, trim, features, prune_triangles, prune_size, local,
                window, dry_run, rejected, simplify, deviation, volume, tiles] = settings;
@@ -28,7 +28,7 @@ std::string mesh_settings(const SurfaceSettings& settings) {
                                  : volume.wanted() ? "grid"
                                                    : "auto";
   return fmt::format(
-      "columns {}\nprojected {}\nselect {}\nframe {}\nbad_samples {}\nnormals {}\ncleaning {}\nparticlescale "
+      "columns {}\nprojected {}\nselect {}\nframe {}\nbad_samples {}\nnormals {}\nalign {}\ncleaning {}\nparticlescale "
       "{}\ndensity "
       "{}\nmax_radius {}\n"
       "blend {}\nrefit {}\nsteps {}\nstep_tolerance {}\nfit {}\ndiffuse {}\ncell {}\nlevels {}\nboundary {}\ncluster "
@@ -36,10 +36,11 @@ std::string mesh_settings(const SurfaceSettings& settings) {
       "chord {}\nlevel {}\ncurvature {}\nfilled {}\nclose_holes {}\nwatertight {}\nfill_all {}\ntrim {}\nfeatures {}\n"
       "deviation {}\n",
       reading.columns, reading.project_degrees, to_string(reading.select), frame_word, static_cast<int>(bad_samples),
-      normals_words(settings), cleaning_words(clean), radius_scale, density, to_string(max_radius), number(blend),
-      number(refit), steps, step_tolerance, static_cast<int>(fit), diffuse, cell ? to_string(*cell) : "auto", levels,
-      boundary, static_cast<int>(cluster), chord, vertex_levels, vertex_curvature, vertex_filled, number(close_holes),
-      word(watertight), fill_all, number(trim), word(features), number(deviation));
+      normals_words(settings), align, cleaning_words(clean), radius_scale, density, to_string(max_radius),
+      number(blend), number(refit), steps, step_tolerance, static_cast<int>(fit), diffuse,
+      cell ? to_string(*cell) : "auto", levels, boundary, static_cast<int>(cluster), chord, vertex_levels,
+      vertex_curvature, vertex_filled, number(close_holes), word(watertight), fill_all, number(trim), word(features),
+      number(deviation));
 }
 
 std::uint64_t job_hash(const SurfaceSettings& settings, const std::string& input_id, const ReconstructionPlan& plan) {

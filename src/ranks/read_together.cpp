@@ -188,11 +188,12 @@ class Reading {
     ranks_.together([&] {
       if (!ranks_.first()) return;
       source_ = open_inputs(settings_, directory_, job_.run);
-      // Normals that are found lie in a store of rank 0's; it deals them out.
+      // Normals that are found lie in a store of rank 0's, and only it knows how scans move; it deals the rows out.
       job_.watch.time("normals", [&] { source_ = choose_normals(std::move(source_), settings_, directory_, job_); });
+      source_ = choose_poses(std::move(source_), settings_, job_);
       require_samples(source_->info());
       put(words, source_->info());
-      words.put(!job_.stats.normals && can_be_shared(settings_, source_->info()));
+      words.put(!job_.stats.normals && !job_.stats.alignment.moved() && can_be_shared(settings_, source_->info()));
     });
     Bytes bytes = words.take();
     ranks_.broadcast(bytes);

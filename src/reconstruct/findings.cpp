@@ -8,9 +8,14 @@ namespace {
 /// A stretch is worth naming where it has so many times the usual noise.
 constexpr double kMuchNoisier = 1.5;
 
-std::string scans_text(const SurfacePlan& plan) {
+std::string scans_text(const SurfaceStats& stats) {
+  const SurfacePlan& plan = stats.plan;
   if (plan.scans < 2) return "";
-  return fmt::format(" of {} scans that share {:.0f} % of the places", plan.scans, 100 * plan.overlap);
+  std::string text = fmt::format(" of {} scans", plan.scans);
+  if (plan.overlap > 0) text += fmt::format(" that share {:.0f} % of the places", 100 * plan.overlap);
+  const ScanAlignment& a = stats.alignment;
+  if (a.moved()) text += fmt::format(", moved by up to {:.2g} and now {:.2g} apart", a.farthest, a.after);
+  return text;
 }
 
 std::string noise_text(const SurfacePlan& plan) {
@@ -34,7 +39,7 @@ std::string seen(const SurfaceStats& stats) {
   const SurfacePlan& plan = stats.plan;
   // Density radii are twice the spacing.
   std::string text = fmt::format("seen: {} samples{}, spacing {:.3g} ({:.3g} to {:.3g}); {}; {}", plan.samples,
-                                 scans_text(plan), plan.radius_median / 2, plan.radius_low / 2, plan.radius_high / 2,
+                                 scans_text(stats), plan.radius_median / 2, plan.radius_low / 2, plan.radius_high / 2,
                                  noise_text(plan), normals_text(stats));
   const std::uint64_t strays = stats.cleaned.lonely + stats.cleaned.off_surface;
   if (strays > 0) {

@@ -184,7 +184,7 @@ ReconstructionPlan plan_surface(const SurfaceSettings& settings, const StoredClo
   const ReconstructionPlan& plan = *made;
   SurfacePlan& told = job.stats.plan;
   told = summary_of(plan);
-  told.scans = std::max<std::size_t>(cloud.info.scans.size(), 1);
+  told.scans = std::max<std::uint64_t>({cloud.info.scans.size(), job.stats.alignment.scans, 1});
   told.overlap = cloud.ingested.overlap;
   told.threads = tbb::this_task_arena::max_concurrency();
   told.seconds = expected_seconds(plan, cloud.info, told.threads, job);

@@ -96,6 +96,7 @@ Json reading(const SurfaceSettings& settings, bool has_radius) {
   return {{"frame", frame == FrameMode::pca ? "pca" : "axis"},
           {"bad_samples", settings.bad_samples == BadSamples::drop ? "drop" : "refuse"},
           {"normals", normals_words(settings)},
+          {"align", settings.align},
           {"cleaning", cleaning_words(settings.clean)},
           {"select", to_string(settings.reading.select)},
           {"particlescale", has_radius ? settings.radius_scale : 1.0}};
@@ -104,6 +105,7 @@ Json reading(const SurfaceSettings& settings, bool has_radius) {
 bool is_asked_for(const std::string& key, const SurfaceSettings& settings) {
   if (key == "bad_samples") return false;
   if (key == "normals") return settings.normals && settings.normals != NormalsChoice::file;
+  if (key == "align") return settings.align;
   if (key == "cleaning") return !cleaning_words(settings.clean).empty();
   if (key == "select") return to_string(settings.reading.select) != to_string(PointSelection{});
   return key != "frame" || settings.frame || settings.volume.wanted();

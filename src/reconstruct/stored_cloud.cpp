@@ -219,6 +219,21 @@ std::unique_ptr<PointSource> choose_normals(std::unique_ptr<PointSource> source,
   return found;
 }
 
+std::unique_ptr<PointSource> choose_poses(std::unique_ptr<PointSource> source, const SurfaceSettings& settings,
+                                          Job& job) {
+  // In a dry run normals that are found are made up.
+  if (!settings.align || (settings.dry_run && source->info().found_normals)) return source;
+  job.watch.time("align", [&] { source = align_scans(std::move(source), job.stats.alignment, job.run); });
+  const ScanAlignment& found = job.stats.alignment;
+  if (found.moved()) {
+    job.run.info(
+        fmt::format("{} scans moved by up to {:.2g}: where two see the same they were {:.2g} apart and are "
+                    "{:.2g} (--keep-poses leaves them)",
+                    found.scans, found.farthest, found.before, found.after));
+  }
+  return source;
+}
+
 std::string normals_words(const SurfaceSettings& settings) {
   if (settings.normals == NormalsChoice::file) return "file";
   // Every setting by name: one that is added must be dealt with here, or this does not compile.
@@ -245,6 +260,7 @@ StoredCloud read_cloud(const SurfaceSettings& settings, const StorePlace& place,
   if (settings.normals != NormalsChoice::file) {
     job.watch.time("normals", [&] { source = choose_normals(std::move(source), settings, scratch, job); });
   }
+  source = choose_poses(std::move(source), settings, job);
   StoredCloud cloud = ingest_all(*source, settings, place, job);
   clean_cloud(cloud, settings, scratch, job);
   return cloud;

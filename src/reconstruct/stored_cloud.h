@@ -59,6 +59,11 @@ std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const 
 std::unique_ptr<PointSource> choose_normals(std::unique_ptr<PointSource> source, const SurfaceSettings& settings,
                                             const std::string& tmp_dir, Job& job);
 
+/// The source itself, or with its scans moved where the settings ask for it and that lets them agree
+/// (job.stats.alignment). Says so.
+std::unique_ptr<PointSource> choose_poses(std::unique_ptr<PointSource> source, const SurfaceSettings& settings,
+                                          Job& job);
+
 /// What the settings ask of normals in words: others where other normals come out.
 std::string normals_words(const SurfaceSettings& settings);
 
