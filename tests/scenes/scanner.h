@@ -78,6 +78,7 @@ struct ScannerErrors {
 
 struct SceneScan {
   Cloud cloud;
+  std::vector<std::size_t> begins;  ///< first sample of each view; outliers are behind the last
   double spacing = 0;
   std::vector<Vec3> places;  ///< evenly over the truth
   std::vector<Vec3> seen;    ///< those of them that some view sees
@@ -99,7 +100,10 @@ class SceneScanner {
     std::nth_element(spacings.begin(), spacings.begin() + static_cast<long>(spacings.size() / 2), spacings.end());
     SceneScan result;
     result.spacing = spacing_ = spacings[spacings.size() / 2];
-    for (std::size_t i = 0; i < views_.size(); ++i) add_returns(i, result.cloud);
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      result.begins.push_back(result.cloud.size());
+      add_returns(i, result.cloud);
+    }
     add_outliers(result.cloud);
     find_seen_places(places, result);
     return result;

@@ -28,10 +28,10 @@ const std::map<std::string, MeshQuality> kLimits{
   //                       error missing invented layers flipped normals parts flakes folds loops ragged turn coincident
   {"Knot",               {  0.20,   0.05,    0.03, 1.05,    0.03,    10.5,  2,   0.02, 0.03,  19,   1.4,   36,   0}},
   {"KnotWithoutNormals", {  0.20,   0.06,    0.04, 1.05,    0.03,    10.5,  2,   0.02, 0.03,  19,   1.4,   37,   0}},
-  {"KnotBadlyScanned",   {  0.95,   0.3,     0.8,  1.05,    0.4,     24,   20,   1.3,  0.075, 24,   1.5,   36,   0}},
+  {"KnotBadlyScanned",   {  0.95,   0.3,     0.8,  1.05,    0.4,     24,   20,   2.2,  0.14,  24,   1.5,   36,   0}},
   {"KnotFromOneSide",    {  0.43,   1.35,    0.8,  1.0,     0.6,     15,   11,   1.2,  0.13,  11,   1.25,  27,   0}},
-  {"Facade",             {  0.18,   0.11,    0.15, 0.96,    0.15,    37,   11,   0.45, 0.05,  22,   1.25,  24,   0}},
-  {"Room",               {  0.19,   2.1,     0.15, 1.0,     0.4,     37,   11,   0.5,  0.05,  24,   1.3,   33,   0}},
+  {"Facade",             {  0.18,   0.11,    0.15, 0.96,    0.15,    37,   11,   1,    0.05,  22,   1.25,  24,   0}},
+  {"Room",               {  0.19,   2.1,     0.15, 1.0,     0.4,     37,   11,   1,    0.05,  24,   1.3,   33,   0}},
   {"ThinPlate",          {  0.155,  0,       0,    1.05,    0.02,    41,    2,   0.02, 0.05,   1,   1,      0,   0}},
   {"Terraces",           {  0.21,   0.05,    0.09, 1.0,     0.3,     48,    9,   0.45, 0.08,  25,   1.45,  31,   0}},
 };
@@ -62,6 +62,7 @@ TEST_P(ScannedScene, KeepsItsLimits) {
   // What lamina surface does without options.
   settings.blend.reset();
   settings.prune_triangles.reset();
+  settings.deviation.reset();
   settings.clean.strays = true;
   reconstruct_surface(settings, {});
   const MeshQuality q = judge_mesh(read_mesh(settings.output), truth, scan);
@@ -81,6 +82,39 @@ TEST_P(ScannedScene, KeepsItsLimits) {
   EXPECT_LE(q.ragged, limits.ragged);
   EXPECT_LE(q.turn, limits.turn);
   EXPECT_LE(q.coincident, limits.coincident);
+}
+
+// Of a cloud that says whose its samples are the scans are moved until they agree: what is left is noise, averaged.
+TEST(ScannedScenes, AreNearerToTheTruthWhereScansAreTold) {
+  const std::vector<Scene> scenes = all_scenes(1);
+  for (const std::string name : {"Knot", "KnotBadlyScanned"}) {
+    const auto scene = std::find_if(scenes.begin(), scenes.end(), [&](const Scene& s) { return s.name == name; });
+    const TriangleMesh truth = scene->truth();
+    SceneScan scan = SceneScanner(truth, scene->views, scene->errors).scan(10000);
+    scan.cloud.extra = {{"scan", ScalarType::uint8}};
+    scan.cloud.values.resize(1);
+    for (std::size_t i = 0; i < scan.cloud.size(); ++i) {
+      const auto next = std::upper_bound(scan.begins.begin(), scan.begins.end(), i);
+      scan.cloud.values[0].push_back(static_cast<double>(next - scan.begins.begin()));
+    }
+    const test::TemporaryFolder folder;
+    SurfaceSettings settings;
+    settings.input = write_points(scan.cloud, true, folder / "in.ply");
+    settings.output = folder / "out.ply";
+    settings.blend.reset();
+    settings.prune_triangles.reset();
+    settings.deviation.reset();
+    settings.clean.strays = true;
+    const auto error = [&](bool align) {
+      settings.align = align;
+      const SurfaceStats stats = reconstruct_surface(settings, {});
+      EXPECT_EQ(stats.alignment.moved(), align);
+      return judge_mesh(read_mesh(settings.output), truth, scan).error;
+    };
+    const double before = error(false), after = error(true);
+    std::cout << name << ": " << before << ", " << after << '\n';
+    EXPECT_LT(after, 0.8 * before) << name;
+  }
 }
 
 // The measures on meshes whose faults are known.
