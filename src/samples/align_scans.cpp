@@ -142,8 +142,7 @@ class Alignment {
       for (std::size_t s = 0; s < motions_.size(); ++s) {
         const RigidMotion& by = found.motions[s];
         motions_[s] = {by.turn * motions_[s].turn, by(motions_[s].shift)};
-        for (const OrientedPoint& p : places)
-          farthest = std::max(farthest, (by(p.at - middle_) - (p.at - middle_)).norm());
+        farthest = std::max(farthest, farthest_moved(by, places));
       }
       if (farthest < kSmallMotion * agreement.radius()) return;
     }
@@ -151,10 +150,7 @@ class Alignment {
 
   [[nodiscard]] ScanAlignment told(const std::vector<OrientedPoint>& places) const {
     ScanAlignment told{scan_.scans(), first_.places, first_.before, after_.value_or(first_.before), 0};
-    for (const RigidMotion& by : motions_) {
-      for (const OrientedPoint& p : places)
-        told.farthest = std::max(told.farthest, (by(p.at - middle_) - (p.at - middle_)).norm());
-    }
+    for (const RigidMotion& by : motions_) told.farthest = std::max(told.farthest, farthest_moved(by, places));
     return told;
   }
   /// In input coordinates.
@@ -165,6 +161,11 @@ class Alignment {
   }
 
  private:
+  [[nodiscard]] double farthest_moved(const RigidMotion& by, const std::vector<OrientedPoint>& places) const {
+    double farthest = 0;
+    for (const OrientedPoint& p : places) farthest = std::max(farthest, (by(p.at - middle_) - (p.at - middle_)).norm());
+    return farthest;
+  }
   void look(ScanAgreement& agreement) {
     for_rows(source_, run_, [&](const SampleBatch& batch) {
       for (std::size_t i = 0; i < batch.size(); ++i) {
