@@ -113,6 +113,7 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
   j["cell"] = to_string(s.plan.cell);
   j["sheet_refinement"] = s.plan.refine_sheets;
   j["watertight"] = s.plan.watertight;
+  j["bridge"] = s.plan.bridge;
   j["trim"] = s.plan.trim;
   j["features"] = s.plan.features;
   j["deviation"] = s.plan.deviation;

@@ -82,6 +82,18 @@ void add_hole_options(CLI::App& tool, SurfaceSettings& settings, const std::stri
                      [&settings](const std::optional<double>& radii) { settings.close_holes = radii; })
       ->option_text("RADII|auto [auto]")
       ->group(group);
+  tool.add_option_function<std::string>(
+          "--bridge",
+          [&settings](const std::string& word) {
+            settings.bridge = word == "auto" ? std::nullopt : std::optional(word == "yes");
+          },
+          "Bridge gaps of that length whose rims are too bent to show it, where the surface leads into them from all "
+          "around; auto: where --blend is auto and the cloud is of several scans or came without normals, since gaps "
+          "in it are what nobody saw")
+      ->check(CLI::IsMember({"auto", "yes", "no"}).description(""))
+      ->type_name("auto|yes|no")
+      ->default_str("auto")
+      ->group(group);
   tool.add_flag("--filled", settings.vertex_filled,
                 "Give vertices a property filled: 1 where one was added to close a hole, else 0: 'lamina render "
                 "mesh.ply --paint filled'")

@@ -14,7 +14,7 @@ struct OpenLoop {
   double radii = 0;                  ///< the same length in local influence radii
   std::uint64_t edges = 0;
   /// Why it stays open: "long", "outer boundary" (the surface lies inside it), "bent" (the surface around it does not
-  /// tell how to continue), "occupied" (another boundary runs through it).
+  /// tell how to continue, or turns away from it), "occupied" (another boundary runs through it).
   std::string reason;
 };
 
@@ -34,6 +34,9 @@ struct HoleSettings {
   /// smooth surface (boundary/closure.h).
   Watertight watertight = Watertight::no;
   static constexpr double kWatertight = 24;
+  /// Loops up to `longest` around which nothing flat tells how the surface goes on are closed by a smooth surface over
+  /// the rim (boundary/closure.h) where the surface leads into them from all around, the more so the longer they are.
+  bool bridge = false;
   /// Vertices' last attribute says which of them were added: those that are get 1.
   bool mark = false;
   /// What stays open then is closed all the same, by surfaces that rest on nothing but the rims (boundary/closure.h).

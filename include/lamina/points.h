@@ -42,9 +42,15 @@ struct PointSourceInfo {
   bool from_above = false;           ///< wide and flat, with the returns or classes of surveys from the air
   std::string crs;                   ///< coordinate reference system: well-known text or EPSG:NUMBER; empty: not told
   std::vector<ScanPart> scans;       ///< ascending, the first begins with row 0; empty: one scan, nothing known of it
+  bool scans_told = false;           ///< that it is of several scans is known, but no longer which rows are whose
   AttributeLayout attributes;        ///< every other scalar property, in the file's order and types
   std::vector<std::string> remarks;  ///< what the user should know, one line each: guesses, things left out
 };
+
+/// Whether a cloud is known to be of several scans: by `scans`, by an attribute `scan`, or by what it was read from.
+inline bool tells_scans(const PointSourceInfo& info) {
+  return info.scans_told || info.scans.size() > 1 || find_attribute(info.attributes, "scan");
+}
 
 /// What people call a coordinate reference system (PointSourceInfo::crs): the name in the text, or the text itself.
 std::string crs_name(const std::string& crs);

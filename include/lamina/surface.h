@@ -90,7 +90,10 @@ struct SurfaceSettings {
   /// object is taken to be closed then. Unset: chosen where `blend` is (where the samples came with normals, only if
   /// none longer than 24 R is left), else false.
   std::optional<bool> watertight;
-  /// Close everything: what `close_holes` and `watertight` leave open gets surfaces that rest on nothing but its rim.
+  /// Bridge gaps with bent rims where the surface leads into them from all around (HoleSettings::bridge). Unset: where
+  /// `blend` is chosen and gaps are what nobody saw: in clouds of several scans, and in those that came without normals.
+  std::optional<bool> bridge;
+  /// Close everything: what `close_holes`, `bridge` and `watertight` leave open gets surfaces that rest on nothing but its rim.
   /// Vertices get an attribute `invented`: 1 where one was added for that, else 0. Not with ClusterMode::free.
   bool fill_all = false;
   /// R, 0 <= trim < 1: the mesh is cut along the curve where it reaches so far beyond the samples that carry it (where
@@ -139,6 +142,7 @@ struct SurfacePlan {
   Length cell;
   bool refine_sheets = false;  ///< half of it where things are thin
   bool watertight = false;     ///< as given or chosen
+  bool bridge = false;         ///< as given or chosen
   double trim = 0;             ///< R, as given or chosen
   bool features = false;       ///< as given or chosen
   double deviation = 0;        ///< as given or chosen

@@ -193,6 +193,22 @@ void HoleCloser::settle_occupied(std::vector<Closing>& closings) const {
   for (const std::size_t island : taken) closings[island].filling.verdict = Verdict::joined;
 }
 
+void HoleCloser::bridge_gaps(std::vector<Closing>& closings) const {
+  std::vector<Closing> bridges(loops_.size());
+  tbb::parallel_for(std::size_t{0}, loops_.size(), [&](std::size_t l) {
+    if (closings[l].filling.verdict != Verdict::bent) return;
+    const auto& [loop, extent] = loops_[l];
+    Closure closure = close_loop(loop);
+    if (closure.leads_in < kBridgeLeadsIn + kBridgePerRadius * extent.radii) return;
+    bridges[l].filling = std::move(closure.filling);
+    bridges[l].filling.verdict = Verdict::filled;
+  });
+  const std::vector<std::vector<std::size_t>> occupants = find_occupants(bridges);
+  for (std::size_t l = 0; l < loops_.size(); ++l) {
+    if (bridges[l].is_closed() && occupants[l].empty()) closings[l] = std::move(bridges[l]);
+  }
+}
+
 bool HoleCloser::may_be_closed_thing(std::uint64_t vertices, const std::vector<Closing>& closings) const {
   std::uint64_t edges = 0;
   for (std::size_t l = 0; l < loops_.size(); ++l) {
@@ -314,6 +330,7 @@ Addition HoleCloser::finish(std::uint64_t vertices) {
   std::vector<Closing> closings(loops_.size());
   fill_all(closings);
   settle_occupied(closings);
+  if (settings_.bridge) bridge_gaps(closings);
   if (may_be_closed_thing(vertices, closings) && close_wide(closings)) fill_rest(closings);
   if (settings_.all) {
     sort_loops(long_);

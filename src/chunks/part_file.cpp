@@ -65,6 +65,7 @@ nlohmann::json to_json(const PartInfo& info) {
           {"comments", info.comments},
           {"close_holes", info.holes.longest},
           {"watertight", static_cast<int>(info.holes.watertight)},
+          {"bridge", info.holes.bridge},
           {"mark_filled", info.holes.mark},
           {"fill_all", info.holes.all},
           {"deviation", info.deviation},
@@ -88,7 +89,7 @@ PartInfo info_from(const nlohmann::json& j) {
   }
   info.comments = j.at("comments").get<std::vector<std::string>>();
   info.holes = {j.at("close_holes").get<double>(), static_cast<Watertight>(j.at("watertight").get<int>()),
-                j.at("mark_filled").get<bool>(), j.at("fill_all").get<bool>()};
+                j.at("bridge").get<bool>(), j.at("mark_filled").get<bool>(), j.at("fill_all").get<bool>()};
   info.deviation = j.at("deviation").get<double>();
   info.vertices = j.at("vertices").get<std::uint64_t>();
   info.triangles = j.at("triangles").get<std::uint64_t>();

@@ -15,7 +15,7 @@ std::string mesh_settings(const SurfaceSettings& settings) {
   const auto& [input, more_inputs, open, reading, output, more_outputs, receiver, frame, bad_samples, normals,
                normal_search, align, guess_trade, radius_scale, density, clean, max_radius, blend, refit, steps,
                step_tolerance, fit, diffuse, cell, levels, boundary, cluster, chord, vertex_levels, vertex_curvature,
-               vertex_filled, close_holes, watertight, fill_all, trim, features, prune_triangles, prune_size, local,
+               vertex_filled, close_holes, watertight, bridge, fill_all, trim, features, prune_triangles, prune_size, local,
                window, dry_run, rejected, simplify, deviation, volume, tiles] = settings;
   // Jobs of several runs refuse these: require_mesh_alone().
   (void)prune_triangles, (void)prune_size, (void)local, (void)tiles, (void)open, (void)receiver, (void)rejected;
@@ -33,13 +33,13 @@ std::string mesh_settings(const SurfaceSettings& settings) {
       "{}\nmax_radius {}\n"
       "blend {}\nrefit {}\nsteps {}\nstep_tolerance {}\nfit {}\ndiffuse {}\ncell {}\nlevels {}\nboundary {}\ncluster "
       "{}\n"
-      "chord {}\nlevel {}\ncurvature {}\nfilled {}\nclose_holes {}\nwatertight {}\nfill_all {}\ntrim {}\nfeatures {}\n"
+      "chord {}\nlevel {}\ncurvature {}\nfilled {}\nclose_holes {}\nwatertight {}\nbridge {}\nfill_all {}\ntrim {}\nfeatures {}\n"
       "deviation {}\n",
       reading.columns, reading.project_degrees, to_string(reading.select), frame_word, static_cast<int>(bad_samples),
       normals_words(settings), align, cleaning_words(clean), radius_scale, density, to_string(max_radius),
       number(blend), number(refit), steps, step_tolerance, static_cast<int>(fit), diffuse,
       cell ? to_string(*cell) : "auto", levels, boundary, static_cast<int>(cluster), chord, vertex_levels,
-      vertex_curvature, vertex_filled, number(close_holes), word(watertight), fill_all, number(trim), word(features),
+      vertex_curvature, vertex_filled, number(close_holes), word(watertight), word(bridge), fill_all, number(trim), word(features),
       number(deviation));
 }
 

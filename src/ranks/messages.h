@@ -80,7 +80,8 @@ class Unpacker {
 inline void put(Packer& out, const PointSourceInfo& info) {
   out.put(info.path);
   out.put(info.count);
-  for (const bool flag : {info.has_normals, info.found_normals, info.has_radius, info.has_quality}) out.put(flag);
+  for (const bool flag : {info.has_normals, info.found_normals, info.has_radius, info.has_quality, tells_scans(info)})
+    out.put(flag);
   out.put(info.attributes.size());
   for (const AttributeSpec& a : info.attributes) {
     out.put(a.name);
@@ -92,7 +93,8 @@ inline PointSourceInfo get_info(Unpacker& in) {
   PointSourceInfo info;
   info.path = in.get_text();
   info.count = in.get<std::uint64_t>();
-  for (bool* flag : {&info.has_normals, &info.found_normals, &info.has_radius, &info.has_quality})
+  for (bool* flag :
+       {&info.has_normals, &info.found_normals, &info.has_radius, &info.has_quality, &info.scans_told})
     *flag = in.get<bool>();
   const auto attributes = in.get<std::size_t>();
   for (std::size_t a = 0; a < attributes; ++a) {

@@ -74,7 +74,11 @@ StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& surve
   out.holes.mark = s.vertex_filled;
   out.holes.all = s.fill_all;
   if (s.watertight) out.holes.watertight = *s.watertight ? Watertight::any_loops : Watertight::no;
-  if (out.holes.longest == 0) out.holes.watertight = Watertight::no;
+  out.holes.bridge = s.bridge.value_or(!s.blend && (info.found_normals || tells_scans(info)));
+  if (out.holes.longest == 0) {
+    out.holes.watertight = Watertight::no;
+    out.holes.bridge = false;
+  }
   out.feed.radius_scale = static_cast<float>(s.radius_scale);
   out.projection.fit = s.fit == FitMode::sphere ? Fit::sphere : Fit::plane;
   out.projection.steps = s.steps == 0 ? kMostProjections : s.steps;

@@ -64,6 +64,7 @@ std::string chosen(const SurfaceSettings& s, const SurfacePlan& plan) {
                                            plan.sharpen ? " (and normals found again at edges)" : ""));
   add(!s.close_holes, fmt::format("--close-holes {:g}", plan.longest_rim));
   add(!s.watertight && !s.blend, fmt::format("--watertight {}", plan.watertight ? "yes" : "no"));
+  add(!s.bridge && !s.blend, fmt::format("--bridge {}", plan.bridge ? "yes" : "no"));
   add(!s.deviation && !s.simplify.wanted(), fmt::format("--deviation {:g}", plan.deviation));
   return text.empty() ? text : "\nchosen:" + text;
 }

@@ -38,8 +38,13 @@ Eigen::Vector3d vector_from(const Json& j) {
 Json to_json(const PointSourceInfo& info) {
   Json attributes = Json::array();
   for (const AttributeSpec& a : info.attributes) attributes.push_back({{"name", a.name}, {"type", ply_name(a.type)}});
-  return {{"path", info.path},         {"rows", info.count},          {"found_normals", info.found_normals},
-          {"radius", info.has_radius}, {"quality", info.has_quality}, {"crs", info.crs},
+  return {{"path", info.path},
+          {"rows", info.count},
+          {"found_normals", info.found_normals},
+          {"radius", info.has_radius},
+          {"quality", info.has_quality},
+          {"crs", info.crs},
+          {"scans_told", tells_scans(info)},
           {"attributes", attributes}};
 }
 
@@ -52,6 +57,7 @@ PointSourceInfo info_from(const Json& j) {
   info.has_radius = j.at("radius").get<bool>();
   info.has_quality = j.at("quality").get<bool>();
   info.crs = j.value("crs", std::string());  // older stores have none
+  info.scans_told = j.value("scans_told", false);
   for (const Json& a : j.at("attributes")) {
     const auto type = ply_type(a.at("type").get<std::string>());
     if (!type) throw std::invalid_argument("type");

@@ -235,6 +235,8 @@ void check_settings(const SurfaceSettings& s) {
   require(s.close_holes.value_or(0) >= 0, "--close-holes", "0 (none) or positive, in influence radii");
   require(!s.watertight.value_or(false) || (s.close_holes.value_or(1) > 0 && s.cluster != ClusterMode::free),
           "--watertight", "left out with --close-holes 0 and with --cluster free, which close no holes");
+  require(!s.bridge.value_or(false) || (s.close_holes.value_or(1) > 0 && s.cluster != ClusterMode::free), "--bridge",
+          "left out with --close-holes 0 and with --cluster free, which close no holes");
   require(!s.fill_all || s.cluster != ClusterMode::free, "--fill all",
           "left out with --cluster free, which lets boundary loops meet");
   require(!s.trim || (*s.trim >= 0 && *s.trim < 1), "--trim", "auto or in [0, 1), in influence radii");
@@ -333,6 +335,7 @@ SurfacePlan summary_of(const ReconstructionPlan& p) {
   out.cell = p.feed.cell;
   out.refine_sheets = p.feed.refine_sheets;
   out.watertight = p.holes.watertight != Watertight::no;
+  out.bridge = p.holes.bridge;
   out.trim = p.vertices.trim;
   out.deviation = p.simplify.deviation;
   out.longest_rim = p.holes.longest;

@@ -49,6 +49,24 @@ TEST(ChooseSupport, PositionsAloneMayHaveWideGaps) {
   EXPECT_EQ(choice_of(by_noise(), survey(0.2F, 2.5F), true).holes.watertight, Watertight::no);
 }
 
+TEST(ChooseSupport, GapsThatNobodySawAreBridged) {
+  EXPECT_TRUE(choice_of(by_noise(), survey(0.2F, 8), true).holes.bridge);
+  PointSourceInfo info;
+  EXPECT_FALSE(choose_support(by_noise(), survey(0.2F, 8), info).holes.bridge);
+  info.attributes.push_back({"scan", ScalarType::uint8});
+  EXPECT_TRUE(choose_support(by_noise(), survey(0.2F, 8), info).holes.bridge);
+  EXPECT_FALSE(choose_support({}, survey(0.2F, 8), info).holes.bridge) << "nothing is chosen unless asked for";
+  info.attributes.clear();
+  info.scans.resize(2);
+  EXPECT_TRUE(choose_support(by_noise(), survey(0.01F, 2), info).holes.bridge);
+  SurfaceSettings settings = by_noise();
+  settings.bridge = false;
+  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2), info).holes.bridge);
+  settings = by_noise();
+  settings.close_holes = 0;
+  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2), info).holes.bridge);
+}
+
 TEST(ChooseSupport, ClosedMeshesAreMadeWhereAskedFor) {
   SurfaceSettings settings;
   EXPECT_EQ(choice_of(settings, survey(0.01F, 2)).holes.watertight, Watertight::no);

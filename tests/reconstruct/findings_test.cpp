@@ -33,7 +33,7 @@ TEST(Findings, WhatWasSeenAndChosen) {
   EXPECT_THAT(said, HasSubstr("900 samples of 3 scans that share 34 % of the places, spacing 1 (0.5 to 4)"));
   EXPECT_THAT(said, HasSubstr("noise 0.1 r, a tenth above 0.25 r, 0.2 r around 1,2,3; normals of the file"));
   EXPECT_THAT(said, HasSubstr("; 100 strays (10 %) left out\nchosen: --blend 1.5 "));
-  EXPECT_THAT(said, HasSubstr(" --trim 0.18 --features no --close-holes 300 --watertight no"));
+  EXPECT_THAT(said, HasSubstr(" --trim 0.18 --features no --close-holes 300 --watertight no --bridge no"));
 }
 
 TEST(Findings, WhereEverythingWasGivenNothingWasChosen) {

@@ -171,6 +171,7 @@ RC_GTEST_PROP(SurfaceFuzz, BadShapesWithAnySettings, (unsigned seed)) {
   s.cluster = static_cast<ClusterMode>(pick(random, 3));
   s.close_holes = s.cluster == ClusterMode::free ? 0 : maybe(40.0, 8.0);
   if (s.close_holes > 0 && pick(random, 2) == 0) s.watertight = pick(random, 3) > 0;
+  if (s.close_holes > 0 && pick(random, 2) == 0) s.bridge = pick(random, 3) > 0;
   s.steps = static_cast<int>(pick(random, 5));
   s.diffuse = maybe(true, false);
   s.fit = static_cast<FitMode>(pick(random, 2));

@@ -103,8 +103,33 @@ Cloud cube_cloud(std::size_t count, const std::function<bool(const Point3&)>& ke
   return cloud;
 }
 
+std::function<bool(const Point3&)> away_from_corner(double distance) {
+  return [distance](const Point3& p) { return std::hypot(p[0] - 1, p[1] - 1, p[2] - 1) >= distance; };
+}
+
 bool beside_corner(const Point3& p) {
-  return std::hypot(p[0] - 1, p[1] - 1, p[2] - 1) < 0.8;
+  return !away_from_corner(0.8)(p);
+}
+
+TEST(Holes, WithBentRimsAreBridgedWhereTheSurfaceLeadsIntoThem) {
+  const Cloud cloud = cube_cloud(20000, away_from_corner(0.5));
+  SurfaceSettings s = closing(300);
+  s.watertight = false;
+  const Reconstruction open = test::reconstruct(cloud, s);
+  ASSERT_EQ(open.stats.holes.open, 1U);
+  EXPECT_EQ(open.stats.holes.longest.front().reason, "bent");
+  s.bridge = true;
+  const Reconstruction bridged = test::reconstruct(cloud, s);
+  EXPECT_TRUE(bridged.facts.is_closed_manifold());
+  EXPECT_EQ(bridged.facts.euler, std::vector<long>{2});
+  for (std::size_t v = open.mesh.positions.size(); v < bridged.mesh.positions.size(); ++v) {
+    const Point3& p = bridged.mesh.positions[v];
+    EXPECT_LT(std::max({p[0], p[1], p[2]}), 1.05);
+    EXPECT_GT(p[0] + p[1] + p[2], 2.25) << "farther in than across the corner that is missing";
+  }
+  EXPECT_EQ(test::reconstruct(cube_cloud(20000, away_from_corner(0.95)), s).stats.holes.open, 1U) << "too wide";
+  const auto open_above = [](const Point3& p) { return p[2] < 1; };
+  EXPECT_EQ(test::reconstruct(cube_cloud(20000, open_above), s).stats.holes.open, 1U) << "a box without its lid";
 }
 
 TEST(Holes, WideOnesOfAClosedThingAreClosedWhereTheSurfaceLeadsIntoThem) {
@@ -258,6 +283,7 @@ RC_GTEST_PROP(Holes, RandomGapsStayManifoldAndTheSameBytes, ()) {
   const test::TemporaryFolder folder;
   SurfaceSettings s = closing(*rc::gen::element(6.0, 8.0, 20.0, 300.0));
   s.watertight = *rc::gen::arbitrary<bool>();
+  s.bridge = *rc::gen::arbitrary<bool>();
   s.input = test::write_cloud(cloud, folder / "in.ply");
   s.output = folder / "out.ply";
   RunContext run;
