@@ -1,6 +1,7 @@
 #include "e57/paged_file.h"
 
 #include <fmt/format.h>
+#include <nmmintrin.h>
 
 #include <algorithm>
 #include <array>
@@ -10,7 +11,6 @@
 
 #include "base/descriptor.h"
 #include "base/little_endian.h"
-#include "e57/crc32c.h"
 #include "lamina/error.h"
 
 namespace lamina::e57 {
@@ -87,6 +87,71 @@ std::uint64_t payload_offset(std::uint64_t file_offset) {
 
 std::uint64_t file_offset(std::uint64_t payload_offset) {
   return payload_offset / kPagePayload * kPageBytes + payload_offset % kPagePayload;
+}
+
+std::uint32_t crc32c(const std::byte* data, std::size_t bytes) {
+  std::uint64_t crc = 0xFFFFFFFF;
+  for (; bytes >= 8; bytes -= 8, data += 8) crc = _mm_crc32_u64(crc, load_little<std::uint64_t>(data));
+  auto narrow = static_cast<std::uint32_t>(crc);
+  for (; bytes > 0; --bytes, ++data) narrow = _mm_crc32_u8(narrow, std::to_integer<unsigned char>(*data));
+  return ~narrow;
+}
+
+namespace {
+
+/// The checksum stands with its highest byte first.
+void add_checksum(std::byte* page) {
+  const std::uint32_t crc = crc32c(page, kPagePayload);
+  for (unsigned k = 0; k < 4; ++k) page[kPagePayload + k] = static_cast<std::byte>(crc >> (24 - 8 * k));
+}
+
+}  // namespace
+
+int PageWriter::append(int fd, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const std::size_t in_page = filled_ % kPagePayload;
+    const std::size_t n = std::min(kPagePayload - in_page, bytes.size());
+    std::memcpy(pages_.data() + filled_ / kPagePayload * kPageBytes + in_page, bytes.data(), n);
+    filled_ += n;
+    payload_ += n;
+    bytes = bytes.subspan(n);
+    if (filled_ < kPages * kPagePayload) continue;
+    if (const int error = write_pages(fd); error != 0) return error;
+  }
+  return 0;
+}
+
+int PageWriter::finish(int fd) {
+  constexpr std::array<std::byte, kPagePayload> kZeros{};
+  const std::size_t over = payload_ % kPagePayload;
+  if (over > 0) {
+    if (const int error = append(fd, std::span(kZeros).first(kPagePayload - over)); error != 0) return error;
+  }
+  return filled_ > 0 ? write_pages(fd) : 0;
+}
+
+void PageWriter::put(std::size_t offset, std::span<const std::byte> bytes) {
+  // In memory still, or written already.
+  if (payload_ == filled_) std::memcpy(pages_.data() + offset, bytes.data(), bytes.size());
+  std::memcpy(first_.data() + offset, bytes.data(), bytes.size());
+}
+
+std::string PageWriter::first_page() const {
+  std::vector<std::byte> page = first_;
+  add_checksum(page.data());
+  return {reinterpret_cast<const char*>(page.data()), page.size()};
+}
+
+int PageWriter::write_pages(int fd) {
+  if (payload_ == filled_) std::memcpy(first_.data(), pages_.data(), kPageBytes);
+  const std::size_t pages = filled_ / kPagePayload;
+  for (std::size_t i = 0; i < pages; ++i) {
+    add_checksum(pages_.data() + i * kPageBytes);
+    hash_ = (hash_ ^ crc32c(pages_.data() + i * kPageBytes, kPagePayload)) * 0x9E3779B97F4A7C15ULL;
+    hash_ ^= hash_ >> 29U;
+  }
+  filled_ = 0;
+  return write_all(fd, pages_.data(), pages * kPageBytes);
 }
 
 }  // namespace lamina::e57

@@ -1,5 +1,5 @@
 // The first layer: where every point lies, which return of its pulse it is, and what else is new about it. One code for
-// both ways, as integer_codec.h.
+// both ways, as field_codecs.h.
 #pragma once
 #include <array>
 #include <cstddef>
@@ -8,8 +8,7 @@
 
 #include "base/little_endian.h"
 #include "laz/layers.h"
-#include "laz/return_contexts.h"
-#include "laz/running_median.h"
+#include "laz/point_contexts.h"
 
 namespace lamina::laz {
 

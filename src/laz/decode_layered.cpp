@@ -11,10 +11,10 @@
 #include <utility>
 
 #include "base/little_endian.h"
-#include "laz/arithmetic_decoder.h"
+#include "laz/arithmetic_coder.h"
+#include "laz/chunks.h"
 #include "laz/core_layer.h"
 #include "laz/layers.h"
-#include "laz/point_chunk.h"
 
 namespace lamina::laz {
 namespace {

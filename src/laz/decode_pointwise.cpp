@@ -7,14 +7,10 @@
 #include <optional>
 
 #include "base/little_endian.h"
-#include "laz/arithmetic_decoder.h"
-#include "laz/colour_codec.h"
-#include "laz/gps_time_codec.h"
-#include "laz/integer_codec.h"
-#include "laz/model_bank.h"
-#include "laz/point_chunk.h"
-#include "laz/return_contexts.h"
-#include "laz/running_median.h"
+#include "laz/arithmetic_coder.h"
+#include "laz/chunks.h"
+#include "laz/field_codecs.h"
+#include "laz/point_contexts.h"
 
 namespace lamina::laz {
 namespace {
@@ -140,6 +136,24 @@ void decode_pointwise(const RecordLayout& layout, std::span<const std::byte> chu
   if (decode_unbounded(layout, chunk, count, records) != chunk.size()) {
     throw Damaged("its points take fewer bytes than it has");
   }
+}
+
+std::vector<TabledChunk> decode_chunk_table(std::span<const std::byte> code, std::uint32_t chunks, bool with_points,
+                                            std::uint64_t most_bytes) {
+  std::vector<TabledChunk> table;
+  if (chunks == 0) return table;
+  ArithmeticDecoder decoder(code);
+  const auto integers = std::make_unique<IntegerCodec<32, 2>>();
+  TabledChunk chunk;
+  for (std::uint32_t i = 0; i < chunks; ++i) {
+    if (with_points) chunk.points = integers->code(decoder, chunk.points, 0);
+    chunk.bytes = integers->code(decoder, chunk.bytes, 1);
+    // No entry without a byte in the file: the table cannot grow by its own word.
+    if (chunk.bytes == 0 || chunk.bytes > most_bytes) throw Damaged("its chunk table goes beyond its chunks");
+    most_bytes -= chunk.bytes;
+    table.push_back(chunk);
+  }
+  return table;
 }
 
 }  // namespace lamina::laz

@@ -1,4 +1,4 @@
-#include "laz/encode_chunk.h"
+#include "laz/chunks.h"
 
 #include <algorithm>
 #include <cstring>
@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "base/little_endian.h"
-#include "laz/arithmetic_encoder.h"
+#include "laz/arithmetic_coder.h"
 #include "laz/core_layer.h"
-#include "laz/integer_codec.h"
+#include "laz/field_codecs.h"
 #include "laz/layers.h"
 
 namespace lamina::laz {

@@ -1,5 +1,5 @@
 // The layers of LAS 1.4's points. Every value is predicted from the last point of the same scanner channel; a channel
-// that comes up begins with what the point before had. One code for both ways, as integer_codec.h: an encoder finds the
+// that comes up begins with what the point before had. One code for both ways, as field_codecs.h: an encoder finds the
 // values in the records, a decoder puts them there.
 #pragma once
 #include <array>
@@ -9,10 +9,8 @@
 #include <utility>
 
 #include "base/little_endian.h"
-#include "laz/colour_codec.h"
-#include "laz/gps_time_codec.h"
-#include "laz/integer_codec.h"
-#include "laz/model_bank.h"
+#include "laz/arithmetic_coder.h"
+#include "laz/field_codecs.h"
 
 namespace lamina::laz {
 

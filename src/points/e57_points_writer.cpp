@@ -15,7 +15,7 @@
 
 #include "base/little_endian.h"
 #include "base/scalar_type.h"
-#include "e57/page_writer.h"
+#include "e57/paged_file.h"
 #include "lamina/error.h"
 #include "lamina/run.h"
 #include "points/binary_rows.h"

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "lamina/error.h"
-#include "laz/arithmetic_decoder.h"
+#include "laz/arithmetic_coder.h"
 #include "points/copc.h"
 #include "points/laz_chunks.h"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "laz/point_chunk.h"
+#include "laz/chunks.h"
 #include "points/binary_rows.h"
 #include "points/input_file.h"
 #include "points/las_header.h"

@@ -11,8 +11,8 @@
 
 #include "base/little_endian.h"
 #include "lamina/error.h"
-#include "laz/arithmetic_decoder.h"
-#include "laz/chunk_table.h"
+#include "laz/arithmetic_coder.h"
+#include "laz/chunks.h"
 
 namespace lamina {
 namespace {

@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "laz/point_chunk.h"
+#include "laz/chunks.h"
 
 namespace lamina {
 

@@ -7,7 +7,7 @@
 
 #include "base/descriptor.h"
 #include "base/little_endian.h"
-#include "laz/encode_chunk.h"
+#include "laz/chunks.h"
 #include "points/las_header.h"
 #include "points/laz_packing.h"
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "laz/point_chunk.h"
+#include "laz/chunks.h"
 #include "points/las_layout.h"
 
 namespace lamina {

@@ -16,8 +16,7 @@
 
 #include "base/temporary_folder.h"
 #include "lamina/points_writer.h"
-#include "laz/encode_chunk.h"
-#include "laz/point_chunk.h"
+#include "laz/chunks.h"
 #include "points/las_records.h"
 #include "points/point_rows.h"
 #include "points/readers.h"

@@ -44,4 +44,23 @@ struct LayeredSize {
 std::size_t layered_head_bytes(const RecordLayout& layout);
 LayeredSize layered_size(const RecordLayout& layout, std::span<const std::byte> head);
 
+// The table of a LAZ file's chunks, itself compressed.
+
+struct TabledChunk {
+  std::uint32_t points = 0;  ///< 0 where all chunks but the last have the same number
+  std::uint32_t bytes = 0;
+};
+
+/// The table of `chunks` entries whose code is `code`; all chunks together have at most `most_bytes`. Throws Damaged.
+std::vector<TabledChunk> decode_chunk_table(std::span<const std::byte> code, std::uint32_t chunks, bool with_points,
+                                            std::uint64_t most_bytes);
+
+// Chunks, written.
+
+/// A chunk of `count` >= 1 records of formats 6 to 8, for decode_layered().
+std::vector<std::byte> encode_layered(const RecordLayout& layout, const std::byte* records, std::size_t count);
+
+/// The code of a table of chunks, which have the same number of points but for the last.
+std::vector<std::byte> encode_chunk_table(std::span<const std::uint32_t> chunk_bytes);
+
 }  // namespace lamina::laz
