@@ -16,7 +16,6 @@
 #include "e57/record_streams.h"
 #include "lamina/points.h"
 #include "points/e57_columns.h"
-#include "points/e57_grid.h"
 #include "points/point_columns.h"
 #include "points/readers.h"
 #include "points/scans.h"

@@ -1,20 +1,128 @@
 // Points to LAS 1.4, and to LAZ.
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <memory>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "base/background_writer.h"
+#include "base/descriptor.h"
+#include "base/little_endian.h"
 #include "base/spill_file.h"
+#include "laz/chunks.h"
 #include "points/binary_rows.h"
+#include "points/las_header.h"
 #include "points/las_layout.h"
-#include "points/laz_record_sink.h"
+#include "points/laz_packing.h"
 #include "points/writers.h"
 
 namespace lamina {
 namespace {
+
+/// Point records into the chunks of a LAZ file. Chunks are compressed in parallel, a few at once; all the sink holds is
+/// these.
+class LazRecordSink {
+ public:
+  explicit LazRecordSink(const LasLayout& layout);
+
+  /// The record of the header that says how points are compressed.
+  [[nodiscard]] static std::string packing(const LasLayout& layout);
+  /// What stands before the first chunk: where the chunk table is, once that is known.
+  [[nodiscard]] std::string lead() const;
+  /// The offset of the first chunk.
+  void begin(std::uint64_t offset) { begin_ = offset; }
+
+  /// Adds `count` records: fill(to, at, n) writes n of them from the at-th on. Returns an errno value.
+  template <class Fill>
+  int append(int fd, std::size_t count, const Fill& fill) {
+    for (std::size_t done = 0; done < count;) {
+      const std::size_t n = std::min(count - done, room());
+      if (waiting_.size() < (records_ + n) * layout_.bytes) waiting_.resize((records_ + n) * layout_.bytes);
+      fill(waiting_.data() + records_ * layout_.bytes, done, n);
+      records_ += n;
+      done += n;
+      if (room() > 0) continue;
+      if (const int error = compress(fd); error != 0) return error;
+    }
+    return 0;
+  }
+  /// The last chunk and the table. Returns an errno value.
+  int finish(int fd);
+  [[nodiscard]] std::uint64_t written() const { return written_; }  ///< bytes behind lead()
+
+ private:
+  static constexpr std::size_t kChunkPoints = 50'000;  ///< as LASzip's own
+  static constexpr std::size_t kChunksAtOnce = 8;
+
+  [[nodiscard]] std::size_t room() const { return kChunkPoints * kChunksAtOnce - records_; }
+  int compress(int fd);
+  int put(int fd, const std::vector<std::byte>& bytes);
+
+  laz::RecordLayout layout_;
+  std::vector<std::byte> waiting_;
+  std::size_t records_ = 0;  ///< waiting
+  std::vector<std::uint32_t> chunk_bytes_;
+  std::uint64_t begin_ = 0, written_ = 0;
+  std::uint64_t table_ = 0;  ///< offset, 0: not written yet
+};
+
+LazRecordSink::LazRecordSink(const LasLayout& layout)
+    : layout_{.bytes = layout.record_bytes(),
+              .extra_bytes = layout.record_bytes() - las_record_bytes(layout.point_format()),
+              .colours = layout.has_colours()} {}
+
+std::string LazRecordSink::packing(const LasLayout& layout) {
+  return laz_packing_record(layout.point_format(), layout.record_bytes(), kChunkPoints);
+}
+
+std::string LazRecordSink::lead() const {
+  std::string bytes;
+  append_little(bytes, table_);
+  return bytes;
+}
+
+int LazRecordSink::put(int fd, const std::vector<std::byte>& bytes) {
+  written_ += bytes.size();
+  return write_all(fd, bytes.data(), bytes.size());
+}
+
+int LazRecordSink::compress(int fd) {
+  const std::size_t chunks = (records_ + kChunkPoints - 1) / kChunkPoints;
+  std::array<std::vector<std::byte>, kChunksAtOnce> code;
+  tbb::parallel_for(std::size_t{0}, chunks, [&](std::size_t i) {
+    const std::size_t first = i * kChunkPoints;
+    code.at(i) =
+        laz::encode_layered(layout_, waiting_.data() + first * layout_.bytes, std::min(kChunkPoints, records_ - first));
+  });
+  records_ = 0;
+  for (std::size_t i = 0; i < chunks; ++i) {
+    chunk_bytes_.push_back(static_cast<std::uint32_t>(code.at(i).size()));
+    if (const int error = put(fd, code.at(i)); error != 0) return error;
+  }
+  return 0;
+}
+
+int LazRecordSink::finish(int fd) {
+  if (const int error = compress(fd); error != 0) return error;
+  table_ = begin_ + written_;
+  std::string head;
+  append_little(head, std::uint32_t{0});  // version of the table
+  append_little(head, static_cast<std::uint32_t>(chunk_bytes_.size()));
+  std::vector<std::byte> table(head.size());
+  std::transform(head.begin(), head.end(), table.begin(), [](char c) { return static_cast<std::byte>(c); });
+  if (!chunk_bytes_.empty()) {
+    const std::vector<std::byte> code = laz::encode_chunk_table(chunk_bytes_);
+    table.insert(table.end(), code.begin(), code.end());
+  }
+  return put(fd, table);
+}
 
 constexpr double kMostSteps = 2147483647;
 

@@ -9,12 +9,12 @@
 #include "base/little_endian.h"
 #include "lamina/error.h"
 #include "points/binary_rows.h"
+#include "points/input_file.h"
 #include "points/pcd_header.h"
 #include "points/point_columns.h"
 #include "points/readers.h"
 #include "points/scans.h"
 #include "points/text_rows.h"
-#include "points/unpack.h"
 
 namespace lamina {
 namespace {

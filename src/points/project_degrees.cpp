@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -11,6 +12,7 @@
 #include <utility>
 
 #include "lamina/error.h"
+#include "lamina/points.h"
 
 namespace lamina {
 namespace {
@@ -214,6 +216,14 @@ void require_no_degrees(const PointSourceInfo& info) {
       fmt::format("{}: x and y are degrees of longitude and latitude, in which no distance can be measured; "
                   "--project-degrees takes them to metres in a plane, other programs to a system of your choice",
                   info.path == "-" ? "standard input" : info.path));
+}
+
+std::string crs_name(const std::string& crs) {
+  // The name is the first text in quotes; that of a compound system tells both of its parts.
+  const std::size_t open = crs.find('"');
+  if (open == std::string::npos) return crs;
+  const std::size_t close = std::min(crs.find('"', open + 1), crs.size());
+  return crs.substr(open + 1, close - open - 1);
 }
 
 }  // namespace lamina

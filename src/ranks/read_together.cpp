@@ -11,7 +11,6 @@
 #include "lamina/error.h"
 #include "points/input_file.h"
 #include "points/sniff.h"
-#include "points/unpack.h"
 #include "ranks/messages.h"
 #include "reconstruct/stored_cloud.h"
 #include "store/store_blocks.h"

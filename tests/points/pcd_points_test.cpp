@@ -11,8 +11,8 @@
 #include <random>
 
 #include "base/temporary_folder.h"
+#include "points/input_file.h"
 #include "points/point_rows.h"
-#include "points/unpack.h"
 
 namespace lamina {
 namespace {
