@@ -12,10 +12,9 @@
 
 #include "base/output_file.h"
 #include "lamina/mesh.h"
-#include "meshes/block_passes.h"
+#include "meshes/mesh_blocks.h"
 #include "meshes/mesh_format.h"
 #include "meshes/stored_mesh.h"
-#include "meshes/stored_ply.h"
 #include "meshes/writers.h"
 
 namespace lamina {

@@ -17,10 +17,9 @@
 
 #include "base/little_endian.h"
 #include "lamina/error.h"
-#include "meshes/block_passes.h"
 #include "meshes/glb.h"
-#include "meshes/glb_columns.h"
-#include "meshes/glb_document.h"
+#include "meshes/glb_writer.h"
+#include "meshes/mesh_blocks.h"
 #include "meshes/vertex_set.h"
 
 namespace lamina::meshes {

@@ -3,8 +3,10 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
+#include "base/descriptor.h"
 #include "lamina/run.h"
 #include "meshes/mesh_sink.h"
 #include "meshes/writers.h"
@@ -41,3 +43,22 @@ void write_files(const StoredMesh& mesh, const MeshSinkSettings& settings, const
                  const RunContext& run);
 
 }  // namespace lamina
+
+namespace lamina::meshes {
+
+/// A PLY file that is the records of a streamed mesh, to be read where they lie.
+struct StoredPly {
+  Descriptor file;
+  MeshSinkSettings layout;  ///< its name, attributes and kind of positions
+  StoredMesh mesh;
+};
+
+/// A file as MeshSink writes them: binary, little-endian, x y z nx ny nz and further numbers, triangles, and as long as
+/// its header says. Nothing for any other file. Throws Error(unreadable) where it cannot be read or its header is
+/// damaged.
+std::optional<StoredPly> open_stored_ply(const std::string& path);
+
+/// Of a comment `crs ...`; empty where there is none, and for what is no PLY. Throws as above.
+std::string crs_of_ply(const std::string& path);
+
+}  // namespace lamina::meshes

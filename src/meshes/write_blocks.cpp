@@ -13,8 +13,8 @@
 #include "base/little_endian.h"
 #include "base/output_file.h"
 #include "lamina/error.h"
-#include "meshes/block_passes.h"
 #include "meshes/colours.h"
+#include "meshes/mesh_blocks.h"
 #include "meshes/vec3.h"
 #include "meshes/writers.h"
 

@@ -18,7 +18,7 @@
 #include "base/scalar_type.h"
 #include "lamina/error.h"
 #include "lamina/mesh.h"
-#include "meshes/held_mesh.h"
+#include "meshes/mesh_blocks.h"
 #include "meshes/mesh_format.h"
 #include "meshes/writers.h"
 

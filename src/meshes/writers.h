@@ -11,29 +11,10 @@
 
 #include "base/output_file.h"
 #include "lamina/mesh.h"
+#include "meshes/mesh_blocks.h"
 #include "meshes/mesh_format.h"
 
 namespace lamina::meshes {
-
-/// A mesh to be written, block by block: from memory or from a file. Blocks are read in order, some of them again.
-class MeshBlocks {
- public:
-  MeshBlocks() = default;
-  virtual ~MeshBlocks() = default;
-  MeshBlocks(const MeshBlocks&) = delete;
-  MeshBlocks& operator=(const MeshBlocks&) = delete;
-
-  [[nodiscard]] virtual std::uint64_t vertices() const = 0;
-  [[nodiscard]] virtual std::uint64_t triangles() const = 0;
-  [[nodiscard]] virtual bool has_normals() const = 0;
-  [[nodiscard]] virtual const AttributeLayout& layout() const = 0;
-  /// Lines a format with comments begins with.
-  [[nodiscard]] virtual std::vector<std::string> comments() const { return {}; }
-  /// Positions, normals and attributes of `count` vertices into `out`, whose triangles are not looked at.
-  virtual void read_vertices(std::uint64_t first, std::size_t count, TriangleMesh& out) = 0;
-  virtual void read_triangles(std::uint64_t first, std::size_t count,
-                              std::vector<std::array<std::uint32_t, 3>>& out) = 0;
-};
 
 /// Positions as float where that loses nothing, else double; normals; attributes in their own types (rounded and
 /// clamped to them); faces as `list uchar int vertex_indices` (uint beyond 2^31 - 1 vertices).

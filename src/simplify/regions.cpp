@@ -10,10 +10,8 @@
 
 #include "lamina/error.h"
 #include "measure/edge_table.h"
-#include "meshes/block_passes.h"
-#include "meshes/triangle_bins.h"
-#include "meshes/vertex_homes.h"
-#include "meshes/vertex_rows.h"
+#include "meshes/mesh_blocks.h"
+#include "meshes/mesh_pieces.h"
 #include "simplify/stars.h"
 
 namespace lamina::simplify {

@@ -20,7 +20,7 @@
 #include "lamina/error.h"
 #include "lamina/measure.h"
 #include "measure/edge_table.h"
-#include "meshes/block_passes.h"
+#include "meshes/mesh_blocks.h"
 #include "meshes/stored_mesh.h"
 #include "simplify/part.h"
 #include "simplify/regions.h"

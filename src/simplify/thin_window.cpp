@@ -7,7 +7,7 @@
 #include "base/hashing.h"
 #include "lamina/error.h"
 #include "measure/edge_table.h"
-#include "meshes/vertex_rows.h"
+#include "meshes/mesh_pieces.h"
 
 namespace lamina::simplify {
 namespace {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "lamina/error.h"
-#include "meshes/block_passes.h"
+#include "meshes/mesh_blocks.h"
 #include "simplify/cut.h"
 #include "simplify/matching.h"
 #include "simplify/thin_window.h"

@@ -10,7 +10,7 @@
 
 #include "lamina/error.h"
 #include "lamina/mesh.h"
-#include "meshes/block_passes.h"
+#include "meshes/mesh_blocks.h"
 
 namespace lamina::tiles {
 namespace {

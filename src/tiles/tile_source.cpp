@@ -6,9 +6,8 @@
 
 #include "lamina/error.h"
 #include "measure/edge_table.h"
-#include "meshes/block_passes.h"
-#include "meshes/vertex_homes.h"
-#include "meshes/vertex_rows.h"
+#include "meshes/mesh_blocks.h"
+#include "meshes/mesh_pieces.h"
 
 namespace lamina::tiles {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "lamina/run.h"
-#include "meshes/triangle_bins.h"
+#include "meshes/mesh_pieces.h"
 #include "meshes/writers.h"
 #include "tiles/tile_mesh.h"
 #include "tiles/tile_octree.h"

@@ -25,7 +25,7 @@
 #include "lamina/mesh.h"
 #include "meshes/glb_files.h"
 #include "meshes/glb_set.h"
-#include "meshes/held_mesh.h"
+#include "meshes/mesh_blocks.h"
 #include "meshes/mesh_files.h"
 #include "meshes/mesh_sink.h"
 #include "meshes/writers.h"

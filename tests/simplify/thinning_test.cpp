@@ -13,7 +13,7 @@
 #include "lamina/measure.h"
 #include "lamina/mesh.h"
 #include "lamina/simplify.h"
-#include "meshes/held_mesh.h"
+#include "meshes/mesh_blocks.h"
 #include "meshes/mesh_files.h"
 
 namespace lamina::simplify {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "lamina/tiles.h"
-#include "meshes/held_mesh.h"
+#include "meshes/mesh_blocks.h"
 #include "meshes/mesh_files.h"
 #include "tiles/write_tiles.h"
 

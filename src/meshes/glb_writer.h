@@ -1,5 +1,8 @@
-// The JSON of a GLB that is written, and its bytes on their way to the file.
+// A GLB as it is written: what it holds of each vertex, its JSON, and its bytes on their way to the file.
 #pragma once
+#include <nlohmann/json.hpp>
+
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -8,10 +11,36 @@
 #include <vector>
 
 #include "base/little_endian.h"
-#include "meshes/glb_columns.h"
+#include "lamina/attributes.h"
+#include "lamina/mesh.h"
 #include "meshes/writers.h"
 
 namespace lamina::meshes {
+
+using GlbJson = nlohmann::ordered_json;
+
+constexpr std::size_t kMostGlbColumn = 16;  ///< bytes of a vertex in one
+
+/// One accessor of the vertices, in a buffer view of its own.
+struct GlbColumn {
+  std::string semantic;
+  GlbJson accessor;        ///< without what all of them have
+  std::size_t stride = 0;  ///< bytes of a vertex, a multiple of 4
+  std::function<void(const TriangleMesh&, std::size_t, std::byte*)> encode{};
+};
+
+/// The box of the positions in double, and whether floats hold them.
+struct GlbBox {
+  std::array<double, 3> low{}, high{};
+  std::array<double, 3> middle{};  ///< what is taken away from positions that floats do not hold
+  bool floats = true;
+};
+
+/// Throws Error(usage) for positions that are not finite or too far apart for floats.
+GlbBox glb_box_of(MeshBlocks& mesh, const std::string& name);
+
+/// Positions, normals, colours and attributes of vertices in that box, which may be part of the mesh's.
+std::vector<GlbColumn> glb_columns(const AttributeLayout& layout, bool normals, const GlbBox& box);
 
 /// What one buffer holds of a mesh: columns of vertices, triangles that count from the first of these, and which of the
 /// mesh's vertices these are.
