@@ -5,7 +5,6 @@
 
 #include "chunks/cuts.h"
 #include "chunks/folders.h"
-#include "chunks/part_identity.h"
 #include "chunks/part_slabs.h"
 #include "lamina/error.h"
 #include "reconstruct/job.h"

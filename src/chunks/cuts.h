@@ -1,8 +1,10 @@
-// Where a sweep is cut into chunks that take about the same time.
+// Where a sweep is cut into chunks that take about the same time, and what their parts have in common.
 #pragma once
 #include <cstdint>
+#include <string>
 #include <vector>
 
+#include "lamina/surface.h"
 #include "reconstruct/plan.h"
 #include "reconstruct/stages.h"
 #include "store/slab_store.h"
@@ -25,5 +27,14 @@ double chunk_cost(const std::vector<double>& cost, std::size_t begin, std::size_
 
 /// The same spans from what each slab costs; the first is slab number `first`.
 std::vector<SlabSpan> cut(const std::vector<double>& cost, std::int32_t first, int count);
+
+/// The settings that the mesh's bytes depend on, one a line.
+std::string mesh_settings(const SurfaceSettings& settings);
+
+/// A number that parts of different stores, settings, lattices or versions of the program do not share (FNV-1a).
+std::uint64_t job_hash(const SurfaceSettings& settings, const std::string& input_id, const ReconstructionPlan& plan);
+
+/// Throws Error(usage) for settings that cannot be met in parts.
+void require_mesh_alone(const SurfaceSettings& settings, const std::string& option);
 
 }  // namespace lamina

@@ -9,7 +9,6 @@
 
 #include "chunks/cuts.h"
 #include "chunks/folders.h"
-#include "chunks/part_identity.h"
 #include "chunks/part_slabs.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"

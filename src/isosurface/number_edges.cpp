@@ -8,7 +8,6 @@
 
 #include "base/resize_anew.h"
 #include "isosurface/crossing.h"
-#include "mls/crease_seats.h"
 #include "mls/extension.h"
 #include "mls/overhang.h"
 #include "mls/sheets.h"

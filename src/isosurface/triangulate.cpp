@@ -9,7 +9,6 @@
 
 #include "base/resize_anew.h"
 #include "isosurface/cell_emitter.h"
-#include "isosurface/edge_numbers.h"
 #include "isosurface/loops.h"
 #include "isosurface/tile_view.h"
 

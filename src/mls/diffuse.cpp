@@ -1,4 +1,4 @@
-#include "mls/diffuse.h"
+#include "mls/project.h"
 
 #include <tbb/parallel_for.h>
 

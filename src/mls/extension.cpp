@@ -9,7 +9,6 @@
 #include <cmath>
 
 #include "lattice/morphology.h"
-#include "mls/neighbour_records.h"
 
 namespace lamina {
 namespace {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "mls/extension.h"
 #include "mls/kernel.h"
-#include "mls/neighbour_records.h"
 
 namespace lamina {
 namespace {

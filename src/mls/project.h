@@ -14,7 +14,7 @@ enum class Fit { plane, sphere };
 
 struct ProjectSettings {
   Fit fit = Fit::sphere;  ///< sphere: algebraic sphere (Guennebaud & Gross 2007); plane: Cuccuru et al. 2009, 3.2
-  bool centres = false;   ///< project the centres of leaf cells instead of corners (section 3.3; see diffuse.h)
+  bool centres = false;   ///< project the centres of leaf cells instead of corners (section 3.3; see diffuse_slab())
   int steps = 1;          ///< N >= 1: almost orthogonal projection steps (Alexa & Adamson 2004)
   float tolerance = 0;    ///< a point is done when a step moves it no more than so many supports; 0: next to nothing
   float band = 2.25F;     ///< a corner keeps a value only if a sample lies this near, in cells of the sample's level
@@ -62,5 +62,13 @@ class Projector {
   ProjectCounts counts_;
   std::unique_ptr<Scratch> scratch_;
 };
+
+// Cell-to-vertex diffusion (Cuccuru et al. 2009, section 3.3): corners take the mean of what the projected centres of
+// the cells around them say.
+
+/// Fills values, `seen` and `trusted` of the slab's active corners from the centres of the leaf cells that touch them,
+/// at whatever level, weights inversely proportional to cell size; trusted centres only, where there is one. The
+/// centres of this slab and of the one below must be projected (ProjectSettings::centres).
+void diffuse_slab(Window& window, std::int32_t slab);
 
 }  // namespace lamina

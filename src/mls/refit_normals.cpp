@@ -9,7 +9,7 @@
 #include <span>
 #include <tuple>
 
-#include "base/floor_divide.h"
+#include "lattice/lattice.h"
 #include "mls/row_samples.h"
 #include "samples/consensus_plane.h"
 

@@ -11,8 +11,8 @@
 #include <optional>
 #include <utility>
 
-#include "base/floor_divide.h"
 #include "base/union_find.h"
+#include "lattice/lattice.h"
 
 namespace lamina::normals {
 namespace {

@@ -5,9 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "normals/occupancy.h"
 #include "normals/patch_graph.h"
-#include "normals/seen_within.h"
 #include "normals/sight.h"
 
 namespace lamina::normals {

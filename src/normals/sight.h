@@ -1,13 +1,46 @@
-// What can be seen from a patch to either side of it. A scanner stood on a side from which one looks far, and what it
-// saw lies open to that side.
+// Who sees whom: where patches are, and what can be seen from a patch to either side of it. A scanner stood on a side
+// from which one looks far, and what it saw lies open to that side.
 #pragma once
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
-#include "normals/occupancy.h"
+#include "meshes/vec3.h"
 #include "normals/patch_graph.h"
 
 namespace lamina::normals {
+
+// Where patches are, in cubes, and how far one can look between them.
+
+class Occupancy {
+ public:
+  /// What lies nearer to a patch than so many cubes may be its own surface.
+  static constexpr double kClear = 1.8;
+
+  /// Cubes have the size of the graph's cells, or more where these would be too many. Patches of a few samples are
+  /// strays that hide nothing. Empty where the cells have no size.
+  explicit Occupancy(const PatchGraph& graph);
+
+  [[nodiscard]] bool empty() const { return taken_.empty(); }
+  [[nodiscard]] double diagonal() const { return diagonal_; }  ///< of the cloud, cubes
+  /// In cubes from the corner.
+  [[nodiscard]] meshes::Vec3 place(const PatchNode& node) const;
+  /// How many cubes one can look from a place until one that is taken; far more than the diagonal where none is.
+  [[nodiscard]] double way(const meshes::Vec3& at, const meshes::Vec3& direction) const;
+
+ private:
+  using Cube = std::array<std::ptrdiff_t, 3>;
+  [[nodiscard]] std::size_t index(const Cube& cube) const {
+    return static_cast<std::size_t>((cube[2] * size_[1] + cube[1]) * size_[0] + cube[0]);
+  }
+
+  meshes::Vec3 origin_{};
+  double side_ = 1;
+  double diagonal_ = 1;
+  Cube size_{};
+  std::vector<bool> taken_;
+};
 
 /// To one side of a patch.
 struct View {
@@ -27,5 +60,18 @@ struct Sight {
 /// may be the patch's own surface. All is open where nothing is known of what patches hide.
 std::vector<Sight> look_around(const PatchGraph& graph, const Occupancy& around,
                                const std::vector<std::uint8_t>& wanted);
+
+// How much of a closed surface could have been scanned from a few places inside: nearly all of a room, but less of a
+// thing with limbs, holes or folds.
+
+/// A patch, as it would face if it had been seen from within.
+struct Wall {
+  meshes::Vec3 at{};  ///< Occupancy::place()
+  meshes::Vec3 facing{};
+  double area = 0;
+};
+
+/// The share of the area that four places see together. 0 for so few walls that cubes are too coarse a picture.
+double share_seen_within(const Occupancy& around, const std::vector<Wall>& walls);
 
 }  // namespace lamina::normals

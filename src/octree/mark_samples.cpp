@@ -1,4 +1,4 @@
-#include "octree/mark_samples.h"
+#include "octree/refine.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,7 @@
 #include <cstring>
 #include <vector>
 
-#include "base/floor_divide.h"
+#include "lattice/lattice.h"
 
 namespace lamina {
 namespace {

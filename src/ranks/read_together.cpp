@@ -11,7 +11,7 @@
 #include "lamina/error.h"
 #include "points/input_file.h"
 #include "points/sniff.h"
-#include "ranks/messages.h"
+#include "ranks/ranks.h"
 #include "reconstruct/stored_cloud.h"
 #include "store/store_blocks.h"
 

@@ -7,9 +7,8 @@
 #include <cmath>
 
 #include "lamina/error.h"
-#include "mls/diffuse.h"
 #include "mls/extension.h"
-#include "octree/mark_samples.h"
+#include "mls/project.h"
 #include "octree/refine.h"
 
 namespace lamina {

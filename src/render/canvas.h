@@ -1,12 +1,17 @@
-// Samples of a picture: what is nearest at each, and averaging them into pixels. canvas.cpp writes these, too, as PNG.
+// Samples of a picture: how they look, what is nearest at each, and averaging them into pixels. canvas.cpp writes
+// these, too, as PNG.
 #pragma once
+#include <Eigen/Core>
+
 #include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
+#include "lamina/attributes.h"
 #include "lamina/render.h"
 
 namespace lamina::render_detail {
@@ -57,6 +62,29 @@ class Canvas {
   int width_, height_;
   std::vector<float> depth_;
   std::vector<std::array<std::uint8_t, 4>> colour_;  ///< the last byte: something was drawn
+};
+
+// Light and colour: how a surface point looks.
+
+inline constexpr Rgb kClay{0.62F, 0.55F, 0.47F};
+inline constexpr Rgb kBoundary{0.90F, 0.02F, 0.02F};
+
+/// The colour of a surface lit from beside the camera; `normal` is a unit vector in the view's axes, facing the viewer.
+Rgb lit(const Rgb& base, const Eigen::Vector3f& normal, bool back_face);
+
+/// A normal's components (input coordinates) as a colour.
+Rgb normal_colour(const std::array<float, 3>& normal);
+
+/// Reads the colours among the attributes, whatever their type.
+class ColourReader {
+ public:
+  /// Nothing when red, green and blue are not all there.
+  static std::optional<ColourReader> find(const AttributeLayout& layout, const std::vector<std::vector<float>>& values);
+  [[nodiscard]] Rgb operator()(std::size_t i) const;
+
+ private:
+  std::array<const std::vector<float>*, 3> channels_{};
+  std::array<float, 3> to_byte_{};
 };
 
 }  // namespace lamina::render_detail

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/canvas.h"
 #include "render/draw.h"
 #include "render/ray_field.h"
-#include "render/shade.h"
 #include "vdb/grids.h"
 #include "vdb/vdb_file.h"
 #include "volume/volume_data.h"

@@ -5,7 +5,7 @@
 
 #include <optional>
 
-#include "render/shade.h"
+#include "render/canvas.h"
 #include "render/view.h"
 #include "vdb/grids.h"
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/floor_divide.h"
+#include "lattice/lattice.h"
 
 namespace lamina {
 namespace {

@@ -5,8 +5,8 @@
 #include <limits>
 #include <tuple>
 
-#include "base/floor_divide.h"
 #include "base/resize_anew.h"
+#include "lattice/lattice.h"
 #include "samples/block_order.h"
 
 namespace lamina {

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/floor_divide.h"
+#include "lattice/lattice.h"
 #include "samples/cell_layer.h"
 #include "samples/outliers.h"
 #include "store/slab_store.h"

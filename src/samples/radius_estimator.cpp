@@ -5,8 +5,8 @@
 #include <deque>
 #include <limits>
 
-#include "base/floor_divide.h"
 #include "lamina/error.h"
+#include "lattice/lattice.h"
 #include "samples/cell_octree.h"
 #include "samples/radius_estimator.h"
 

@@ -6,7 +6,6 @@
 #include <limits>
 #include <vector>
 
-#include "base/floor_divide.h"
 #include "lattice/lattice.h"
 #include "samples/cell_table.h"
 #include "store/slab_store.h"

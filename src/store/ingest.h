@@ -1,11 +1,17 @@
 // From the input's samples to the slab store: validated, rotated, fixed-point, bucketed along the sweep axis.
 #pragma once
+#include <Eigen/Core>
+
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <utility>
+#include <vector>
 
+#include "base/hashing.h"
 #include "lamina/frame.h"
 #include "lamina/points.h"
 #include "lamina/run.h"
@@ -14,6 +20,33 @@
 #include "store/slab_store.h"
 
 namespace lamina {
+
+/// How much of a cloud more than one of its scans saw. Counts in places, cubes of a hundredth of the cloud's diagonal.
+/// Memory: some 40 bytes a place, of which a surface has ten thousand or a few.
+class ScanOverlap {
+ public:
+  /// The box is that of the whole cloud, roughly.
+  ScanOverlap(std::vector<ScanPart> scans, const Eigen::Vector3d& low, const Eigen::Vector3d& high);
+  /// Rows in the source's order, from row batch.first on.
+  void add(const SampleBatch& batch);
+  /// The share of all places that several scans have samples in; 0 where there is one scan.
+  [[nodiscard]] double share() const;
+
+ private:
+  static constexpr std::uint32_t kSeveral = std::numeric_limits<std::uint32_t>::max();
+  struct Place {
+    std::array<std::int32_t, 3> at;
+    bool operator==(const Place&) const = default;
+  };
+  struct PlaceHash {
+    std::size_t operator()(const Place& p) const { return cell_hash(p.at[0], p.at[1], p.at[2]); }
+  };
+
+  std::vector<ScanPart> scans_;
+  Eigen::Vector3d low_;
+  double inverse_ = 0;
+  std::unordered_map<Place, std::uint32_t, PlaceHash> seen_by_;  ///< which scan, or kSeveral
+};
 
 struct Ingested {
   SlabStore store;

@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/floor_divide.h"
 #include "lamina/error.h"
+#include "lattice/lattice.h"
 #include "store/store_blocks.h"
 
 namespace lamina {

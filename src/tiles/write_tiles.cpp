@@ -28,7 +28,6 @@
 #include "tiles/tile_content.h"
 #include "tiles/tile_mesh.h"
 #include "tiles/tile_octree.h"
-#include "tiles/tile_source.h"
 #include "tiles/tileset.h"
 
 namespace lamina {

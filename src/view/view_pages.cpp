@@ -5,9 +5,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <vector>
 
 #include "base/output_file.h"
@@ -22,6 +24,7 @@
 #include "view/tile_files.h"
 
 namespace lamina {
+
 namespace view {
 namespace {
 
@@ -267,6 +270,20 @@ ViewStats write_tiles_page(const std::string& folder, const ViewSettings& settin
                {"embedded", true},
                {"files", stats.tiles}});
   return stats;
+}
+
+std::string find_viewer() {
+  namespace fs = std::filesystem;
+  std::error_code failed;
+  const fs::path folder = fs::read_symlink("/proc/self/exe", failed).parent_path();
+  for (const fs::path& share : {folder / "share", folder.parent_path() / "share"}) {
+    const fs::path file = share / "lamina" / "viewer.js";
+    if (fs::is_regular_file(file, failed)) return file.string();
+  }
+  throw Error(ExitCode::usage,
+              fmt::format("the viewer's code, share/lamina/viewer.js, is not beside the program in {}; 'scripts/setup "
+                          "viewer' in Lamina's sources makes it (npm), building installs it",
+                          folder.string()));
 }
 
 }  // namespace lamina

@@ -7,9 +7,8 @@
 #include <limits>
 
 #include "isosurface/number_edges.h"
-#include "mls/diffuse.h"
 #include "mls/extension.h"
-#include "octree/mark_samples.h"
+#include "mls/project.h"
 #include "octree/refine.h"
 #include "reconstruct/final_vertices.h"
 #include "reconstruct/stages.h"

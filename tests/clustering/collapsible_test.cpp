@@ -1,4 +1,4 @@
-#include "clustering/collapsible.h"
+#include "clustering/resolve.h"
 
 #include <gtest/gtest.h>
 

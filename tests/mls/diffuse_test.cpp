@@ -1,4 +1,4 @@
-#include "mls/diffuse.h"
+#include "mls/project.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -6,7 +6,6 @@
 #include <cmath>
 #include <optional>
 
-#include "mls/project.h"
 #include "support/random_cloud.h"
 #include "support/streamed_cloud.h"
 #include "support/window_contents.h"

@@ -8,7 +8,6 @@
 #include <set>
 #include <vector>
 
-#include "octree/mark_samples.h"
 #include "octree/refine.h"
 
 namespace lamina::test {

@@ -9,7 +9,6 @@
 #include <numeric>
 #include <random>
 
-#include "octree/mark_samples.h"
 #include "octree/octree_truth.h"
 #include "support/window_contents.h"
 

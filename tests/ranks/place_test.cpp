@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "lamina/error.h"
-#include "ranks/messages.h"
+#include "ranks/ranks.h"
 #include "ranks/write_together.h"
 
 namespace lamina::ranks {

@@ -1,4 +1,4 @@
-#include "store/scan_overlap.h"
+#include "store/ingest.h"
 
 #include <gtest/gtest.h>
 

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "base/temporary_folder.h"
-#include "octree/mark_samples.h"
 #include "octree/refine.h"
 #include "octree/window.h"
 #include "samples/sample_feed.h"

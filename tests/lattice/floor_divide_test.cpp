@@ -1,4 +1,4 @@
-#include "base/floor_divide.h"
+#include "lattice/lattice.h"
 
 #include <gtest/gtest.h>
 
