@@ -9,7 +9,7 @@
 #include "common/help.h"
 #include "common/inputs.h"
 #include "common/text.h"
-#include "lamina/attribute_transfer.h"
+#include "lamina/edit.h"
 #include "lamina/error.h"
 #include "tool.h"
 

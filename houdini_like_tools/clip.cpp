@@ -1,5 +1,5 @@
 // lamina clip: the part of points, a mesh or volumes inside a box or before planes.
-#include "lamina/clip.h"
+#include "lamina/edit.h"
 
 #include <fmt/format.h>
 
@@ -12,7 +12,6 @@
 #include "common/option_values.h"
 #include "common/outputs.h"
 #include "common/text.h"
-#include "lamina/edit_points.h"
 #include "lamina/error.h"
 #include "lamina/volume_tools.h"
 #include "tool.h"

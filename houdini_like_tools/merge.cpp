@@ -1,5 +1,5 @@
 // lamina merge: several clouds, meshes or volumes in one file.
-#include "lamina/merge.h"
+#include "lamina/edit.h"
 
 #include <fmt/format.h>
 

@@ -14,7 +14,7 @@
 #include "common/point_options.h"
 #include "common/presets.h"
 #include "common/stats.h"
-#include "lamina/edit_points.h"
+#include "lamina/edit.h"
 #include "lamina/error.h"
 #include "tables.h"
 #include "tool.h"

@@ -15,7 +15,7 @@
 #include "common/presets.h"
 #include "common/text.h"
 #include "lamina/chunk.h"
-#include "lamina/edit_points.h"
+#include "lamina/edit.h"
 #include "lamina/error.h"
 #include "tool.h"
 

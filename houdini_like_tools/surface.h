@@ -9,8 +9,8 @@
 
 #include "common/console.h"
 #include "common/parts.h"
+#include "lamina/normals.h"
 #include "lamina/run.h"
-#include "lamina/trade.h"
 #include "tables.h"
 
 namespace lamina::tools {

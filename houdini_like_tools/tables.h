@@ -17,7 +17,6 @@
 #include "lamina/render.h"
 #include "lamina/run.h"
 #include "lamina/simplify.h"
-#include "lamina/trade.h"
 #include "lamina/volume.h"
 
 namespace lamina::tools {

@@ -1,5 +1,5 @@
 // lamina transform: move, turn and scale points, a mesh or volumes.
-#include "lamina/transform.h"
+#include "lamina/edit.h"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,6 @@
 #include "common/option_values.h"
 #include "common/outputs.h"
 #include "common/text.h"
-#include "lamina/edit_points.h"
 #include "lamina/error.h"
 #include "lamina/volume_tools.h"
 #include "tool.h"

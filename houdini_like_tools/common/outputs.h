@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "lamina/points_writer.h"
+#include "lamina/points.h"
 #include "lamina/tiles.h"
 #include "lamina/volume_tools.h"
 

@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
+#include "lamina/normals.h"
 #include "lamina/run.h"
-#include "lamina/trade.h"
 
 namespace lamina::tools {
 

@@ -5,8 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "lamina/clip.h"
-#include "lamina/edit_points.h"
+#include "lamina/edit.h"
 
 namespace lamina {
 

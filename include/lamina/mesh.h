@@ -4,10 +4,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "lamina/attributes.h"
+#include "lamina/run.h"
 
 namespace lamina {
 
@@ -42,5 +44,17 @@ std::size_t drop_non_finite(TriangleMesh& mesh);
 /// it is complete. Positions read back as the same bits (from STL as floats, from GLB as floats from a middle). Throws
 /// Error(budget) when the file cannot be written, Error(usage) for another extension.
 void write_mesh(const TriangleMesh& mesh, const std::string& path);
+
+/// A mesh file that went into another format, piece by piece.
+struct ConvertedMesh {
+  std::uint64_t vertices = 0, triangles = 0;
+};
+
+/// Writes a mesh file that need not fit in memory as OBJ, OFF, STL or GLB: what write_mesh() writes of it, byte for
+/// byte. Of a binary PLY of triangles with normals, as this program writes them, whose positions are all finite;
+/// nothing, and nothing written, for all others, which are to be read whole. Throws what write_mesh() throws,
+/// Error(internal) when cancelled.
+std::optional<ConvertedMesh> convert_mesh_file(const std::string& from, const std::string& to,
+                                               const RunContext& run = {});
 
 }  // namespace lamina

@@ -2,7 +2,7 @@
 #pragma once
 #include <cstdint>
 
-#include "lamina/edit_points.h"
+#include "lamina/edit.h"
 
 namespace lamina {
 

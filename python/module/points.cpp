@@ -13,11 +13,11 @@
 #include "functions.h"
 #include "keywords.h"
 #include "lamina/clean.h"
-#include "lamina/edit_points.h"
+#include "lamina/edit.h"
 #include "lamina/error.h"
 #include "lamina/normals.h"
 #include "lamina/point_radii.h"
-#include "lamina/points_writer.h"
+#include "lamina/points.h"
 #include "run.h"
 #include "tables.h"
 

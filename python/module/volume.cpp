@@ -17,7 +17,6 @@
 #include "lamina/error.h"
 #include "lamina/volume.h"
 #include "lamina/volume_tools.h"
-#include "lamina/voxels.h"
 #include "mesh.h"
 #include "run.h"
 #include "tables.h"

@@ -1,4 +1,4 @@
-#include "lamina/attribute_transfer.h"
+#include "lamina/edit.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,4 +1,4 @@
-#include "lamina/clip.h"
+#include "lamina/edit.h"
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>
@@ -9,7 +9,6 @@
 #include <unordered_map>
 
 #include "base/run.h"
-#include "lamina/edit_points.h"
 #include "lamina/error.h"
 #include "meshes/vec3.h"
 

@@ -1,4 +1,4 @@
-#include "lamina/edit_points.h"
+#include "lamina/edit.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "lamina/merge.h"
+#include "lamina/edit.h"
 
 #include <fmt/format.h>
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "edit/batch_pipe.h"
-#include "lamina/edit_points.h"
+#include "lamina/edit.h"
 #include "lamina/info.h"
 
 namespace lamina {

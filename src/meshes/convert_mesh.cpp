@@ -1,4 +1,4 @@
-#include "lamina/convert_mesh.h"
+#include "lamina/mesh.h"
 
 #include <algorithm>
 #include <array>
@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "base/output_file.h"
-#include "lamina/mesh.h"
 #include "meshes/mesh_blocks.h"
 #include "meshes/mesh_format.h"
 #include "meshes/stored_mesh.h"

@@ -1,4 +1,4 @@
-#include "lamina/trade.h"
+#include "lamina/normals.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "lamina/attributes.h"
-#include "lamina/points_writer.h"
+#include "lamina/points.h"
 #include "points/input_file.h"
 #include "points/point_columns.h"
 

@@ -10,7 +10,7 @@
 
 #include "base/scalar_type.h"
 #include "lamina/attributes.h"
-#include "lamina/points_writer.h"
+#include "lamina/points.h"
 #include "points/writers.h"
 
 namespace lamina {

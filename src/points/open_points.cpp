@@ -12,7 +12,6 @@
 #include "lamina/error.h"
 #include "lamina/file_ending.h"
 #include "lamina/points.h"
-#include "lamina/points_writer.h"
 #include "points/input_file.h"
 #include "points/project_degrees.h"
 #include "points/readers.h"

@@ -8,7 +8,7 @@
 
 #include "base/descriptor.h"
 #include "base/output_file.h"
-#include "lamina/points_writer.h"
+#include "lamina/points.h"
 
 namespace lamina {
 

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "lamina/points_writer.h"
+#include "lamina/points.h"
 #include "lamina/run.h"
 #include "lamina/surface.h"
 #include "reconstruct/mesh_output.h"

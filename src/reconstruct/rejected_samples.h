@@ -2,7 +2,7 @@
 #pragma once
 #include <memory>
 
-#include "lamina/points_writer.h"
+#include "lamina/points.h"
 #include "lamina/surface.h"
 #include "reconstruct/stored_cloud.h"
 #include "samples/outliers.h"

@@ -9,7 +9,7 @@
 
 #include "base/descriptor.h"
 #include "lamina/error.h"
-#include "lamina/trade.h"
+#include "lamina/normals.h"
 #include "reconstruct/job.h"
 #include "reconstruct/kept_input.h"
 #include "reconstruct/rejected_samples.h"

@@ -6,7 +6,7 @@
 #include <limits>
 #include <optional>
 
-#include "lamina/clip.h"
+#include "lamina/edit.h"
 #include "lamina/frame.h"
 #include "lamina/points.h"
 #include "lamina/run.h"

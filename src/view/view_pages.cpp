@@ -14,7 +14,7 @@
 
 #include "base/output_file.h"
 #include "base/union_find.h"
-#include "lamina/edit_points.h"
+#include "lamina/edit.h"
 #include "lamina/error.h"
 #include "lamina/mesh.h"
 #include "lamina/view.h"

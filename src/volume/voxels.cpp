@@ -1,4 +1,4 @@
-#include "lamina/voxels.h"
+#include "lamina/volume_tools.h"
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>

@@ -1,4 +1,4 @@
-#include "lamina/clip.h"
+#include "lamina/edit.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

@@ -1,4 +1,4 @@
-#include "lamina/convert_mesh.h"
+#include "lamina/mesh.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,6 @@
 #include <limits>
 #include <string>
 
-#include "lamina/mesh.h"
 #include "meshes/mesh_files.h"
 #include "tiles/tile_files.h"
 

@@ -1,5 +1,5 @@
 // What clouds are taken for, on files of every kind.
-#include "lamina/trade.h"
+#include "lamina/normals.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

@@ -15,7 +15,7 @@
 #include <set>
 
 #include "base/temporary_folder.h"
-#include "lamina/points_writer.h"
+#include "lamina/points.h"
 #include "laz/chunks.h"
 #include "points/las_records.h"
 #include "points/point_rows.h"

@@ -10,7 +10,6 @@
 
 #include "lamina/error.h"
 #include "lamina/points.h"
-#include "lamina/points_writer.h"
 
 namespace lamina::test {
 

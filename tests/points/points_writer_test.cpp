@@ -1,4 +1,4 @@
-#include "lamina/points_writer.h"
+#include "lamina/points.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

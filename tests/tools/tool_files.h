@@ -8,7 +8,6 @@
 
 #include "lamina/mesh.h"
 #include "lamina/points.h"
-#include "lamina/points_writer.h"
 #include "render/shapes.h"
 #include "support/program.h"
 

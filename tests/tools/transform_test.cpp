@@ -1,4 +1,4 @@
-#include "lamina/transform.h"
+#include "lamina/edit.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

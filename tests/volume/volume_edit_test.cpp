@@ -8,8 +8,8 @@
 #include <filesystem>
 #include <random>
 
+#include "lamina/edit.h"
 #include "lamina/error.h"
-#include "lamina/transform.h"
 #include "lamina/volume_points.h"
 #include "support/program.h"
 #include "vdb/grids.h"
