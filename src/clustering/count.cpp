@@ -1,6 +1,6 @@
 #include "clustering/steps.h"
 
-#include "base/resize_anew.h"
+#include "base/vectors.h"
 #include "clustering/record.h"
 
 namespace lamina::clustering {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "base/resize_anew.h"
+#include "base/vectors.h"
 #include "clustering/record.h"
 
 namespace lamina::clustering {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/resize_anew.h"
+#include "base/vectors.h"
 #include "isosurface/crossing.h"
 #include "mls/extension.h"
 #include "mls/overhang.h"

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <span>
 
-#include "base/resize_anew.h"
+#include "base/vectors.h"
 #include "isosurface/cell_emitter.h"
 #include "isosurface/loops.h"
 #include "isosurface/tile_view.h"

@@ -8,7 +8,7 @@
 #include <limits>
 #include <tuple>
 
-#include "base/resize_anew.h"
+#include "base/vectors.h"
 #include "samples/block_order.h"
 
 namespace lamina {

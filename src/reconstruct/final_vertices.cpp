@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/resize_anew.h"
+#include "base/vectors.h"
 
 namespace lamina {
 namespace {

@@ -5,7 +5,7 @@
 #include <limits>
 #include <tuple>
 
-#include "base/resize_anew.h"
+#include "base/vectors.h"
 #include "lattice/lattice.h"
 #include "samples/block_order.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "base/resize_anew.h"
+#include "base/vectors.h"
 
 namespace lamina {
 namespace {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/hashing.h"
+#include "base/vectors.h"
 #include "samples/consensus_plane.h"
 #include "samples/density_octree.h"
 
@@ -276,17 +277,9 @@ bool is_blurred(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3
          found[0] * own.x() + found[1] * own.y() + found[2] * own.z() < kBlurredCosine;
 }
 
-/// The value that the share of all lies below; 0 where there are too few to tell.
-float quantile_of(std::vector<float>& values, double share) {
-  if (values.size() < kEnough) return 0;
-  const auto place = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size()));
-  const auto value = values.begin() + std::min(place, static_cast<std::ptrdiff_t>(values.size()) - 1);
-  std::nth_element(values.begin(), value, values.end());
-  return *value;
-}
-
-float median_of(std::vector<float>& values) {
-  return quantile_of(values, 0.5);
+/// quantile_of(), or 0 where there are too few values to tell.
+float quantile_of_enough(std::vector<float>& values, double share) {
+  return values.size() < kEnough ? 0 : quantile_of(values, share);
 }
 
 std::array<float, 3> middle_of(const LocalSamples& samples, const std::vector<std::size_t>& seeds) {
@@ -331,15 +324,15 @@ Noise survey_noise(const SlabStore& store, const ReadBucket& read, float radius)
       if (d.angle >= 0) angles.push_back(static_cast<float>(d.angle));
     }
     distances.insert(distances.end(), here.begin(), here.end());
-    if (const float median = median_of(here); median > noise.worst) {
+    if (const float median = quantile_of_enough(here, 0.5); median > noise.worst) {
       noise.worst = median;
       noise.worst_at = middle_of(samples, around.seeds());
     }
   }
   constexpr double kAllButATenth = 0.9;
-  noise.distance = median_of(distances);
-  noise.high = quantile_of(distances, kAllButATenth);
-  noise.angle = median_of(angles);
+  noise.distance = quantile_of_enough(distances, 0.5);
+  noise.high = quantile_of_enough(distances, kAllButATenth);
+  noise.angle = quantile_of_enough(angles, 0.5);
   if (looked_at >= kEnough) noise.blurred = static_cast<float>(blurred) / static_cast<float>(looked_at);
   return noise;
 }

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
 
+#include "base/vectors.h"
 #include "samples/sample_tree.h"
 
 namespace lamina {
@@ -20,16 +20,9 @@ constexpr int kRounds = 5;
 /// 1.4826 medians of distances are a deviation of normally distributed ones.
 constexpr double kDeviation = 1.4826;
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 double median_size(std::vector<double> values) {
   for (double& v : values) v = std::abs(v);
-  return median(std::move(values));
+  return median_of(values);
 }
 
 /// How far scan a lies above scan b, and how that changes with their motions: six numbers, of a's and, with the other
@@ -80,7 +73,7 @@ void ScanAgreement::choose_radii(double samples) {
     if (n == kPlacesAround) place.radius = wider * std::sqrt(double{found[n - 1].squared}) / steps;
     radii.push_back(place.radius);
   }
-  radius_ = median(radii);
+  radius_ = median_of(radii);
   for (Place& p : places_) p.radius = std::min(p.radius, kWidest * radius_);
 }
 

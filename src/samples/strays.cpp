@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/resize_anew.h"
+#include "base/vectors.h"
 #include "lamina/error.h"
 #include "samples/neighbourhoods.h"
 #include "samples/sampling_survey.h"

@@ -11,7 +11,7 @@
 #include <memory>
 #include <type_traits>
 
-#include "base/resize_anew.h"
+#include "base/vectors.h"
 #include "lamina/error.h"
 
 namespace lamina {

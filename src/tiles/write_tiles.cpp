@@ -20,6 +20,7 @@
 
 #include "base/run.h"
 #include "base/staged_folder.h"
+#include "base/vectors.h"
 #include "lamina/error.h"
 #include "meshes/mesh_blocks.h"
 #include "meshes/stored_mesh.h"
@@ -49,14 +50,12 @@ TileLattice lattice_of(const Extent& extent, const TileOctree& octree, bool map)
   for (const TileNode& node : octree.nodes()) {
     if (node.leaf()) sides.push_back(node.side);
   }
-  const auto middle = sides.begin() + static_cast<std::ptrdiff_t>(sides.size() / 2);
-  std::nth_element(sides.begin(), middle, sides.end());
   constexpr double kBeside = 1.25;  // triangles reach out of the cells
   constexpr double kWords = 65534, kMostSteps = 1 << 23;
   const double longest = extent.longest();
   TileLattice lattice;
   if (longest > 0) {
-    double step = std::exp2(std::floor(std::log2(kBeside * *middle / kWords)));
+    double step = std::exp2(std::floor(std::log2(kBeside * median_of(sides) / kWords)));
     if (map) step = std::min(step, std::exp2(-10));
     lattice.step = std::max(step, std::exp2(std::ceil(std::log2(longest / kMostSteps))));
   }
