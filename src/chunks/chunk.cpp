@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 #include <filesystem>
 
+#include "base/staged_folder.h"
 #include "chunks/cuts.h"
-#include "chunks/folders.h"
 #include "chunks/part_slabs.h"
 #include "lamina/error.h"
 #include "reconstruct/job.h"
@@ -25,11 +25,11 @@ SurfaceStats write_store(const SurfaceSettings& settings, const std::string& sto
   RunContext here = run;
   if (here.tmp_dir.empty()) here.tmp_dir = (std::filesystem::absolute(store) / "..").lexically_normal().string();
   Job job(here);
-  NewFolder folder(store);
+  StagedFolder folder(store);
   run_in_arena(run, [&] {
-    const StoredCloud cloud = read_cloud(own, {folder.path(), /*stays=*/true}, job);
+    const StoredCloud cloud = read_cloud(own, {folder.hidden(), /*stays=*/true}, job);
     plan_surface(own, cloud, job);
-    job.watch.time("store", [&] { save_input(cloud, own, folder.path()); });
+    job.watch.time("store", [&] { save_input(cloud, own, folder.hidden()); });
   });
   folder.publish();
   job.finish();

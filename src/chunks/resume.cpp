@@ -7,8 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "base/staged_folder.h"
+#include "chunks/checkpoint_folder.h"
 #include "chunks/cuts.h"
-#include "chunks/folders.h"
 #include "chunks/part_slabs.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
@@ -55,10 +56,10 @@ StoredCloud open_input(const SurfaceSettings& settings, const CheckpointFolder& 
     return open_kept_input(settings.input, settings);
   }
   if (!is_kept_input(folder.store())) {
-    NewFolder made(folder.store());
+    StagedFolder made(folder.store());
     {
-      const StoredCloud cloud = read_cloud(settings, {made.path(), /*stays=*/true}, job);
-      job.watch.time("store", [&] { save_input(cloud, settings, made.path()); });
+      const StoredCloud cloud = read_cloud(settings, {made.hidden(), /*stays=*/true}, job);
+      job.watch.time("store", [&] { save_input(cloud, settings, made.hidden()); });
     }
     made.publish();
   }

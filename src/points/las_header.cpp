@@ -12,7 +12,7 @@
 
 #include "base/little_endian.h"
 #include "lamina/error.h"
-#include "points/copc.h"
+#include "points/laz_chunks.h"
 #include "points/ply_header.h"
 #include "points/point_columns.h"
 

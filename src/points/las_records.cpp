@@ -13,7 +13,6 @@
 
 #include "lamina/error.h"
 #include "laz/arithmetic_coder.h"
-#include "points/copc.h"
 #include "points/laz_chunks.h"
 
 namespace lamina {
