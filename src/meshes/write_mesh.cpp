@@ -99,6 +99,7 @@ void write_ply(const TriangleMesh& mesh, ResultFile& out) {
 }
 
 }  // namespace lamina::meshes
+
 namespace lamina {
 
 void write_mesh(const TriangleMesh& mesh, const std::string& path) {
@@ -118,9 +119,6 @@ void write_mesh(const TriangleMesh& mesh, const std::string& path) {
   out.commit();
 }
 
-}  // namespace lamina
-
-namespace lamina {
 namespace {
 
 /// A stored mesh without the lines that say where it comes from, as a mesh that was read whole is without them.
