@@ -12,10 +12,10 @@
 #include <string>
 #include <vector>
 
+#include "lamina/attributes.h"
 #include "lamina/mesh.h"
 #include "lamina/points.h"
 #include "lamina/run.h"
-#include "lamina/sample.h"
 
 namespace lamina {
 

@@ -8,7 +8,6 @@
 
 #include "lamina/attributes.h"
 #include "lamina/points.h"
-#include "lamina/sample.h"
 
 namespace lamina {
 

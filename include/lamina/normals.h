@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
+#include "lamina/attributes.h"
 #include "lamina/points.h"
 #include "lamina/run.h"
-#include "lamina/sample.h"
 
 namespace lamina {
 

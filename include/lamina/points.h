@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "lamina/attributes.h"
-#include "lamina/sample.h"
 
 namespace lamina {
 

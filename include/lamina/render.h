@@ -12,7 +12,6 @@
 #include "lamina/attributes.h"
 #include "lamina/mesh.h"
 #include "lamina/run.h"
-#include "lamina/sample.h"
 #include "lamina/volume.h"
 
 namespace lamina {

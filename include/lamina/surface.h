@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "lamina/align.h"
+#include "lamina/attributes.h"
 #include "lamina/clean.h"
 #include "lamina/clustering.h"
 #include "lamina/frame.h"
@@ -18,7 +19,6 @@
 #include "lamina/normals.h"
 #include "lamina/points.h"
 #include "lamina/run.h"
-#include "lamina/sample.h"
 #include "lamina/simplify.h"
 #include "lamina/tiles.h"
 #include "lamina/volume_export.h"

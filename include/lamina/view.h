@@ -5,10 +5,10 @@
 #include <functional>
 #include <string>
 
+#include "lamina/attributes.h"
 #include "lamina/mesh.h"
 #include "lamina/points.h"
 #include "lamina/run.h"
-#include "lamina/sample.h"
 
 namespace lamina {
 

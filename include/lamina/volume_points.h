@@ -6,7 +6,6 @@
 
 #include "lamina/attributes.h"
 #include "lamina/run.h"
-#include "lamina/sample.h"
 
 namespace lamina {
 

@@ -13,7 +13,7 @@
 
 #include "base/little_endian.h"
 #include "lamina/error.h"
-#include "meshes/glb_set.h"
+#include "meshes/glb.h"
 
 namespace lamina::meshes {
 namespace {

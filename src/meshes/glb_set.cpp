@@ -1,4 +1,4 @@
-#include "meshes/glb_set.h"
+#include "meshes/glb.h"
 
 #include <fmt/format.h>
 #include <zlib.h>
@@ -17,7 +17,6 @@
 
 #include "base/little_endian.h"
 #include "lamina/error.h"
-#include "meshes/glb.h"
 #include "meshes/glb_writer.h"
 #include "meshes/mesh_blocks.h"
 #include "meshes/vertex_set.h"

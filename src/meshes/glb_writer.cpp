@@ -22,7 +22,6 @@
 #include "lamina/error.h"
 #include "meshes/colours.h"
 #include "meshes/glb.h"
-#include "meshes/glb_set.h"
 #include "meshes/mesh_blocks.h"
 #include "meshes/writers.h"
 

@@ -28,7 +28,7 @@ std::uint64_t glb_data_bytes(const AttributeLayout& layout, bool normals, std::u
 /// own. Positions are floats; where those lose something, floats from a middle that the node's translation holds in
 /// double. Colours become linear, as glTF has them, in numbers from which they come back unchanged. Normals of no
 /// length become 0 0 1, others of another length than 1 are made unit; attributes that are not finite become 0. Meshes
-/// beyond what one file holds are split into primitives with files of their own (glb_set.h). Throws Error(usage) for
+/// beyond what one file holds are split into primitives with files of their own (glb.h). Throws Error(usage) for
 /// positions that are not finite or too far apart for floats.
 void write_glb(MeshBlocks& mesh, ResultFile& out, const GlbLimits& limits = {});
 

@@ -5,7 +5,7 @@
 
 #include "mls/kernel.h"
 #include "mls/project.h"
-#include "mls/row_samples.h"
+#include "mls/tile_samples.h"
 #include "octree/window.h"
 
 namespace lamina {

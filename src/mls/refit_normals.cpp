@@ -10,7 +10,7 @@
 #include <tuple>
 
 #include "lattice/lattice.h"
-#include "mls/row_samples.h"
+#include "mls/tile_samples.h"
 #include "samples/consensus_plane.h"
 
 namespace lamina {

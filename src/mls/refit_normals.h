@@ -6,7 +6,7 @@
 
 #include "lattice/lattice.h"
 #include "mls/kernel.h"
-#include "mls/sample_clusters.h"
+#include "mls/tile_samples.h"
 #include "samples/sample_feed.h"
 
 namespace lamina {

@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "lamina/attributes.h"
 #include "lamina/error.h"
-#include "lamina/sample.h"
 
 namespace lamina {
 namespace {

@@ -8,7 +8,6 @@
 #include "lamina/attributes.h"
 #include "lamina/mesh.h"
 #include "lamina/render.h"
-#include "lamina/sample.h"
 #include "lamina/volume.h"
 #include "measure/edge_table.h"
 #include "render/canvas.h"

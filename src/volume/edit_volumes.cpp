@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "base/run.h"
+#include "lamina/attributes.h"
 #include "lamina/edit.h"
 #include "lamina/error.h"
-#include "lamina/sample.h"
 #include "lamina/volume_points.h"
 #include "lamina/volume_tools.h"
 #include "vdb/points_grid.h"

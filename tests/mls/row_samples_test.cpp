@@ -1,4 +1,4 @@
-#include "mls/row_samples.h"
+#include "mls/tile_samples.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
