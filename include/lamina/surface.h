@@ -91,10 +91,11 @@ struct SurfaceSettings {
   /// none longer than 24 R is left), else false.
   std::optional<bool> watertight;
   /// Bridge gaps with bent rims where the surface leads into them from all around (HoleSettings::bridge). Unset: where
-  /// `blend` is chosen and gaps are what nobody saw: in clouds of several scans, and in those that came without normals.
+  /// `blend` is chosen and gaps are what nobody saw: in clouds of several scans, and in those that came without
+  /// normals.
   std::optional<bool> bridge;
-  /// Close everything: what `close_holes`, `bridge` and `watertight` leave open gets surfaces that rest on nothing but its rim.
-  /// Vertices get an attribute `invented`: 1 where one was added for that, else 0. Not with ClusterMode::free.
+  /// Close everything: what `close_holes`, `bridge` and `watertight` leave open gets surfaces that rest on nothing but
+  /// its rim. Vertices get an attribute `invented`: 1 where one was added for that, else 0. Not with ClusterMode::free.
   bool fill_all = false;
   /// R, 0 <= trim < 1: the mesh is cut along the curve where it reaches so far beyond the samples that carry it (where
   /// their weighted mean lies so far to one side); 0.235 is the straight edge of evenly spread samples. 0: nowhere,
