@@ -116,7 +116,7 @@ std::string quoted_word(std::string_view word) {
 
 namespace {
 
-constexpr std::size_t kBytes = 256 << 10;
+constexpr std::size_t kUnpackedAtOnce = 256 << 10;
 constexpr int kGzipOnly = 16 + MAX_WBITS;
 
 class Inflater {
@@ -215,8 +215,8 @@ bool is_gzip(std::string_view start) {
 }
 
 InputFile unpack_gzip(const InputFile& packed, const std::string& tmp_dir) {
-  const auto in = std::make_unique_for_overwrite<Bytef[]>(kBytes);
-  const auto out = std::make_unique_for_overwrite<Bytef[]>(kBytes);
+  const auto in = std::make_unique_for_overwrite<Bytef[]>(kUnpackedAtOnce);
+  const auto out = std::make_unique_for_overwrite<Bytef[]>(kUnpackedAtOnce);
   Inflater inflater(packed.name);
   z_stream& stream = inflater.stream;
   std::uint64_t offset = 0;
@@ -230,7 +230,7 @@ InputFile unpack_gzip(const InputFile& packed, const std::string& tmp_dir) {
   for (;;) {
     if (stream.avail_in == 0) {
       stream.next_in = in.get();
-      stream.avail_in = static_cast<uInt>(packed.read(offset, in.get(), kBytes));
+      stream.avail_in = static_cast<uInt>(packed.read(offset, in.get(), kUnpackedAtOnce));
       offset += stream.avail_in;
       if (stream.avail_in == 0) {
         if (!member_ended) damaged("cut short");
@@ -247,10 +247,10 @@ InputFile unpack_gzip(const InputFile& packed, const std::string& tmp_dir) {
       member_ended = false;
     }
     stream.next_out = out.get();
-    stream.avail_out = kBytes;
+    stream.avail_out = kUnpackedAtOnce;
     const int status = inflate(&stream, Z_NO_FLUSH);
     if (status != Z_OK && status != Z_STREAM_END) damaged("damaged");
-    const std::size_t n = kBytes - stream.avail_out;
+    const std::size_t n = kUnpackedAtOnce - stream.avail_out;
     if (n > 0 && spool.bytes() == 0) {
       detect_format({reinterpret_cast<const char*>(out.get()), std::min(n, kSniffBytes)}, packed.name);
     }
