@@ -51,7 +51,7 @@ Placed Contractor::place(std::uint32_t u, std::uint32_t v) const {
 }
 
 void Contractor::offer(std::uint32_t u, std::uint32_t v) {
-  if (piece_.fixed[v] != 0) return;
+  if ((piece_.fixed[u] | piece_.fixed[v]) != 0) return;
   if (u > v) std::swap(u, v);
   const Entry edge{static_cast<float>(place(u, v).cost), u, v, version_[u] + version_[v]};
   if (edge.cost > limit_) {
@@ -108,7 +108,7 @@ std::uint64_t Contractor::run(float dearest, std::uint64_t keep) {
     const double weight = piece_.quadrics[e.u].weight() + piece_.quadrics[e.v].weight();
     if (weight > 0) deviation2_ = std::max(deviation2_, to.cost / weight);
     size_ -= static_cast<std::uint64_t>(contract(e.u, e.v, to.at));
-    if (old_) tracker_->accept();
+    if (old_) tracker_->accept(e.u, e.v);
   }
   return before - size_;
 }
@@ -120,7 +120,8 @@ bool Contractor::stays_near(std::uint32_t u, std::uint32_t v, const Placed& to) 
   const double of_noise = 16 * kNormalNoise * kNormalNoise * dot(edge, edge);  // counted in the cost, too
   const double weight = piece_.quadrics[u].weight() + piece_.quadrics[v].weight();
   if (to.cost > weight * (piece_.bound * piece_.bound + of_noise)) return false;
-  return tracker_->allows(stars_, piece_.positions, u, v, to.at);
+  return tracker_->takes_on_trust(stars_, u, v, weight > 0 ? to.cost / weight : 0) ||
+         tracker_->allows(stars_, piece_.positions, u, v, to.at);
 }
 
 int Contractor::contract(std::uint32_t u, std::uint32_t v, const Vec3& to) {
@@ -163,7 +164,7 @@ void Contractor::prove() {
 }
 
 void Contractor::keep_bound() {
-  Proof proof(*old_, {stars_, piece_.positions, tracker_->homes(), change_});
+  Proof proof(*old_, {stars_, piece_.positions, change_}, *tracker_);
   for (int attempt = 0;; ++attempt) {
     const std::vector<std::uint32_t>& failures = proof.find_failures();
     if (failures.empty()) break;
@@ -213,7 +214,8 @@ void Contractor::take_back(std::uint32_t step, std::vector<std::uint32_t>& touch
   piece_.quadrics[s.u] = s.quadric;
   merges_[step].u = kNone;
   for (std::size_t i = triangles.size(); i-- > 0;) change_[triangles[i]] = earlier_[s.changes + i];
-  tracker_->settle(stars_, piece_.positions, triangles);
+  tracker_->undo(s.u, s.v);
+  for (const std::uint32_t triangle : triangles) tracker_->forget(triangle);
   touched.insert(touched.end(), triangles.begin(), triangles.end());
 }
 

@@ -34,17 +34,14 @@ struct OldMesh {
     for (std::uint32_t i = 0; i < triangles.size(); ++i) {
       for (const std::uint32_t v : triangles[i]) listed[--begins[v]] = i;
     }
-    list_neighbours();
+    twins.reserve(listed.size());
+    for (std::uint32_t side = 0; side < listed.size(); ++side)
+      twins.push_back(find_twin(triangles, side, around(triangles[side / 3][side % 3])));
   }
 
   /// The triangles at a vertex.
   [[nodiscard]] std::span<const std::uint32_t> around(std::uint32_t vertex) const {
     return {listed.data() + begins[vertex], begins[vertex + 1] - begins[vertex]};
-  }
-
-  /// The vertices beside a vertex, each once.
-  [[nodiscard]] std::span<const std::uint32_t> neighbours(std::uint32_t vertex) const {
-    return {beside.data() + beside_begins[vertex], beside_begins[vertex + 1] - beside_begins[vertex]};
   }
 
   static constexpr double kRounding = 1e-6;  ///< of the bound: what arithmetic may cost
@@ -54,23 +51,7 @@ struct OldMesh {
   std::vector<Errors> errors;  ///< of the triangles
   double bound;
   std::vector<std::uint32_t> begins, listed;
-  std::vector<std::uint32_t> beside_begins, beside;
-
- private:
-  void list_neighbours() {
-    std::vector<std::uint32_t> last(positions.size(), kNone);
-    for (std::uint32_t v = 0; v < positions.size(); ++v) {
-      beside_begins.push_back(static_cast<std::uint32_t>(beside.size()));
-      for (const std::uint32_t triangle : around(v)) {
-        for (const std::uint32_t w : triangles[triangle]) {
-          if (w == v || last[w] == v) continue;
-          last[w] = v;
-          beside.push_back(w);
-        }
-      }
-    }
-    beside_begins.push_back(static_cast<std::uint32_t>(beside.size()));
-  }
+  std::vector<std::uint32_t> twins;  ///< of the sides (Overlay): the same one of the other triangle; kNone: a boundary
 };
 
 }  // namespace lamina::simplify

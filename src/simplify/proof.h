@@ -10,7 +10,9 @@
 #include "meshes/vec3.h"
 #include "simplify/cover.h"
 #include "simplify/old_mesh.h"
+#include "simplify/overlay.h"
 #include "simplify/stars.h"
+#include "simplify/tracker.h"
 
 namespace lamina::simplify {
 
@@ -18,7 +20,6 @@ namespace lamina::simplify {
 struct Present {
   const Stars& stars;
   const std::vector<meshes::Vec3>& positions;
-  const std::vector<std::uint32_t>& homes;    ///< of the old vertices: present triangles near them
   const std::vector<std::uint32_t>& changes;  ///< of the triangles; kNone: as it was
 };
 
@@ -26,8 +27,10 @@ struct Present {
 /// proved anew.
 class Proof {
  public:
-  /// Refers to all of it.
-  Proof(const OldMesh& old, const Present& now);
+  using Corners = std::array<meshes::Vec3, 3>;
+
+  /// Refers to all of it. `tracker`: what it knows of present triangles is not asked again.
+  Proof(const OldMesh& old, const Present& now, Tracker& tracker);
 
   /// Present triangles, not as they were, beside which something cannot be proved; none: everything is.
   const std::vector<std::uint32_t>& find_failures();
@@ -47,31 +50,32 @@ class Proof {
   };
 
   void prove_old(std::uint32_t number);
-  void list_olds();
+  std::uint32_t home_of(std::uint32_t number);
+  bool take_proof(OldProof& proof, const Corners& corners, double error);
+  bool keep(OldProof& proof, double error, std::span<const std::uint32_t> faces) const;
   void prove_face(std::uint32_t face);
-  [[nodiscard]] std::span<const std::uint32_t> olds_at(std::uint32_t face) const {
-    return {olds_.data() + begins_[face], begins_[face + 1] - begins_[face]};
-  }
-  bool take_proof(OldProof& proof, const Triangle& corners, double error);
+  [[nodiscard]] Corners corners_of(std::uint32_t face) const;
   const Facet* face_facet(std::uint32_t face);
-  const Facet* old_facet(std::uint32_t number);
   void add_face(std::uint32_t face);
-  float prove_near_old(const std::array<meshes::Vec3, 3>& triangle, const std::vector<const Facet*>& all, int halvings);
   void blame(std::span<const std::uint32_t> faces);
   [[nodiscard]] bool changed(std::uint32_t face) const { return now_.changes[face] != kNone; }
 
   const OldMesh& old_;
   Present now_;
-  meshes::Vec3 origin_;  ///< of facets
+  Tracker& tracker_;
+  Extent extent_;
   Cover cover_;
-  std::deque<Facet> facets_;                      ///< those asked for
-  std::vector<const Facet*> faces_, old_facets_;  ///< of the present triangles and the old ones; or none yet
+  Overlay overlay_;
+  std::deque<Facet> facets_;         ///< those asked for
+  std::vector<const Facet*> faces_;  ///< of the present triangles; or none yet
   std::vector<OldProof> proofs_;
-  std::vector<float> back_;                   ///< of the present triangles; below 0: not proved
-  std::vector<std::uint32_t> begins_, olds_;  ///< of present triangles: old ones near them
+  std::vector<float> back_;  ///< of the present triangles; below 0: not proved
   std::vector<std::uint32_t> failures_;
   std::vector<const Facet*> list_;
-  std::vector<std::uint32_t> asked_;  ///< what is in list_
+  std::vector<std::uint32_t> asked_;     ///< what is in list_
+  std::vector<std::uint32_t> queue_;     ///< of a search for a home
+  std::vector<std::uint32_t> searched_;  ///< of old triangles: the last search that met them
+  std::uint32_t search_ = 0;
 };
 
 }  // namespace lamina::simplify

@@ -21,6 +21,20 @@ inline bool names(const Triangle& t, std::uint32_t vertex) {
   return t[0] == vertex || t[1] == vertex || t[2] == vertex;
 }
 
+/// A triangle's side from corner k to the next is the (3 number + k)th. The same side of another one of `around`, the
+/// triangles at the side's first vertex, or kNone.
+inline std::uint32_t find_twin(std::span<const Triangle> triangles, std::uint32_t side,
+                               std::span<const std::uint32_t> around) {
+  const Triangle& t = triangles[side / 3];
+  const std::uint32_t from = t[side % 3], to = t[(side % 3 + 1) % 3];
+  for (const std::uint32_t other : around) {
+    const Triangle& o = triangles[other];
+    const auto before = static_cast<std::uint32_t>((corner_of(o, from) + 2) % 3);
+    if (o[before] == to) return 3 * other + before;
+  }
+  return kNone;
+}
+
 /// Which triangles meet at a vertex: for each a run of triangle numbers in one array. A contracted vertex' run is
 /// written anew behind the others.
 class Stars {

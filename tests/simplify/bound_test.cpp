@@ -14,6 +14,8 @@
 #include "meshes/mesh_files.h"
 #include "meshes/vec3.h"
 #include "simplify/cover.h"
+#include "simplify/near_old.h"
+#include "simplify/old_mesh.h"
 
 namespace lamina {
 namespace {
@@ -150,12 +152,95 @@ TEST(SimplifyBound, APlaneGoesAtAnyBound) {
   EXPECT_LT(mesh.triangles.size(), before / 2);
 }
 
+/// Where proofs fail, contractions are taken back and others tried, between vertices that pieces have in common, too.
+TEST(SimplifyBound, TopologyStaysWhereContractionsAreTakenBack) {
+  TriangleMesh mesh;
+  constexpr std::uint32_t n = 130;  // more than a piece
+  for (std::uint32_t i = 0; i <= n; ++i)
+    for (std::uint32_t j = 0; j <= n; ++j) {
+      const double x = static_cast<double>(i) / n, y = static_cast<double>(j) / n;
+      mesh.positions.push_back({x, y, 0.05 * std::sin(40 * x) * std::cos(40 * y)});
+    }
+  for (std::uint32_t i = 0; i < n; ++i)
+    for (std::uint32_t j = 0; j < n; ++j) {
+      const std::uint32_t a = i * (n + 1) + j, b = a + n + 1;
+      mesh.triangles.push_back({a, b, b + 1});
+      mesh.triangles.push_back({a, b + 1, a + 1});
+    }
+  for (const double bound : {0.03, 0.06}) {
+    TriangleMesh fewer = mesh;
+    simplify_mesh(fewer, {0, bound});
+    const CheckReport is = check_mesh(fewer);
+    EXPECT_TRUE(is.manifold());
+    EXPECT_EQ(is.euler_characteristic, 1);
+    EXPECT_EQ(is.boundary_loops, 1U);
+    EXPECT_LT(2 * fewer.triangles.size(), mesh.triangles.size());
+    const CompareResult apart = compare(fewer, mesh, {20000});
+    EXPECT_LE(std::max(apart.a_to_b->max, apart.b_to_a->max), bound);
+  }
+}
+
 TEST(SimplifyBound, RefusesWhatIsNoLength) {
   TriangleMesh mesh = tetrahedron();
   for (const double error : {-1.0, std::nan(""), std::numeric_limits<double>::infinity()})
     expect_error(ExitCode::usage, [&] { simplify_mesh(mesh, {0, error}); }, {"error", "length above 0"});
   expect_error(ExitCode::usage, [&] { simplify_mesh(mesh, {2, 1.0}); }, {"not both"});
   expect_error(ExitCode::usage, [&] { simplify_mesh(mesh, {0, 0.0}); }, {"at least one triangle"});
+}
+
+/// Triangles over a rough field: what is said to be near is, by a bound that is nearly the least.
+TEST(NearOld, SaysWhatIsTrue) {
+  using simplify::NearOld;
+  std::mt19937 random(5);
+  std::uniform_real_distribution<> real(0, 1);
+  int near = 0, seen = 0;
+  for (int round = 0; round < 20; ++round) {
+    TriangleMesh field = rough_field(random, 8);
+    const simplify::OldMesh old(field.positions, field.triangles, std::vector<simplify::Errors>(field.triangles.size()),
+                                0.5);
+    NearOld near_old(old);
+    for (int i = 0; i < 50; ++i) {
+      TriangleMesh one;
+      for (int k = 0; k < 3; ++k) one.positions.push_back({real(random), real(random), 0.2 * real(random)});
+      one.triangles.push_back({0, 1, 2});
+      if (cross(one.positions[1] - one.positions[0], one.positions[2] - one.positions[0])[2] < 0)
+        std::swap(one.triangles[0][0], one.triangles[0][1]);
+      const auto& t = one.triangles[0];
+      const NearOld::Corners corners{one.positions[t[0]], one.positions[t[1]], one.positions[t[2]]};
+      const auto begin = static_cast<std::uint32_t>(random() % field.triangles.size());
+      const double truth = farthest(one, field);
+      EXPECT_FALSE(near_old.prove(corners, begin, 0.999 * truth));
+      if (!near_old.prove(corners, begin, 0.5)) continue;
+      ++near;
+      EXPECT_GE(static_cast<double>(near_old.error()), 0.999 * truth);
+      if (near_old.look(corners, begin, 0.5) == NearOld::Answer::near) ++seen;
+    }
+  }
+  EXPECT_GT(near, 400);
+  EXPECT_GT(seen, 100);
+}
+
+/// Of a flat mesh, what is beyond its end or turned over is not.
+TEST(NearOld, EndsWhereTheMeshEnds) {
+  using simplify::NearOld;
+  TriangleMesh square;
+  square.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  square.triangles = {{0, 1, 2}, {0, 2, 3}};
+  const simplify::OldMesh old(square.positions, square.triangles, std::vector<simplify::Errors>(2), 0.1);
+  NearOld near_old(old);
+  const Vec3 a{0.1, 0.1, 0.05}, b{0.9, 0.2, 0.05}, c{0.2, 0.8, 0.05};
+  EXPECT_EQ(near_old.look({a, b, c}, 1, 0.06), NearOld::Answer::near);
+  EXPECT_NEAR(near_old.error(), 0.05, 1e-6);
+  EXPECT_EQ(near_old.used().size(), 2U);
+  EXPECT_EQ(near_old.look({a, b, c}, 1, 0.04), NearOld::Answer::far);
+  EXPECT_EQ(near_old.look({a, c, b}, 1, 0.06), NearOld::Answer::unclear);
+  EXPECT_EQ(near_old.look({a, {1.05, 0.2, 0.05}, c}, 1, 0.06), NearOld::Answer::unclear);
+  EXPECT_TRUE(near_old.prove({a, c, b}, 1, 0.06));                  // one way or the other it is near
+  EXPECT_TRUE(near_old.prove({a, {1.03, 0.2, 0.05}, c}, 1, 0.06));  // by 0.058
+  EXPECT_FALSE(near_old.prove({a, {1.05, 0.2, 0.05}, c}, 1, 0.06));
+  // All of the square, corner on corner.
+  EXPECT_EQ(near_old.look({Vec3{0, 0, 0}, Vec3{1, 0, 0}, Vec3{1, 1, 0}}, 1, 0.01), NearOld::Answer::near);
+  EXPECT_EQ(near_old.used().size(), 1U);
 }
 
 TEST(Cover, DistanceIsTheDistance) {
