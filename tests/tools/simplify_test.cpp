@@ -69,6 +69,7 @@ TEST(SimplifyTool, RefusesWithoutLeavingAnything) {
   refuses({"--error", "0"}, "above 0");
   refuses({"--error", "nan"}, "above 0");
   refuses({"--triangles", "0"}, "at least one triangle");
+  refuses({"--triangles", "-5"}, "-5: is below 0");
   refuses({"--triangles", "201"}, "201 triangles are wanted, the mesh has 200");
   refuses({"--ratio", "1.1"}, "up to 1");
   refuses({"--ratio", "0.5", "--error", "1"}, "excludes");
