@@ -9,6 +9,8 @@
 #include <span>
 #include <tuple>
 
+#include <Eigen/Core>
+
 #include "lattice/lattice.h"
 #include "mls/tile_samples.h"
 #include "samples/consensus_plane.h"
@@ -57,12 +59,21 @@ struct Scratch {
   ConsensusPlane plane;
 };
 
+/// Of normals whose angles have that median: each of two components is the median over 1.18 (Rayleigh's distribution).
+float variance_of(float median_angle) {
+  constexpr float kMedianOfRayleigh = 1.1774F;
+  const float deviation = median_angle / kMedianOfRayleigh;
+  return 2 * deviation * deviation;
+}
+
 /// One tile's fits.
 class TileRefit {
  public:
-  TileRefit(const Kernel& kernel, bool only_blurred, const ActiveBucket& bucket, Scratch& scratch, UnitNormals& out)
+  TileRefit(const Kernel& kernel, const RefitSettings& settings, const ActiveBucket& bucket, Scratch& scratch,
+            UnitNormals& out)
       : kernel_(kernel),
-        only_blurred_(only_blurred),
+        only_blurred_(settings.only_blurred),
+        noise_variance_(std::max(kNoiseVariance, 2 * variance_of(settings.noise))),
         s_(bucket.samples),
         support_(bucket.support),
         scratch_(scratch),
@@ -114,7 +125,8 @@ class TileRefit {
       const int l = static_cast<int>(k);
       const float along = fit.nx[l] * s_.nx[i] + fit.ny[l] * s_.ny[i] + fit.nz[l] * s_.nz[i];
       const bool keep = !(along > 0) || sums[kSeen][l] < kLeastRefitSamples;
-      put(i, keep ? normal_of(i) : Point{fit.nx[l], fit.ny[l], fit.nz[l]});
+      put(i, keep ? normal_of(i)
+                  : mixed({fit.nx[l], fit.ny[l], fit.nz[l]}, normal_of(i), 1 - mean_of_normals(sums.data(), l)));
     }
   }
   using Point = std::array<float, 3>;
@@ -123,6 +135,14 @@ class TileRefit {
     const float y = sums[kNy][l];
     const float z = sums[kNz][l];
     return (x * x + y * y + z * z) / std::max(1e-30F, sums[kW][l] * sums[kW][l]);
+  }
+  /// The fit, or the normal that came, as the normals around vary.
+  [[nodiscard]] Point mixed(const Point& fit, const Point& own, float variance) const {
+    const float share = std::clamp((variance - noise_variance_) / ((kShapeRatio - 1) * noise_variance_), 0.0F, 1.0F);
+    const Eigen::Vector3f f(fit[0], fit[1], fit[2]), o(own[0], own[1], own[2]);
+    const Eigen::Vector3f sum = f + share * (o - f);
+    const float length = sum.norm();  // never 0: the two face one way
+    return {sum.x() / length, sum.y() / length, sum.z() / length};
   }
   /// One sample's normal; it stays where those around are the same, whose mean has this squared length.
   void sharpen(std::uint32_t i, const Point& at, int ranges, float mean2) {
@@ -158,6 +178,7 @@ class TileRefit {
 
   const Kernel& kernel_;
   bool only_blurred_;
+  float noise_variance_;
   const LocalSamples& s_;
   const std::vector<float>& support_;
   Scratch& scratch_;
@@ -235,7 +256,7 @@ UnitNormals RefitNormals::find(std::size_t bucket) {
     Scratch& local = scratch.local();
     constexpr float kNoBand = 1e4F;
     local.rows.gather(lattice_, layers, blocks[t], bins.of(t), kNoBand);
-    TileRefit(kernel_, settings_.only_blurred, own.bucket, local, out)
+    TileRefit(kernel_, settings_, own.bucket, local, out)
         .fit(blocks[t], cell, std::span(placed).subspan(tiles[t].begin, tiles[t].end - tiles[t].begin));
   });
   return out;

@@ -1,5 +1,5 @@
-// Every sample's normal replaced by that of the sphere fitted to the samples around it: noise averages out, and what
-// the projection sums up are normals that agree.
+// Every sample's normal replaced by that of the sphere fitted to the samples around it, where these face about one way:
+// noise averages out, and what the projection sums up are normals that agree.
 #pragma once
 #include <map>
 #include <memory>
@@ -18,10 +18,17 @@ inline constexpr float kLeastRefitSamples = 6;
 /// than four degrees.
 inline constexpr float kBlurredVariance = 0.0005F;
 
+/// Variances of the normals around a sample, of length one. Up to this, or twice what the cloud's normals have where
+/// that is more, it is taken for noise, and the fit is better than the normal that came. From so many times that on it
+/// is shape, which a fit would level, and the normal stays; between them it is a mixture.
+inline constexpr float kNoiseVariance = 0.1F;
+inline constexpr float kShapeRatio = 3;
+
 struct RefitSettings {
   double support = 0;    ///< radii within which a sample acts; 0: normals stay
   float max_radius = 0;  ///< a longer radius acts as this, steps, > 0: how far is known before streaming
   int level = 0;         ///< whose cells are about a radius long: only time depends on it
+  float noise = 0;       ///< of the normals, median angle, radians
   /// Instead of all normals, noisy ones, only those are replaced that were interpolated over a sharp edge, by those of
   /// the planes that the samples' neighbours lie on (samples/consensus_plane.h).
   bool only_blurred = false;

@@ -267,6 +267,8 @@ ReconstructionPlan make_plan(const SurfaceSettings& s, const StoredCloud& cloud,
   const StageSettings stages = choose_support(s, survey, cloud.info);
   plan.feed = stages.feed;
   plan.refit = stages.refit;
+  // Normals that were found from the positions tell nothing that a fit over more of them does not.
+  plan.refit.noise = cloud.info.found_normals ? static_cast<float>(std::numbers::pi) : survey.normal_noise;
   plan.projection = stages.projection;
   plan.holes = stages.holes;
   double max_radius = 0;

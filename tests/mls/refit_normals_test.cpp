@@ -27,7 +27,9 @@ struct RefitScene {
     truth.push_back(normal);
   }
   /// Each component by up to `error` either way.
+  float noise = 0;  ///< median angle of the normals to the truth
   void perturb(double error) {
+    noise = static_cast<float>(0.68 * error);
     std::mt19937 random(7);
     std::uniform_real_distribution<> u(-error, error);
     for (const Vector& n : truth) {
@@ -56,7 +58,7 @@ RefitScene sphere(std::size_t count) {
 
 UnitNormals refitted(const RefitScene& scene, float support) {
   const auto radius = static_cast<float>(scene.radius);
-  RefitNormals refit({support, radius, 0}, {static_cast<std::int32_t>(radius), 4}, select_kernel());
+  RefitNormals refit({support, radius, 0, scene.noise}, {static_cast<std::int32_t>(radius), 4}, select_kernel());
   refit.add(0, scene.samples, std::vector<float>(scene.samples.size(), radius));
   return refit.find(0);
 }
@@ -117,6 +119,26 @@ TEST(RefitNormals, OfTwoSidesOfASheet) {
   EXPECT_LT(error_of(scene.truth, n.x, n.y, n.z), 0.4 * before);
 }
 
+/// Two planes at a right angle with exact normals: a fit across the edge would turn those beside it.
+TEST(RefitNormals, StayBesideAnEdge) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<> u(0, 1);
+  RefitScene scene;
+  constexpr std::size_t kCount = 4000;
+  scene.radius = 2 * kUnit * std::sqrt(2.0 / kCount);
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const double along = u(random), from_edge = u(random);
+    if (i % 2 == 0) {
+      scene.add({from_edge, along, 0}, {0, 0, -1});
+    } else {
+      scene.add({0, along, from_edge}, {-1, 0, 0});
+    }
+  }
+  scene.perturb(0);
+  const UnitNormals n = refitted(scene, 3);
+  EXPECT_LT(error_of(scene.truth, n.x, n.y, n.z), 0.03);
+}
+
 TEST(RefitNormals, StayWhereTooFewSamplesAreNear) {
   RefitScene scene;
   scene.radius = 0.01 * kUnit;
@@ -134,7 +156,7 @@ TEST(RefitNormals, DoNotDependOnBuckets) {
   scene.perturb(0.5);
   const UnitNormals whole = refitted(scene, 3);
   const auto radius = static_cast<float>(scene.radius);
-  RefitNormals refit({3, radius, 0}, {static_cast<std::int32_t>(radius), 4}, select_kernel());
+  RefitNormals refit({3, radius, 0, scene.noise}, {static_cast<std::int32_t>(radius), 4}, select_kernel());
   constexpr int kBuckets = 20;
   std::array<LocalSamples, kBuckets> buckets;
   std::array<std::vector<std::size_t>, kBuckets> numbers;
