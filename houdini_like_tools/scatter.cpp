@@ -77,7 +77,10 @@ void add_scatter(CLI::App& app) {
   tool->add_option("-o,--output", o->output, "Points to write: binary little-endian PLY, - for standard output")
       ->required()
       ->type_name("FILE");
-  tool->add_option("--count", o->settings.count, "Number of samples")->type_name("N")->capture_default_str();
+  tool->add_option("--count", o->settings.count, "Number of samples")
+      ->type_name("N")
+      ->check([](const std::string& n) { return n.starts_with('-') ? n + ": is below 0" : ""; })
+      ->capture_default_str();
   tool->add_option("--seed", o->settings.seed, "Another seed, another cloud")->type_name("N")->capture_default_str();
   tool->add_option("--noise", o->settings.noise,
                    "Move every coordinate by up to K/2 local spacings either way, uniformly")
