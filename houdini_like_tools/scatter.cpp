@@ -5,6 +5,7 @@
 
 #include "common/help.h"
 #include "common/inputs.h"
+#include "common/option_values.h"
 #include "lamina/error.h"
 #include "lamina/scatter.h"
 #include "tool.h"
@@ -79,7 +80,7 @@ void add_scatter(CLI::App& app) {
       ->type_name("FILE");
   tool->add_option("--count", o->settings.count, "Number of samples")
       ->type_name("N")
-      ->check([](const std::string& n) { return n.starts_with('-') ? n + ": is below 0" : ""; })
+      ->check(refuse_below_zero)
       ->capture_default_str();
   tool->add_option("--seed", o->settings.seed, "Another seed, another cloud")->type_name("N")->capture_default_str();
   tool->add_option("--noise", o->settings.noise,

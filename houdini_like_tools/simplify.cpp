@@ -14,6 +14,7 @@
 #include "common/console.h"
 #include "common/help.h"
 #include "common/inputs.h"
+#include "common/option_values.h"
 #include "common/outputs.h"
 #include "common/text.h"
 #include "lamina/error.h"
@@ -97,10 +98,7 @@ void add_simplify_goal(CLI::App& tool, SimplifyGoal& goal, const std::string& gr
                                 "How far the mesh may get from what it was, and that from it, in its units");
   error->type_name("LENGTH")->group(group);
   auto* triangles = tool.add_option("--triangles", goal.triangles, "How many triangles stay, at most those there are");
-  triangles->type_name("N")
-      ->check([](const std::string& n) { return n.starts_with('-') ? n + ": is below 0" : ""; })
-      ->excludes(error)
-      ->group(group);
+  triangles->type_name("N")->check(refuse_below_zero)->excludes(error)->group(group);
   tool.add_option("--ratio", goal.ratio, "Which share of the triangles stays, above 0 and up to 1")
       ->type_name("K")
       ->excludes(triangles)

@@ -83,4 +83,20 @@ CLI::Option* add_length(CLI::App& app, const std::string& names, Length& value, 
       ->default_str(to_string(value));
 }
 
+CLI::Option* add_yes_no_or_auto(CLI::App& app, const std::string& name, std::optional<bool>& value,
+                                const std::string& description) {
+  return app
+      .add_option_function<std::string>(
+          name,
+          [&value](const std::string& word) { value = word == "auto" ? std::nullopt : std::optional(word == "yes"); },
+          description)
+      ->check(CLI::IsMember({"auto", "yes", "no"}).description(""))
+      ->type_name("auto|yes|no")
+      ->default_str("auto");
+}
+
+std::string refuse_below_zero(const std::string& text) {
+  return text.starts_with('-') ? text + ": is below 0" : "";
+}
+
 }  // namespace lamina::tools

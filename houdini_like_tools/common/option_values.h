@@ -50,4 +50,11 @@ CLI::Option* add_number_or_auto(CLI::App& app, const std::string& name, const st
                                 const std::string& description,
                                 const std::function<void(const std::optional<double>&)>& take);
 
+/// An option of `auto`, where the program chooses and `value` stays empty, `yes` and `no`.
+CLI::Option* add_yes_no_or_auto(CLI::App& app, const std::string& name, std::optional<bool>& value,
+                                const std::string& description);
+
+/// Of a count: why its text cannot be one where it is below 0, which the conversion takes for a huge number.
+std::string refuse_below_zero(const std::string& text);
+
 }  // namespace lamina::tools

@@ -52,15 +52,10 @@ void add_fit_options(CLI::App& tool, SurfaceSettings& s) {
       ->group(fit);
   tool.add_flag("--diffuse", s.diffuse, "Project cell centres and average them at the corners: smoother")->group(fit);
 
-  tool.add_option_function<std::string>(
-          "--features",
-          [&s](const std::string& word) { s.features = word == "auto" ? std::nullopt : std::optional(word == "yes"); },
-          "Sharp edges and corners where the samples' normals show them; of clean clouds normals that were "
-          "interpolated "
-          "over edges are found again; auto: where --blend is auto and finds a clean cloud")
-      ->check(CLI::IsMember({"auto", "yes", "no"}).description(""))
-      ->type_name("auto|yes|no")
-      ->default_str("auto")
+  add_yes_no_or_auto(tool, "--features", s.features,
+                     "Sharp edges and corners where the samples' normals show them; of clean clouds normals that were "
+                     "interpolated "
+                     "over edges are found again; auto: where --blend is auto and finds a clean cloud")
       ->group("Fit");
   const std::string lattice = "Octree";
   tool.add_option_function<std::string>(
@@ -82,17 +77,11 @@ void add_hole_options(CLI::App& tool, SurfaceSettings& settings, const std::stri
                      [&settings](const std::optional<double>& radii) { settings.close_holes = radii; })
       ->option_text("RADII|auto [auto]")
       ->group(group);
-  tool.add_option_function<std::string>(
-          "--bridge",
-          [&settings](const std::string& word) {
-            settings.bridge = word == "auto" ? std::nullopt : std::optional(word == "yes");
-          },
-          "Bridge gaps of that length whose rims are too bent to show it, where the surface leads into them from all "
-          "around; auto: where --blend is auto and the cloud is of several scans or came without normals, since gaps "
-          "in it are what nobody saw")
-      ->check(CLI::IsMember({"auto", "yes", "no"}).description(""))
-      ->type_name("auto|yes|no")
-      ->default_str("auto")
+  add_yes_no_or_auto(
+      tool, "--bridge", settings.bridge,
+      "Bridge gaps of that length whose rims are too bent to show it, where the surface leads into them from all "
+      "around; auto: where --blend is auto and the cloud is of several scans or came without normals, since gaps "
+      "in it are what nobody saw")
       ->group(group);
   tool.add_flag("--filled", settings.vertex_filled,
                 "Give vertices a property filled: 1 where one was added to close a hole, else 0: 'lamina render "
@@ -106,18 +95,12 @@ void add_hole_options(CLI::App& tool, SurfaceSettings& settings, const std::stri
       ->type_name("auto|all")
       ->default_str("auto")
       ->group(group);
-  tool.add_option_function<std::string>(
-          "--watertight",
-          [&settings](const std::string& word) {
-            settings.watertight = word == "auto" ? std::nullopt : std::optional(word == "yes");
-          },
-          "Close all holes, whatever lies around, unless a rim longer than 24 influence radii shows that the surface "
-          "is an open one, since the surface does not lead into it; auto: where --blend auto finds a clean, even "
-          "cloud, "
-          "with rims longer than that only if its normals had to be found")
-      ->check(CLI::IsMember({"auto", "yes", "no"}).description(""))
-      ->type_name("auto|yes|no")
-      ->default_str("auto")
+  add_yes_no_or_auto(
+      tool, "--watertight", settings.watertight,
+      "Close all holes, whatever lies around, unless a rim longer than 24 influence radii shows that the surface "
+      "is an open one, since the surface does not lead into it; auto: where --blend auto finds a clean, even "
+      "cloud, "
+      "with rims longer than that only if its normals had to be found")
       ->group(group);
 }
 

@@ -14,6 +14,7 @@
 #include "meshes/mesh_files.h"
 #include "meshes/vec3.h"
 #include "simplify/cover.h"
+#include "simplify/height_field.h"
 #include "simplify/near_old.h"
 #include "simplify/old_mesh.h"
 
@@ -111,19 +112,9 @@ TEST(SimplifyBound, HoldsBothWays) {
 }
 
 TEST(SimplifyBound, IsUsedUp) {
-  TriangleMesh mesh;
-  constexpr std::uint32_t n = 112;  // more than a piece
-  for (std::uint32_t i = 0; i <= n; ++i)
-    for (std::uint32_t j = 0; j <= n; ++j) {
-      const double x = static_cast<double>(i) / n, y = static_cast<double>(j) / n;
-      mesh.positions.push_back({x, y, 0.1 * std::sin(6 * x) * std::cos(6 * y)});
-    }
-  for (std::uint32_t i = 0; i < n; ++i)
-    for (std::uint32_t j = 0; j < n; ++j) {
-      const std::uint32_t a = i * (n + 1) + j, b = a + n + 1;
-      mesh.triangles.push_back({a, b, b + 1});
-      mesh.triangles.push_back({a, b + 1, a + 1});
-    }
+  // More squares than a piece has.
+  TriangleMesh mesh =
+      test::height_field(112, [](double x, double y) { return 0.1 * std::sin(6 * x) * std::cos(6 * y); });
   TriangleMesh within = mesh, plain = mesh;
   RunContext one;
   one.threads = 1;
@@ -154,19 +145,9 @@ TEST(SimplifyBound, APlaneGoesAtAnyBound) {
 
 /// Where proofs fail, contractions are taken back and others tried, between vertices that pieces have in common, too.
 TEST(SimplifyBound, TopologyStaysWhereContractionsAreTakenBack) {
-  TriangleMesh mesh;
-  constexpr std::uint32_t n = 130;  // more than a piece
-  for (std::uint32_t i = 0; i <= n; ++i)
-    for (std::uint32_t j = 0; j <= n; ++j) {
-      const double x = static_cast<double>(i) / n, y = static_cast<double>(j) / n;
-      mesh.positions.push_back({x, y, 0.05 * std::sin(40 * x) * std::cos(40 * y)});
-    }
-  for (std::uint32_t i = 0; i < n; ++i)
-    for (std::uint32_t j = 0; j < n; ++j) {
-      const std::uint32_t a = i * (n + 1) + j, b = a + n + 1;
-      mesh.triangles.push_back({a, b, b + 1});
-      mesh.triangles.push_back({a, b + 1, a + 1});
-    }
+  // More squares than a piece has.
+  TriangleMesh mesh =
+      test::height_field(130, [](double x, double y) { return 0.05 * std::sin(40 * x) * std::cos(40 * y); });
   for (const double bound : {0.03, 0.06}) {
     TriangleMesh fewer = mesh;
     simplify_mesh(fewer, {0, bound});

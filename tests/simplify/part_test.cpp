@@ -11,6 +11,7 @@
 
 #include "lamina/mesh.h"
 #include "lamina/simplify.h"
+#include "simplify/height_field.h"
 #include "simplify/stars.h"
 
 namespace lamina::simplify {
@@ -18,18 +19,7 @@ namespace {
 
 /// n x n squares of a gentle wave.
 TriangleMesh wave(std::uint32_t n) {
-  TriangleMesh mesh;
-  for (std::uint32_t i = 0; i <= n; ++i)
-    for (std::uint32_t j = 0; j <= n; ++j) {
-      const double x = static_cast<double>(i) / n, y = static_cast<double>(j) / n;
-      mesh.positions.push_back({x, y, 0.1 * std::sin(6 * x) * std::cos(5 * y)});
-    }
-  for (std::uint32_t i = 0; i < n; ++i)
-    for (std::uint32_t j = 0; j < n; ++j) {
-      const std::uint32_t a = i * (n + 1) + j, b = a + n + 1;
-      mesh.triangles.push_back({a, b, b + 1});
-      mesh.triangles.push_back({a, b + 1, a + 1});
-    }
+  TriangleMesh mesh = test::height_field(n, [](double x, double y) { return 0.1 * std::sin(6 * x) * std::cos(5 * y); });
   return mesh;
 }
 
