@@ -7,7 +7,7 @@
 #include <Eigen/Core>
 
 #include "boundary/boundary.h"
-#include "boundary/gap_rim.h"
+#include "boundary/gap_surface.h"
 
 namespace lamina::boundary {
 

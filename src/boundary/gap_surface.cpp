@@ -1,15 +1,207 @@
 #include "boundary/gap_surface.h"
 
-#include <algorithm>
-#include <cmath>
-
+#include <Eigen/Geometry>
 #include <Eigen/QR>
 #include <Eigen/Sparse>
 #include <Eigen/SparseCholesky>
 
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "boundary/triangulate_polygon.h"
 #include "lamina/error.h"
 
 namespace lamina::boundary {
+namespace {
+
+using Vec2 = Eigen::Vector2d;
+using Vec3 = Eigen::Vector3d;
+
+/// What chance adds to a rim is gone after so many passes; what winds still does so at large.
+constexpr int kMostSmoothing = 20;
+
+void stand_across(const Vec3& normal, Base& base) {
+  if (!(normal.norm() > 0)) return;
+  const Vec3 up = normal.normalized();
+  base.axes.row(2) = up;
+  base.axes.row(0) = up.unitOrthogonal();
+  base.axes.row(1) = up.cross(Vec3(base.axes.row(0)));
+}
+
+bool segments_meet(const Vec2& a, const Vec2& b, const Vec2& c, const Vec2& d) {
+  const auto side = [](const Vec2& p, const Vec2& q, const Vec2& r) { return cross(q - p, r - p); };
+  return side(a, b, c) * side(a, b, d) <= 0 && side(c, d, a) * side(c, d, b) <= 0;
+}
+
+/// Whether the edge meets one of the rim's that begins at `first` or later, those that share a vertex left out.
+bool meets_rim(std::uint32_t from, std::uint32_t to, const Rim& rim, const std::vector<Vec2>& at, std::uint32_t first) {
+  for (std::uint32_t i = first; i < rim.size(); ++i) {
+    const std::uint32_t j = rim.next[i];
+    if (i == from || i == to || j == from || j == to) continue;
+    if (segments_meet(at[from], at[to], at[i], at[j])) return true;
+  }
+  return false;
+}
+
+bool is_simple(const Rim& rim, const std::vector<Vec2>& at) {
+  for (std::uint32_t i = 0; i < rim.size(); ++i) {
+    if (meets_rim(i, rim.next[i], rim, at, i + 1)) return false;
+  }
+  return true;
+}
+
+/// A polygon's corner and an island's vertex that see each other.
+struct Bridge {
+  std::size_t corner = 0;  ///< place in the polygon
+  std::uint32_t vertex = 0;
+};
+
+/// The shortest edge from the polygon to an island, past all rims.
+std::optional<Bridge> bridge_to(std::uint32_t begin, std::uint32_t end, const std::vector<std::uint32_t>& polygon,
+                                const Rim& rim, const std::vector<Vec2>& outline) {
+  struct Candidate {
+    double squared;
+    Bridge bridge;
+  };
+  std::vector<Candidate> candidates;
+  for (std::size_t c = 0; c < polygon.size(); ++c) {
+    // Where a bridge ends already, two corners lie in one place, which see different sides.
+    if (std::count(polygon.begin(), polygon.end(), polygon[c]) > 1) continue;
+    for (std::uint32_t v = begin; v < end; ++v)
+      candidates.push_back({(outline[v] - outline[polygon[c]]).squaredNorm(), {c, v}});
+  }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.squared < b.squared; });
+  for (const Candidate& c : candidates) {
+    const std::uint32_t from = polygon[c.bridge.corner], to = c.bridge.vertex;
+    if (rim.allows(from, to) && !meets_rim(from, to, rim, outline, 0)) return c.bridge;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Base base_of(const Loop& loop) {
+  Base base;
+  const std::size_t n = loop.vertices.size();
+  Vec3 normal = Vec3::Zero();
+  for (std::size_t i = 0; i < n; ++i) {
+    const BoundaryVertex& v = loop.vertices[i];
+    const Vec3 p = to_vec(v.position);
+    const double edges = (to_vec(loop.vertices[(i + 1) % n].position) - p).norm() +
+                         (p - to_vec(loop.vertices[(i + n - 1) % n].position)).norm();
+    base.middle += p / static_cast<double>(n);
+    base.radius += static_cast<double>(v.radius) / static_cast<double>(n);
+    normal += edges * to_vec(v.normal);
+  }
+  stand_across(normal, base);
+  return base;
+}
+
+Base widest_base(const Loop& loop) {
+  Base base = base_of(loop);
+  Vec3 area = Vec3::Zero();
+  const std::size_t n = loop.vertices.size();
+  for (std::size_t i = 0; i < n; ++i) {
+    area += (to_vec(loop.vertices[i].position) - base.middle)
+                .cross(to_vec(loop.vertices[(i + 1) % n].position) - base.middle);
+  }
+  stand_across(area, base);
+  return base;
+}
+
+Rim::Rim(const std::vector<const Loop*>& loops, const Base& seen_from) : base(seen_from) {
+  std::map<Number, std::uint32_t> places;
+  for (const Loop* loop : loops) {
+    const auto first = size();
+    const auto n = static_cast<std::uint32_t>(loop->vertices.size());
+    begins.push_back(first);
+    for (std::uint32_t i = 0; i < n; ++i) {
+      places[loop->vertices[i].number] = first + i;
+      points.push_back(base.local(to_vec(loop->vertices[i].position)));
+      normals.push_back(base.axes * to_vec(loop->vertices[i].normal));
+      facing.push_back(base.axes * to_vec(loop->facing[i]));
+      next.push_back(first + (i + 1) % n);
+    }
+    for (const auto& [i, j] : loop->taken) taken.insert({first + i, first + j});
+  }
+  for (std::size_t l = 0; l < loops.size(); ++l) {
+    for (const auto& [i, number] : loops[l]->leaving) {
+      const auto other = places.find(number);
+      if (other != places.end())
+        taken.insert({std::min(begins[l] + i, other->second), std::max(begins[l] + i, other->second)});
+    }
+  }
+}
+
+bool Rim::allows(std::uint32_t i, std::uint32_t j) const {
+  if (std::max(i, j) >= size()) return true;
+  return !taken.contains({std::min(i, j), std::max(i, j)});
+}
+
+double signed_area(const Rim& rim) {
+  double sum = 0;
+  const std::uint32_t end = rim.begins.size() > 1 ? rim.begins[1] : rim.size();
+  for (std::uint32_t i = 0; i < end; ++i) sum += cross(rim.points[i].head<2>(), rim.points[rim.next[i]].head<2>());
+  return 0.5 * sum;
+}
+
+std::vector<Vec2> plane_of(const Rim& rim) {
+  std::vector<Vec2> plane;
+  for (const Vec3& p : rim.points) plane.emplace_back(p.head<2>());
+  return plane;
+}
+
+std::optional<std::vector<Vec2>> simple_outline(const Rim& rim) {
+  std::vector<Vec2> outline = plane_of(rim);
+  for (int pass = 0; pass <= kMostSmoothing; ++pass) {
+    if (is_simple(rim, outline)) return outline;
+    std::vector<Vec2> smooth(outline.size(), Vec2::Zero());
+    for (std::uint32_t i = 0; i < rim.size(); ++i) {
+      const std::uint32_t j = rim.next[i];
+      smooth[i] += 0.25 * (outline[i] + outline[j]);
+      smooth[j] += 0.25 * (outline[i] + outline[j]);
+    }
+    outline = std::move(smooth);
+  }
+  return std::nullopt;
+}
+
+std::optional<std::vector<std::uint32_t>> polygon_of(const Rim& rim, const std::vector<Vec2>& outline) {
+  std::vector<std::uint32_t> polygon;
+  for (std::size_t loop = 0; loop < rim.begins.size(); ++loop) {
+    const std::uint32_t begin = rim.begins[loop];
+    const std::uint32_t end = loop + 1 < rim.begins.size() ? rim.begins[loop + 1] : rim.size();
+    if (loop == 0) {
+      for (std::uint32_t i = begin; i < end; ++i) polygon.push_back(i);
+      continue;
+    }
+    const auto bridge = bridge_to(begin, end, polygon, rim, outline);
+    if (!bridge) return std::nullopt;
+    std::vector<std::uint32_t> detour;
+    std::uint32_t at = bridge->vertex;
+    do {
+      detour.push_back(at);
+      at = rim.next[at];
+    } while (at != bridge->vertex);
+    detour.push_back(bridge->vertex);
+    detour.push_back(polygon[bridge->corner]);
+    polygon.insert(polygon.begin() + static_cast<std::ptrdiff_t>(bridge->corner) + 1, detour.begin(), detour.end());
+  }
+  return polygon;
+}
+
+bool is_inside(const Vec2& point, const std::vector<Vec2>& loop) {
+  bool inside = false;
+  for (std::size_t i = 0; i < loop.size(); ++i) {
+    const Vec2 &a = loop[i], &b = loop[(i + 1) % loop.size()];
+    if ((a.y() > point.y()) == (b.y() > point.y())) continue;
+    if (point.x() < a.x() + (point.y() - a.y()) / (b.y() - a.y()) * (b.x() - a.x())) inside = !inside;
+  }
+  return inside;
+}
+
 namespace {
 
 using Vec2 = Eigen::Vector2d;

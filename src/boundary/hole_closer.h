@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "boundary/boundary_paths.h"
+#include "boundary/boundary.h"
 #include "boundary/fill.h"
 #include "lamina/holes.h"
 #include "meshes/distinct_positions.h"

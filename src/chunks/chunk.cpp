@@ -5,7 +5,7 @@
 
 #include "base/staged_folder.h"
 #include "chunks/cuts.h"
-#include "chunks/part_slabs.h"
+#include "chunks/part_file.h"
 #include "lamina/error.h"
 #include "reconstruct/job.h"
 #include "reconstruct/kept_input.h"

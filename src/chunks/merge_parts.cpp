@@ -10,7 +10,6 @@
 #include "boundary/hole_closer.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
-#include "meshes/mesh_format.h"
 #include "meshes/stored_mesh.h"
 #include "meshes/streamed_ply.h"
 #include "meshes/writers.h"

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 
-#include "clustering/record.h"
 #include "clustering/resolve.h"
 
 namespace lamina::clustering {

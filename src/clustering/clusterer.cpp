@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "clustering/clusterer.h"
-#include "clustering/record.h"
 #include "clustering/steps.h"
 
 namespace lamina {

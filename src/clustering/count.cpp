@@ -1,7 +1,6 @@
 #include "clustering/steps.h"
 
 #include "base/vectors.h"
-#include "clustering/record.h"
 
 namespace lamina::clustering {
 namespace {

@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "base/vectors.h"
-#include "clustering/record.h"
 
 namespace lamina::clustering {
 namespace {

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "clustering/record.h"
+#include "clustering/steps.h"
 
 namespace lamina::clustering {
 

@@ -9,7 +9,6 @@
 
 #include "base/output_file.h"
 #include "lamina/attributes.h"
-#include "meshes/mesh_format.h"
 #include "meshes/writers.h"
 
 namespace lamina::meshes::glb {

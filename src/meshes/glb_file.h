@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "meshes/file_stream.h"
 #include "meshes/glb.h"
+#include "meshes/readers.h"
 
 namespace lamina::meshes {
 

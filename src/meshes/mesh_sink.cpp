@@ -18,9 +18,9 @@
 #include "base/output_file.h"
 #include "lamina/error.h"
 #include "lamina/mesh_receiver.h"
-#include "meshes/mesh_format.h"
 #include "meshes/stored_mesh.h"
 #include "meshes/streamed_ply.h"
+#include "meshes/writers.h"
 
 namespace lamina {
 namespace {

@@ -14,7 +14,7 @@
 #include "lamina/attributes.h"
 #include "lamina/mesh.h"
 #include "lamina/run.h"
-#include "meshes/mesh_format.h"
+#include "meshes/writers.h"
 
 namespace lamina::meshes {
 class MeshBlocks;

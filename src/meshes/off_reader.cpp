@@ -10,7 +10,6 @@
 
 #include "base/number.h"
 #include "lamina/error.h"
-#include "meshes/file_stream.h"
 #include "meshes/readers.h"
 
 namespace lamina::meshes {

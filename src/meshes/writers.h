@@ -1,20 +1,44 @@
-// The formats' writers behind write_mesh() and the streamed meshes. Ours, because OpenMesh's writers hold the mesh and
-// round positions to float, and its OBJ writer refuses colours.
+// The formats a mesh is written in, by the ending of its name, what each of them leaves out, and the writers behind
+// write_mesh() and the streamed meshes. Ours, because OpenMesh's writers hold the mesh and round positions to float,
+// and its OBJ writer refuses colours.
 #pragma once
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "base/output_file.h"
 #include "lamina/mesh.h"
+#include "lamina/run.h"
 #include "meshes/mesh_blocks.h"
-#include "meshes/mesh_format.h"
+
+namespace lamina {
+struct MeshSinkSettings;
+}
 
 namespace lamina::meshes {
+
+enum class MeshFormat : std::uint8_t { ply, obj, off, stl, glb };
+
+/// How much goes into the files of a GLB.
+struct GlbLimits {
+  std::uint64_t file = 0xFFFFFFFF;  ///< the GLB's own length has 32 bits
+  /// Of each piece where one file does not hold all of a mesh: what programs like to have in one array.
+  std::uint64_t buffer = 2'000'000'000;
+};
+
+/// By the ending, in any case; nothing for another one.
+std::optional<MeshFormat> known_mesh_format(std::string_view path);
+
+/// The same; PLY for every name that says nothing else: "-", pipes, names without an ending.
+MeshFormat mesh_format(std::string_view path);
+
+/// Warns of the properties of a mesh that the formats of its names cannot hold, a line for each.
+void warn_of_losses(const MeshSinkSettings& mesh, const RunContext& run);
 
 /// Positions as float where that loses nothing, else double; normals; attributes in their own types (rounded and
 /// clamped to them); faces as `list uchar int vertex_indices` (uint beyond 2^31 - 1 vertices).

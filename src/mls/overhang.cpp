@@ -66,7 +66,7 @@ float overhang(const CornerBlock& block, int offset, int slab_layers, const std:
     if (alone < kUpright * trim && block.trusted.test(offset)) return alone;
   }
   for_records_around(block, offset, &Projected::seen, slab_layers, [&](int dx, int dy, int dz, const float* v) {
-    if (dot(normal, v + kNormalX) < kSameSheet) return;
+    if (dot(normal, v + kNormalX) < kSheetCosine) return;
     std::array<float, 3> lean = unpacked_lean(v[kLean]);
     if (own == nullptr) {
       lean[0] += kLeanPerCell * static_cast<float>(dx);

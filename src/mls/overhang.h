@@ -15,7 +15,7 @@ namespace lamina {
 /// all sides without asking others.
 inline constexpr float kUpright = 0.55F;
 /// Neighbours belong to the same sheet while the cosine between their normals is more than this (60 degrees).
-inline constexpr float kSameSheet = 0.5F;
+inline constexpr float kSheetCosine = 0.5F;
 /// A corner that has no samples of its own leans towards those neighbours that do, by so much for each cell: the mean
 /// of the samples follows a point half of the way when it moves over a rim.
 inline constexpr float kLeanPerCell = 0.5F;

@@ -9,7 +9,6 @@
 #include <tuple>
 
 #include "base/vectors.h"
-#include "samples/block_order.h"
 
 namespace lamina {
 namespace {

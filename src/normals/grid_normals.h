@@ -11,7 +11,7 @@
 #include "lamina/normals.h"
 #include "lamina/points.h"
 #include "lamina/run.h"
-#include "normals/viewpoints.h"
+#include "normals/sight.h"
 #include "points/scans.h"
 
 namespace lamina::normals {

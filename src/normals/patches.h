@@ -5,7 +5,7 @@
 
 #include "normals/patch_graph.h"
 #include "normals/sample_window.h"
-#include "normals/viewpoints.h"
+#include "normals/sight.h"
 #include "samples/sample_tree.h"
 
 namespace lamina::normals {

@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-#include "store/row_ids.h"
+#include "store/ingest.h"
 
 namespace lamina::normals {
 namespace {

@@ -16,11 +16,10 @@
 #include "normals/patches.h"
 #include "normals/row_normals.h"
 #include "normals/sample_window.h"
-#include "normals/viewpoints.h"
+#include "normals/sight.h"
 #include "samples/sampling_survey.h"
 #include "store/ingest.h"
 #include "store/input_survey.h"
-#include "store/row_ids.h"
 
 namespace lamina {
 namespace {

@@ -15,12 +15,11 @@
 #include <utility>
 
 #include "lamina/error.h"
-#include "meshes/mesh_format.h"
 #include "meshes/writers.h"
 #include "mls/refit_normals.h"
 #include "reconstruct/cost.h"
-#include "reconstruct/findings.h"
 #include "reconstruct/pipeline.h"
+#include "reconstruct/plan.h"
 
 namespace lamina {
 namespace {

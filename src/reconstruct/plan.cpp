@@ -11,8 +11,8 @@
 
 #include "lamina/error.h"
 #include "levelset/surface_volume.h"
-#include "meshes/mesh_format.h"
 #include "meshes/streamed_ply.h"
+#include "meshes/writers.h"
 #include "reconstruct/choose_support.h"
 #include "reconstruct/constants.h"
 #include "reconstruct/cost.h"
@@ -348,33 +348,6 @@ SurfacePlan summary_of(const ReconstructionPlan& p) {
   out.buckets = p.buckets;
   out.memory_bytes = p.expected.memory;
   out.disk_bytes = p.expected.disk;
-  return out;
-}
-
-namespace {
-
-/// No more exact than the model: seconds below a minute and a half, then minutes, then hours.
-std::string about(double seconds) {
-  if (seconds < 10) return fmt::format("{:.1f} s", seconds);
-  if (seconds < 90) return fmt::format("{:.0f} s", seconds);
-  if (seconds < 5400) return fmt::format("{:.0f} min", seconds / 60);
-  return fmt::format("{:.1f} h", seconds / 3600);
-}
-
-}  // namespace
-
-std::string describe(const SurfacePlan& p) {
-  const auto mb = [](std::uint64_t bytes) { return static_cast<double>(bytes) / 1e6; };
-  std::string out;
-  out += fmt::format("samples {}, extent {:.4g} x {:.4g} x {:.4g}\n", p.samples, p.extent[0], p.extent[1], p.extent[2]);
-  out += fmt::format("radius r {:.4g} (1 % {:.4g}, 99 % {:.4g}), influence R = {:g} r\n", p.radius_median, p.radius_low,
-                     p.radius_high, p.blend);
-  out += fmt::format("levels {}, cells {:.4g} to {:.4g}, slabs {} of {:.4g}\n", p.levels, p.finest_cell,
-                     std::ldexp(p.finest_cell, p.levels - 1), p.slabs, p.slab_height);
-  out += fmt::format("expected memory {:.0f} MB, temporary disk {:.0f} MB", mb(p.memory_bytes), mb(p.disk_bytes));
-  if (p.seconds > 0) {
-    out += fmt::format(", about {} on {} thread{}", about(p.seconds), p.threads, p.threads == 1 ? "" : "s");
-  }
   return out;
 }
 

@@ -14,7 +14,7 @@
 #include "meshes/mesh_sink.h"
 #include "mls/project.h"
 #include "mls/refit_normals.h"
-#include "reconstruct/final_vertices.h"
+#include "reconstruct/mesh_output.h"
 #include "reconstruct/pruner.h"
 #include "reconstruct/stages.h"
 #include "reconstruct/stored_cloud.h"
@@ -100,5 +100,10 @@ SurfacePlan summary_of(const ReconstructionPlan& plan);
 
 /// The summary in lines for a reader.
 std::string describe(const SurfacePlan& plan);
+
+/// What was seen of a cloud and chosen for it, in two or three lines for a reader; SurfacePlan has the same as numbers:
+/// the samples, their scans, spacing, noise and where it is most, normals and strays; then every choice that the
+/// settings left open, as the option that would have made it.
+std::string describe_findings(const SurfaceSettings& settings, const SurfaceStats& stats);
 
 }  // namespace lamina

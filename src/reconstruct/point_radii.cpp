@@ -16,7 +16,6 @@
 #include "reconstruct/plan.h"
 #include "store/ingest.h"
 #include "store/input_survey.h"
-#include "store/row_ids.h"
 
 namespace lamina {
 namespace {

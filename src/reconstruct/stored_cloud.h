@@ -1,4 +1,5 @@
-// The input of a reconstruction: points opened, their normals found, cleaned and put into a store.
+// The input of a reconstruction: points opened, their normals found, cleaned and put into a store; the samples that
+// cleaning leaves out, as a point file beside the mesh.
 #pragma once
 #include <array>
 #include <memory>
@@ -10,6 +11,7 @@
 #include "lamina/points.h"
 #include "lamina/run.h"
 #include "lamina/surface.h"
+#include "samples/outliers.h"
 #include "samples/sampling_survey.h"
 #include "store/ingest.h"
 
@@ -77,5 +79,15 @@ void shift_to_origin(StoredCloud& cloud);
 
 /// "4468300 847200 0", every digit of the numbers.
 std::string shift_text(const std::array<double, 3>& shift);
+
+/// Throws Error: usage for a name that says no format, budget for a file that cannot be written.
+void try_rejected(const SurfaceSettings& settings);
+
+/// Opens the file for samples of the cloud. Throws Error(usage) where their attributes have one called `reason`
+/// already, and what open_points_writer() throws.
+std::unique_ptr<PointsWriter> open_rejected(const StoredCloud& cloud, const SurfaceSettings& settings);
+
+/// Appends the samples that have a reason: buckets along the sweep axis, in each the input's order.
+void write_rejected(const StoredCloud& cloud, const Reasons& reasons, PointsWriter& writer);
 
 }  // namespace lamina

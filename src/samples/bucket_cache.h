@@ -1,4 +1,5 @@
-// Buckets in memory: read in the background before they are needed, kept within a budget, their memory used again.
+// Buckets in memory: read in the background before they are needed, kept within a budget, their memory used again;
+// their samples in order by blocks of cells, so that neighbours in space are neighbours in memory.
 #pragma once
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/task_group.h>
@@ -10,10 +11,21 @@
 #include <vector>
 
 #include "lattice/lattice.h"
-#include "samples/block_order.h"
 #include "store/slab_store.h"
 
 namespace lamina {
+
+/// Memory of sort_by_block(), kept from bucket to bucket.
+struct BlockOrderScratch {
+  std::vector<std::uint64_t> order, other;
+  std::vector<std::int32_t> integers;
+  std::vector<float> floats;
+};
+
+/// Sorts the samples of a bucket by the block of 8^3 finest cells they lie in: blocks by z, then y, then x (fastest);
+/// inside a block in the order they had. A bucket that spans more than 2^32 such blocks is sorted by larger ones (twice
+/// the side, four times, ...). The result is a function of the samples and the lattice alone.
+void sort_by_block(LocalSamples& samples, const Lattice& lattice, BlockOrderScratch& scratch);
 
 /// A bucket's samples with what refinement and projection need of each.
 struct ActiveBucket {

@@ -3,15 +3,102 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <mutex>
+#include <utility>
 
+#include "base/descriptor.h"
+#include "base/hashing.h"
+#include "base/run.h"
+#include "edit/batch_pipe.h"
 #include "lamina/clean.h"
 #include "lamina/error.h"
 #include "samples/strays.h"
-#include "samples/thinner.h"
+#include "store/ingest.h"
+#include "store/input_survey.h"
 
 namespace lamina {
+namespace {
+
+constexpr std::size_t kFewest = 1 << 10;
+
+std::int64_t cell_along(std::int64_t a, std::int64_t b) {
+  return a / b - static_cast<std::int64_t>(a % b != 0 && a < 0);
+}
+
+}  // namespace
+
+Thinner::Thinner(double distance)
+    : distance_(std::min(distance, 0x1p31)),
+      squared_(distance_ * distance_),
+      cell_(std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(2 * distance_)))),
+      heads_(kFewest, kNone) {}
+
+std::size_t Thinner::place(std::int64_t x, std::int64_t y, std::int64_t z) const {
+  return cell_hash(x, y, z) & (heads_.size() - 1);
+}
+
+std::size_t Thinner::home(const Kept& k) const {
+  return place(cell_along(k.x, cell_), cell_along(k.y, cell_), cell_along(k.z, cell_));
+}
+
+bool Thinner::is_near_kept(const Kept& s) const {
+  const auto within = static_cast<std::int64_t>(distance_);
+  const auto first = [&](std::int64_t v) { return cell_along(v - within, cell_); };
+  const auto last = [&](std::int64_t v) { return cell_along(v + within, cell_); };
+  for (std::int64_t z = first(s.z); z <= last(s.z); ++z) {
+    for (std::int64_t y = first(s.y); y <= last(s.y); ++y) {
+      for (std::int64_t x = first(s.x); x <= last(s.x); ++x) {
+        for (std::uint32_t i = heads_[place(x, y, z)]; i != kNone; i = kept_[i].next) {
+          const Kept& k = kept_[i];
+          const double dx = static_cast<double>(s.x) - k.x;
+          const double dy = static_cast<double>(s.y) - k.y;
+          const double dz = static_cast<double>(s.z) - k.z;
+          const float facing = s.nx * k.nx + s.ny * k.ny + s.nz * k.nz;
+          if (dx * dx + dy * dy + dz * dz <= squared_ && facing >= 0) return true;
+        }
+      }
+    }
+  }
+  return false;
+}
+
+void Thinner::rehash(std::size_t least) {
+  heads_.assign(std::max(kFewest, std::bit_ceil(2 * least)), kNone);
+  for (std::uint32_t i = 0; i < kept_.size(); ++i) {
+    std::uint32_t& head = heads_[home(kept_[i])];
+    kept_[i].next = head;
+    head = i;
+  }
+}
+
+void Thinner::forget_below(std::int64_t z) {
+  kept_.erase(std::remove_if(kept_.begin(), kept_.end(), [&](const Kept& k) { return k.z < z; }), kept_.end());
+}
+
+std::uint64_t Thinner::thin(const LocalSamples& samples, std::vector<bool>& keep) {
+  if (samples.size() == 0) return 0;
+  const std::int64_t low = *std::min_element(samples.z.begin(), samples.z.end());
+  forget_below(low - static_cast<std::int64_t>(distance_) - 1);
+  rehash(kept_.size() + samples.size());
+  std::uint64_t dropped = 0;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (!keep[i]) continue;
+    Kept s{samples.x[i], samples.y[i], samples.z[i], samples.nx[i], samples.ny[i], samples.nz[i], kNone};
+    if (is_near_kept(s)) {
+      keep[i] = false;
+      ++dropped;
+      continue;
+    }
+    std::uint32_t& head = heads_[home(s)];
+    s.next = head;
+    head = static_cast<std::uint32_t>(kept_.size());
+    kept_.push_back(s);
+  }
+  return dropped;
+}
 
 void require_sane(const CleanSettings& s) {
   const auto require = [](bool ok, const char* what) {
@@ -170,6 +257,71 @@ std::string cleaning_words(const CleanSettings& settings) {
   add(strays, "strays");
   add(spacing > 0, fmt::format("spacing {}", spacing));
   return words;
+}
+
+namespace {
+
+/// Which rows do not stay, found by the steps that look around.
+std::vector<bool> rows_to_drop(PointSource& source, const CleanSettings& settings, BadSamples bad, CleanCounts& counts,
+                               const RunContext& run) {
+  const std::string directory = run.tmp_dir.empty() ? system_tmp_dir() : run.tmp_dir;
+  // Measured: the store's buffers, the samples looked at together and the program; masks and the store's index.
+  constexpr std::uint64_t kProgram = std::uint64_t{92} << 20;
+  const std::uint64_t masks = source.info().count + source.info().count / 4;
+  require_memory(run, kProgram + masks, source.info().path, "cleaning");
+  RunContext silent = run;  // what is left out is told by whoever writes the rows
+  silent.log = nullptr;
+  RowIdSource rows(source);
+  const Survey survey = survey_input(rows, bad, silent, settings.pick);
+  const Frame frame = choose_frame(survey, FrameMode::pca);
+  const Ingested in = ingest(rows, survey, frame, directory, run, {1, settings.pick});
+  const KeepMasks keep = choose_samples(in.store, {settings, frame.step, directory}, counts, run);
+  std::vector<bool> drop(source.info().count, false);
+  LocalSamples samples;
+  for (std::size_t b = 0; b < keep.size(); ++b) {
+    if (in.store.count(b) == 0) continue;
+    in.store.read(b, samples);
+    for (std::size_t i = 0; i < keep[b].size(); ++i) {
+      if (!keep[b][i]) drop[row_of(samples, i)] = true;
+    }
+  }
+  return drop;
+}
+
+}  // namespace
+
+CleanReport clean_points(PointSource& source, PointsWriter& writer, const CleanSettings& settings, BadSamples bad,
+                         const RunContext& run) {
+  require_sane(settings);
+  CleanReport report;
+  std::vector<bool> drop;
+  if (settings.looks_around()) {
+    with_threads(run.threads, [&] { drop = rows_to_drop(source, settings, bad, report.counts, run); });
+  }
+  std::mutex mutex;
+  CleanCounts picked;
+  const auto work = [&](SampleBatch& batch) {
+    CleanCounts counts;
+    std::vector<std::uint8_t> stays(batch.size());
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      const std::uint64_t row = batch.first + i;
+      const Pick pick = judge(settings.pick, batch, i, row);
+      counts.skipped += pick == Pick::skipped ? 1 : 0;
+      counts.clipped += pick == Pick::clipped ? 1 : 0;
+      stays[i] = pick == Pick::taken && (drop.empty() || !drop[row]) ? 1 : 0;
+    }
+    const EditReport rows = clean_rows(batch, std::move(stays));
+    if (rows.bad_rows > 0 && bad == BadSamples::refuse) refuse_bad_row(rows, source.info().path);
+    const std::lock_guard lock(mutex);
+    add(report.rows, rows);
+    picked.clipped += counts.clipped;
+    picked.skipped += counts.skipped;
+  };
+  edit::for_each_batch(source, "write", run, work, [&](SampleBatch& batch) { writer.append(batch); });
+  report.counts.clipped = picked.clipped;
+  report.counts.skipped = picked.skipped;
+  report.rows.written = writer.rows();
+  return report;
 }
 
 }  // namespace lamina

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "samples/block_order.h"
+#include "base/vectors.h"
 
 namespace lamina {
 namespace {

@@ -3,10 +3,178 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <tuple>
+
+#include "base/vectors.h"
+#include "lattice/lattice.h"
 
 namespace lamina {
+namespace {
+
+constexpr std::size_t kEnoughInLeaf = 12;  ///< samples in a leaf, one more where halves are not even
+
+static_assert(CellLayer::kMostInLeaf >= 2 * kEnoughInLeaf + 2);
+
+/// The squared distance between two boxes; no sample of one is nearer to one of the other, rounding included.
+float squared_distance(const ItemBox& a, const ItemBox& b) {
+  const FourInts below = a.low - b.high;
+  const FourInts above = b.low - a.high;
+  const FourInts more = below > above ? below : above;
+  const FourInts gap = more > FourInts{} ? more : FourInts{};
+  const auto dx = static_cast<float>(gap[0]);
+  const auto dy = static_cast<float>(gap[1]);
+  const auto dz = static_cast<float>(gap[2]);
+  return dx * dx + dy * dy + dz * dz;
+}
+
+template <typename T>
+void drop_from(std::vector<T>& values, std::size_t n) {
+  values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(n));
+}
+
+}  // namespace
+
+void Placed::resize(std::size_t n) {
+  for (auto* values : {&x, &y, &z}) values->resize(n);
+  for (auto* values : {&nx, &ny, &nz}) values->resize(n);
+  for (auto* values : {&bucket, &number}) values->resize(n);
+}
+
+void Placed::drop_front(std::size_t n) {
+  for (auto* values : {&x, &y, &z}) drop_from(*values, n);
+  for (auto* values : {&nx, &ny, &nz}) drop_from(*values, n);
+  for (auto* values : {&bucket, &number}) drop_from(*values, n);
+}
+
+void CellLayer::build(std::span<const StoredSample> samples, std::int32_t side, std::size_t first, Scratch& scratch,
+                      Placed& out) {
+  cells_.clear();
+  nodes_.clear();
+  leaves_.clear();
+  if (samples.empty()) return;
+  const FloorDivider cell_of(side);
+  std::array<std::int32_t, 2> low{};
+  std::array<std::int32_t, 2> high{};
+  for (std::size_t a = 0; a < 2; ++a) {
+    const auto [least, most] = std::minmax_element(samples.begin(), samples.end(),
+                                                   [a](const auto& l, const auto& r) { return l.at[a] < r.at[a]; });
+    low[a] = cell_of(least->at[a]);
+    high[a] = cell_of(most->at[a]);
+  }
+  const std::uint64_t row = static_cast<std::uint64_t>(std::int64_t{high[0]} - low[0]) + 1;
+  const std::uint64_t rows = static_cast<std::uint64_t>(std::int64_t{high[1]} - low[1]) + 1;
+  auto& keyed = scratch.keyed;
+  resize_anew(keyed, samples.size());
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const auto x = static_cast<std::uint64_t>(std::int64_t{cell_of(samples[i].at[0])} - low[0]);
+    const auto y = static_cast<std::uint64_t>(std::int64_t{cell_of(samples[i].at[1])} - low[1]);
+    keyed[i] = {y * row + x, static_cast<std::uint32_t>(i)};
+  }
+  digit_sort(keyed, scratch.other, row * rows - 1, [](const Scratch::Keyed& k) { return k.key; });
+  for (std::size_t begin = 0; begin < keyed.size();) {
+    std::size_t end = begin;
+    while (end < keyed.size() && keyed[end].key == keyed[begin].key) ++end;
+    const std::size_t n = end - begin;
+    resize_anew(scratch.items, n);
+    for (std::size_t i = 0; i < n; ++i) {
+      const std::uint32_t sample = keyed[begin + i].sample;
+      scratch.items[i] = {samples[sample].at, sample};
+    }
+    std::uint32_t depth = 0;
+    while ((n >> depth) > kEnoughInLeaf) ++depth;
+    const auto x = static_cast<std::int32_t>(keyed[begin].key % row) + low[0];
+    const auto y = static_cast<std::int32_t>(keyed[begin].key / row) + low[1];
+    cells_.push_back({x, y, depth, first + begin, first + end, nodes_.size()});
+    nodes_.resize(nodes_.size() + (std::size_t{2} << depth) - 1);
+    split(scratch.items, first + begin, {0, 0, n, depth}, cells_.back().first_node);
+    for (std::size_t i = 0; i < n; ++i) {
+      const StoredSample& s = samples[scratch.items[i].number];
+      const std::size_t place = first + begin + i;
+      std::tie(out.x[place], out.y[place], out.z[place]) = std::tuple_cat(s.at);
+      std::tie(out.nx[place], out.ny[place], out.nz[place]) = std::tuple_cat(s.normal);
+      out.bucket[place] = s.bucket;
+      out.number[place] = s.number;
+    }
+    begin = end;
+  }
+}
+
+/// Lists the leaves of a cell's tree, whose first place is `first`, and puts its samples in their order.
+void CellLayer::split(std::span<TreeItem> items, std::size_t first, const Subtree& tree, std::size_t first_node) {
+  const ItemBox box = ItemBox::around(items.subspan(tree.begin, tree.end - tree.begin));
+  nodes_[first_node + tree.node] = box;
+  if (tree.depth == 0) {
+    leaves_.push_back({first + tree.begin, first + tree.end});
+    return;
+  }
+  const std::size_t middle = tree.begin + (tree.end - tree.begin) / 2;
+  MedianSplit(items, box.longest_axis()).select(tree.begin, middle, tree.end);
+  split(items, first, {2 * tree.node + 1, tree.begin, middle, tree.depth - 1}, first_node);
+  split(items, first, {2 * tree.node + 2, middle, tree.end, tree.depth - 1}, first_node);
+}
+
+void CellLayer::move_up(std::size_t by) {
+  for (Cell& cell : cells_) {
+    cell.begin -= by;
+    cell.end -= by;
+  }
+  for (SampleLeaf& leaf : leaves_) {
+    leaf.begin -= by;
+    leaf.end -= by;
+  }
+}
+
+/// The first of its row that does not lie before x, or a later row's.
+std::size_t CellLayer::first_cell(std::int32_t x, std::int32_t y) const {
+  const auto at = std::lower_bound(cells_.begin(), cells_.end(), std::pair(y, x),
+                                   [](const Cell& c, const auto& p) { return std::pair(c.y, c.x) < p; });
+  return static_cast<std::size_t>(at - cells_.begin());
+}
+
+void CellLayer::search(Query& query, std::int32_t x, std::int32_t y, const PlacedAxes& at) const {
+  for (std::size_t c = first_cell(x - 1, y); c < cells_.size() && cells_[c].y == y && cells_[c].x <= x + 1; ++c) {
+    const Cell& cell = cells_[c];
+    if (squared_distance(query.box, nodes_[cell.first_node]) > query.bound) continue;
+    search(query, cell, {0, cell.begin, cell.end, cell.depth}, at);
+  }
+}
+
+void CellLayer::search(Query& query, const Cell& cell, const Subtree& tree, const PlacedAxes& at) const {
+  if (tree.depth == 0) {
+    query.bound = 0;
+    for (std::size_t i = 0; i < query.count; ++i) {
+      query.own[i].take<kMostInLeaf>(at, tree.begin, tree.end);
+      query.bound = std::max(query.bound, query.own[i].bound());
+    }
+    return;
+  }
+  const std::size_t middle = tree.begin + (tree.end - tree.begin) / 2;
+  const Subtree lower{2 * tree.node + 1, tree.begin, middle, tree.depth - 1};
+  const Subtree upper{2 * tree.node + 2, middle, tree.end, tree.depth - 1};
+  const float to_lower = squared_distance(query.box, nodes_[cell.first_node + lower.node]);
+  const float to_upper = squared_distance(query.box, nodes_[cell.first_node + upper.node]);
+  const bool lower_first = to_lower <= to_upper;
+  if (std::min(to_lower, to_upper) <= query.bound) search(query, cell, lower_first ? lower : upper, at);
+  if (std::max(to_lower, to_upper) <= query.bound) search(query, cell, lower_first ? upper : lower, at);
+}
+
+std::size_t CellLayer::count_within(const std::array<std::int32_t, 3>& from, float squared, std::int32_t x,
+                                    std::int32_t y, std::int32_t by, const PlacedAxes& at) const {
+  std::size_t count = 0;
+  for (std::size_t c = first_cell(x - by, y); c < cells_.size() && cells_[c].y == y && cells_[c].x <= x + by; ++c) {
+    for (std::size_t i = cells_[c].begin; i < cells_[c].end; ++i) {
+      const auto dx = static_cast<float>(at.x[i] - from[0]);
+      const auto dy = static_cast<float>(at.y[i] - from[1]);
+      const auto dz = static_cast<float>(at.z[i] - from[2]);
+      count += dx * dx + dy * dy + dz * dz <= squared ? 1 : 0;
+    }
+  }
+  return count;
+}
+
 namespace {
 
 constexpr std::uint64_t kStraySlab = 1u << 17;  ///< samples tested together, at least

@@ -94,7 +94,7 @@ BucketSpan buckets_read(const SlabStore& store, const FeedHalo& halo, std::optio
                         std::int64_t to);
 
 /// Buckets go by ascending z: prepare() runs ahead, release() follows behind. Inside a bucket samples are sorted by
-/// blocks of cells (feed/block_order.h): successive ones lie close to each other, which the stages may rely on for
+/// blocks of cells (sort_by_block()): successive ones lie close to each other, which the stages may rely on for
 /// speed. The next buckets are read while the stages work.
 class SampleFeed {
  public:

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "samples/median_split.h"
-#include "samples/nearest_list.h"
+#include "samples/nearest.h"
 
 namespace lamina {
 

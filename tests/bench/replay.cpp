@@ -10,7 +10,7 @@
 #include "mls/extension.h"
 #include "mls/project.h"
 #include "octree/refine.h"
-#include "reconstruct/final_vertices.h"
+#include "reconstruct/mesh_output.h"
 #include "reconstruct/stages.h"
 
 namespace lamina::bench {

@@ -4,7 +4,7 @@
 #include <functional>
 #include <vector>
 
-#include "boundary/rim_trimmer.h"
+#include "boundary/rims.h"
 
 namespace lamina::test {
 

@@ -1,4 +1,4 @@
-#include "boundary/rim_trimmer.h"
+#include "boundary/rims.h"
 
 #include <gtest/gtest.h>
 

@@ -9,7 +9,6 @@
 
 #include "base/temporary_folder.h"
 #include "chunks/merge_parts.h"
-#include "chunks/part_slabs.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "meshes/streamed_ply.h"

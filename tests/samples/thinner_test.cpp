@@ -1,4 +1,4 @@
-#include "samples/thinner.h"
+#include "samples/cleaning.h"
 
 #include <gtest/gtest.h>
 

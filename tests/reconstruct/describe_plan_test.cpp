@@ -1,4 +1,4 @@
-#include "reconstruct/findings.h"
+#include "reconstruct/plan.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

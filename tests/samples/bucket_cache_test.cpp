@@ -1,4 +1,4 @@
-#include "samples/block_order.h"
+#include "samples/bucket_cache.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck.h>

@@ -1,9 +1,24 @@
-#include "reconstruct/findings.h"
-
+// The plan in words and pictures, for a reader.
 #include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <string>
+
+#include "reconstruct/plan.h"
+#include "reconstruct/stages.h"
 
 namespace lamina {
 namespace {
+
+/// No more exact than the model: seconds below a minute and a half, then minutes, then hours.
+std::string about(double seconds) {
+  if (seconds < 10) return fmt::format("{:.1f} s", seconds);
+  if (seconds < 90) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 5400) return fmt::format("{:.0f} min", seconds / 60);
+  return fmt::format("{:.1f} h", seconds / 3600);
+}
 
 /// A stretch is worth naming where it has so many times the usual noise.
 constexpr double kMuchNoisier = 1.5;
@@ -71,8 +86,41 @@ std::string chosen(const SurfaceSettings& s, const SurfacePlan& plan) {
 
 }  // namespace
 
+std::string describe(const SurfacePlan& p) {
+  const auto mb = [](std::uint64_t bytes) { return static_cast<double>(bytes) / 1e6; };
+  std::string out;
+  out += fmt::format("samples {}, extent {:.4g} x {:.4g} x {:.4g}\n", p.samples, p.extent[0], p.extent[1], p.extent[2]);
+  out += fmt::format("radius r {:.4g} (1 % {:.4g}, 99 % {:.4g}), influence R = {:g} r\n", p.radius_median, p.radius_low,
+                     p.radius_high, p.blend);
+  out += fmt::format("levels {}, cells {:.4g} to {:.4g}, slabs {} of {:.4g}\n", p.levels, p.finest_cell,
+                     std::ldexp(p.finest_cell, p.levels - 1), p.slabs, p.slab_height);
+  out += fmt::format("expected memory {:.0f} MB, temporary disk {:.0f} MB", mb(p.memory_bytes), mb(p.disk_bytes));
+  if (p.seconds > 0) {
+    out += fmt::format(", about {} on {} thread{}", about(p.seconds), p.threads, p.threads == 1 ? "" : "s");
+  }
+  return out;
+}
+
 std::string describe_findings(const SurfaceSettings& settings, const SurfaceStats& stats) {
   return seen(stats) + chosen(settings, stats.plan);
+}
+
+std::string draw_stages() {
+  constexpr int kFarthest = reach_of(Stage::mark).ahead, kWidth = 6;
+  const auto slab = [](int offset) { return offset == 0 ? std::string("t") : fmt::format("t{:+}", offset); };
+  std::string out = fmt::format("{:<12}", "slab");
+  const auto end_line = [&] {
+    while (out.back() == ' ') out.pop_back();
+    out += '\n';
+  };
+  for (int s = 0; s <= kFarthest; ++s) out += fmt::format("{:^{}}", slab(s), kWidth);
+  end_line();
+  for (const StageReach& stage : kStageReach) {
+    out += fmt::format("{:<12}", stage.name);
+    for (int s = 0; s <= stage.ahead; ++s) out += fmt::format("{:^{}}", s == stage.ahead ? "#" : "=", kWidth);
+    end_line();
+  }
+  return out;
 }
 
 }  // namespace lamina
