@@ -1,5 +1,5 @@
-// Procedural shapes by name: round and flat ones, and star-shaped surfaces, stretched along the axes: a sphere with bumps
-// and a draped figure.
+// Procedural shapes by name: round and flat ones, and star-shaped surfaces, stretched along the axes: a sphere with
+// bumps and a draped figure.
 #include "scatter/shapes.h"
 
 #include <fmt/format.h>
