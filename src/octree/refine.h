@@ -20,9 +20,9 @@ struct Mark {
 /// sample after the other lies in the same block.
 void mark_samples(Window& window, std::span<const Mark> marks);
 
-/// Cells around a sample's home, of its own level, that are refined to that level. A radius is estimated too small by
-/// up to a fifth and a cell may be less than half of it, so gaps between samples are up to five cells wide: with two,
-/// they came out as holes.
+/// Cells around a sample's home, of its own level, that are refined to that level. The farther they reach, the nearer
+/// the mesh is to the truth where density varies: coarse cells begin farther from dense samples. With one, places next
+/// to sparse samples open as well; two and three leave equally many gaps.
 inline constexpr int kRefinedCells = 3;
 /// Cells around the home that finer samples' cells inherit closeness from, and whose centres are projected.
 inline constexpr int kCloseCells = 1;
