@@ -23,8 +23,9 @@ struct VolumeEditStats {
 /// Keeps the voxels whose centre lies inside the region (or outside), and points likewise; nothing is resampled. A
 /// level set that loses voxels becomes open: it ends at the cut, as a mesh does, and is neither inside nor outside
 /// beyond its band. Grids without anything left are dropped. The file is held in memory; "-" is standard output. The
-/// bytes are the same for any number of threads. Throws Error: unreadable (the input), usage (clip.h's require_sane();
-/// a grid of a type that cannot be clipped, naming it), empty (nothing left), budget (the output cannot be written).
+/// bytes are the same for any number of threads. Throws Error: unreadable (the input), usage (lamina/edit.h's
+/// require_sane(); a grid of a type that cannot be clipped, naming it), empty (nothing left), budget (the output cannot
+/// be written).
 VolumeEditStats clip_volume(const std::string& input, const ClipRegion& region, Keep keep, const std::string& output,
                             const RunContext& run = {});
 

@@ -36,7 +36,7 @@ struct LasHeader {
   std::string crs;                      ///< PointSourceInfo::crs
   std::vector<LasExtra> extras;         ///< of one value each, of a type this library has
   std::optional<LazPacking> packing;    ///< of LAZ files
-  std::vector<std::byte> octree;        ///< the record of a COPC file (copc.h)
+  std::vector<std::byte> octree;        ///< the record of a COPC file (parse_copc())
 };
 
 /// Throws Error(unreadable) for what no version allows: sizes too small, an unknown point format, a scale of 0, more

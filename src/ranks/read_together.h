@@ -1,5 +1,5 @@
-// An input that only rank 0 reads: it deals the rows out, so that the others store them.
-// The input read by all ranks: each has the samples of its rows in a store of its own.
+// The input read by all ranks: each has the samples of its rows in a store of its own. Where only rank 0 can read, it
+// deals the rows out, and the others store them.
 #pragma once
 #include <cstdint>
 #include <functional>

@@ -41,7 +41,7 @@ TEST_F(RadiusTool, FollowsTheDensityAndTheReconstructionsSurvey) {
   settings.input = cloud_;
   settings.dry_run = true;
   const SurfaceStats stats = reconstruct_surface(settings, {});
-  // The survey does not bound radii by their neighbours' (radii.h), so its upper end may be longer.
+  // The survey does not bound radii by their neighbours' (RadiiSettings), so its upper end may be longer.
   EXPECT_NEAR(median, stats.plan.radius_median, 0.15 * stats.plan.radius_median);
 }
 
