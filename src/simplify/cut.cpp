@@ -3,7 +3,7 @@
 #include <tbb/parallel_invoke.h>
 
 #include <algorithm>
-#include <tuple>
+#include <span>
 
 namespace lamina::simplify {
 namespace {
@@ -27,19 +27,16 @@ std::size_t longest_side(std::span<const Centre> triangles) {
   return longest;
 }
 
-void sort_into_boxes(std::span<Centre> triangles, std::size_t most, double share) {
-  if (triangles.size() <= most) {
-    std::sort(triangles.begin(), triangles.end(),
-              [](const Centre& a, const Centre& b) { return a.triangle < b.triangle; });
-    return;
-  }
+/// In a box they are in no order.
+void part_into_boxes(std::span<Centre> triangles, std::size_t most, double share) {
+  if (triangles.size() <= most) return;
   const std::size_t axis = longest_side(triangles), lower = lower_part(triangles.size(), share);
   std::nth_element(triangles.begin(), triangles.begin() + static_cast<std::ptrdiff_t>(lower), triangles.end(),
                    [axis](const Centre& a, const Centre& b) {
-                     return std::tie(a.at[axis], a.triangle) < std::tie(b.at[axis], b.triangle);
+                     return a.at[axis] < b.at[axis] || (a.at[axis] == b.at[axis] && a.triangle < b.triangle);
                    });
-  tbb::parallel_invoke([&] { sort_into_boxes(triangles.first(lower), most, share); },
-                       [&] { sort_into_boxes(triangles.subspan(lower), most, share); });
+  tbb::parallel_invoke([&] { part_into_boxes(triangles.first(lower), most, share); },
+                       [&] { part_into_boxes(triangles.subspan(lower), most, share); });
 }
 
 void add_starts(std::size_t begin, std::size_t count, std::size_t most, double share,
@@ -55,11 +52,20 @@ void add_starts(std::size_t begin, std::size_t count, std::size_t most, double s
 
 }  // namespace
 
-std::vector<std::size_t> cut_into_boxes(std::span<Centre> triangles, std::size_t most, double share) {
+std::vector<std::size_t> cut_into_boxes(std::vector<Centre> triangles, std::size_t most, double share,
+                                        std::vector<std::uint32_t>& order) {
+  const auto count = static_cast<std::uint32_t>(triangles.size());
   std::vector<std::size_t> starts;
-  add_starts(0, triangles.size(), most, share, starts);
-  starts.push_back(triangles.size());
-  if (!triangles.empty()) sort_into_boxes(triangles, most, share);
+  add_starts(0, count, most, share, starts);
+  starts.push_back(count);
+  if (count > 0) part_into_boxes(triangles, most, share);
+  std::vector<std::uint32_t> box(count);
+  for (std::uint32_t b = 0; b + 1 < starts.size(); ++b) {
+    for (std::size_t i = starts[b]; i < starts[b + 1]; ++i) box[triangles[i].triangle] = b;
+  }
+  std::vector<std::size_t> next = starts;
+  order.resize(count);
+  for (std::uint32_t t = 0; t < count; ++t) order[next[box[t]]++] = t;
   return starts;
 }
 

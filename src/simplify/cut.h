@@ -3,7 +3,6 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 namespace lamina::simplify {
@@ -14,9 +13,10 @@ struct Centre {
   std::uint32_t triangle = 0;
 };
 
-/// Sorts the triangles into boxes of at most `most`, cut across the longest side of what is there, `share` of the
-/// triangles on the lower side, above 0 and below 1: another share, other boxes. Returns where each box begins, and the
-/// end. Within a box they are sorted by number. The result does not depend on the number of threads.
-std::vector<std::size_t> cut_into_boxes(std::span<Centre> triangles, std::size_t most, double share);
+/// Cuts triangles 0 to their number into boxes of at most `most`, across the longest side of what is there, `share` of
+/// the triangles on the lower side, above 0 and below 1: another share, other boxes. `order`: triangles box by box, in
+/// each by number. Returns where each box begins, and the end. The result does not depend on the number of threads.
+std::vector<std::size_t> cut_into_boxes(std::vector<Centre> triangles, std::size_t most, double share,
+                                        std::vector<std::uint32_t>& order);
 
 }  // namespace lamina::simplify

@@ -51,9 +51,7 @@ class Round {
       const Vec3 sum = at(c[0]) + at(c[1]) + at(c[2]) - 3 * work.centre;
       centres[t] = {to_float(sum), static_cast<std::uint32_t>(t)};
     });
-    starts_ = cut_into_boxes(centres, kPieceTriangles, share);
-    order_.resize(size_);
-    for (std::size_t i = 0; i < size_; ++i) order_[i] = centres[i].triangle;
+    starts_ = cut_into_boxes(std::move(centres), kPieceTriangles, share, order_);
     pieces_.resize(starts_.size() - 1);
     vertices_.resize(pieces_.size());
     find_owners();

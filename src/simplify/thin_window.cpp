@@ -54,29 +54,26 @@ void ThinWindow::add(std::span<const Triangle> triangles) {
 /// Adds those of the vertices that are not here; `places`: where each is then.
 void ThinWindow::take_in(std::span<const std::uint32_t> ids, std::vector<std::uint32_t>& places) {
   std::vector<std::uint32_t> moved(vertices_.size()), fresh, fresh_places;
-  std::vector<Vertex> all;
-  all.reserve(vertices_.size() + ids.size());
   places.resize(ids.size());
-  std::size_t old = 0;
-  const auto keep_old = [&] {
-    moved[old] = static_cast<std::uint32_t>(all.size());
-    all.push_back(vertices_[old++]);
-    ++all.back().age;
-  };
+  std::uint32_t old = 0, size = 0;
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    while (old < vertices_.size() && vertices_[old].id < ids[i]) keep_old();
-    places[i] = static_cast<std::uint32_t>(all.size());
+    while (old < vertices_.size() && vertices_[old].id < ids[i]) moved[old++] = size++;
+    places[i] = size;
     if (old < vertices_.size() && vertices_[old].id == ids[i]) {
-      keep_old();
+      moved[old++] = size++;
       continue;
     }
     if (done_[ids[i]]) refuse("a vertex joins parts that share no edge");
     fresh.push_back(ids[i]);
-    fresh_places.push_back(places[i]);
-    all.emplace_back();
+    fresh_places.push_back(size++);
   }
-  while (old < vertices_.size()) keep_old();
-  vertices_ = std::move(all);
+  while (old < vertices_.size()) moved[old++] = size++;
+  vertices_.resize(size);
+  while (old-- > 0) {  // the last first: none is written over before it has moved
+    vertices_[moved[old]] = vertices_[old];
+    ++vertices_[moved[old]].age;
+  }
+  for (const std::uint32_t place : fresh_places) vertices_[place] = {};
   for (Values* values : {&values_, &low_, &high_}) {
     for (std::vector<float>& of : *values) {
       std::vector<float> at(vertices_.size());
@@ -126,7 +123,9 @@ void ThinWindow::add_planes(std::size_t first) {
     }
     if (!(twice > 0)) continue;
     const Quadric plane = plane_quadric({}, (1 / twice) * n, 0.5 * twice, kNormalNoise);
-    for (const std::uint32_t v : t) vertices_[v].quadric += plane;
+    for (const std::uint32_t v : t) {
+      for (std::size_t k = 0; k < plane.a.size(); ++k) vertices_[v].quadric.a[k] += plane.a[k];
+    }
   }
   const auto allowed = static_cast<float>(kEdgeOverArea * deviation_ * deviation_ / 3);
   for (std::size_t i = first; i < triangles_.size(); ++i) {
@@ -149,11 +148,11 @@ std::array<float, 3> ThinWindow::centre(std::size_t triangle) const {
   return to_float(vertices_[t[0]].position + vertices_[t[1]].position + vertices_[t[2]].position - 3 * origin);
 }
 
-ThinWindow::Part ThinWindow::part(std::vector<std::uint32_t> triangles, std::vector<std::uint32_t>& numbers) const {
+ThinWindow::Part ThinWindow::part(std::span<const std::uint32_t> triangles, std::vector<std::uint32_t>& numbers) const {
   Part part;
-  part.triangles = std::move(triangles);
+  part.triangles.assign(triangles.begin(), triangles.end());
   ThinPart& thin = part.thin;
-  thin.mesh.triangles.reserve(part.triangles.size());
+  thin.mesh.triangles.reserve(triangles.size());
   numbers.resize(std::max(numbers.size(), vertices_.size()), kNone);
   std::vector<std::uint32_t> here;
   for (const std::uint32_t triangle : part.triangles) {
@@ -170,24 +169,33 @@ ThinWindow::Part ThinWindow::part(std::vector<std::uint32_t> triangles, std::vec
     thin.mesh.triangles.push_back(t);
   }
   for (const std::uint32_t v : part.vertices) numbers[v] = kNone;
-  thin.mesh.attributes.resize(values_.size());
-  thin.low.resize(values_.size());
-  thin.high.resize(values_.size());
-  for (std::size_t v = 0; v < part.vertices.size(); ++v) {
+  const std::size_t size = part.vertices.size();
+  part.split.resize(size);
+  thin.locked.resize(size);
+  thin.mesh.positions.resize(size);
+  if (mesh_.has_normals()) thin.mesh.normals.resize(size);
+  thin.quadrics.resize(size);
+  thin.budgets.resize(size);
+  for (std::size_t v = 0; v < size; ++v) {
     const std::uint32_t from = part.vertices[v];
     const Vertex& vertex = vertices_[from];
-    part.split.push_back(here[v] < count_[from] ? 1 : 0);
-    thin.locked.push_back(part.split.back() != 0 || vertex.number != kNone ? 1 : 0);
-    thin.mesh.positions.push_back(vertex.position);
-    if (mesh_.has_normals()) thin.mesh.normals.push_back(vertex.normal);
-    thin.quadrics.push_back(vertex.quadric);
-    thin.budgets.push_back(vertex.budget);
-    for (std::size_t a = 0; a < values_.size(); ++a) {
-      thin.mesh.attributes[a].push_back(values_[a][from]);
-      thin.low[a].push_back(low_[a][from]);
-      thin.high[a].push_back(high_[a][from]);
-    }
+    part.split[v] = here[v] < count_[from] ? 1 : 0;
+    thin.locked[v] = part.split[v] != 0 || vertex.number != kNone ? 1 : 0;
+    thin.mesh.positions[v] = vertex.position;
+    if (mesh_.has_normals()) thin.mesh.normals[v] = vertex.normal;
+    thin.quadrics[v] = vertex.quadric;
+    thin.budgets[v] = vertex.budget;
   }
+  const auto pick = [&](const Values& all, std::vector<std::vector<float>>& picked) {
+    picked.resize(all.size());
+    for (std::size_t a = 0; a < all.size(); ++a) {
+      picked[a].reserve(size);
+      for (const std::uint32_t from : part.vertices) picked[a].push_back(all[a][from]);
+    }
+  };
+  pick(values_, thin.mesh.attributes);
+  pick(low_, thin.low);
+  pick(high_, thin.high);
   return part;
 }
 
@@ -244,10 +252,10 @@ void ThinWindow::spread(std::vector<std::uint8_t>& marks) const {
 /// Over its triangles a vertex sums up a hash of the next vertex less one of the vertex before: nothing remains where
 /// they close around it.
 void ThinWindow::find_open() {
-  std::vector<std::uint64_t> turns(vertices_.size());
-  const auto hash = [](std::uint32_t v) { return CounterRng(v, 0).bits(); };
+  std::vector<std::uint64_t> turns(vertices_.size()), hashes(vertices_.size());
+  for (std::size_t v = 0; v < hashes.size(); ++v) hashes[v] = CounterRng(v, 0).bits();
   for (const Triangle& t : triangles_) {
-    const std::array<std::uint64_t, 3> of{hash(t[0]), hash(t[1]), hash(t[2])};
+    const std::array<std::uint64_t, 3> of{hashes[t[0]], hashes[t[1]], hashes[t[2]]};
     for (std::size_t k = 0; k < 3; ++k) turns[t[k]] += of[(k + 1) % 3] - of[(k + 2) % 3];
   }
   for (std::size_t v = 0; v < vertices_.size(); ++v) {

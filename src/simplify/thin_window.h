@@ -34,7 +34,7 @@ class ThinWindow {
     ThinPart thin;
   };
   /// `numbers`: kNone of each vertex, before and after; grows.
-  [[nodiscard]] Part part(std::vector<std::uint32_t> triangles, std::vector<std::uint32_t>& numbers) const;
+  [[nodiscard]] Part part(std::span<const std::uint32_t> triangles, std::vector<std::uint32_t>& numbers) const;
   /// Parts that share no triangle may be put back at once.
   void put_back(const Part& part);
   /// All parts are back. Returns the triangles at vertices that were split, and those around them.

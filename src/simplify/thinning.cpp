@@ -4,9 +4,11 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -84,23 +86,22 @@ class Thinner {
   void work() {
     std::vector<Centre> centres(window_.triangles());
     for (std::uint32_t t = 0; t < centres.size(); ++t) centres[t] = {window_.centre(t), t};
-    const std::vector<std::size_t> starts = cut_into_boxes(centres, kBoxTriangles, 0.5);
-    std::vector<std::vector<std::uint32_t>> boxes(starts.size() - 1);
-    for (std::size_t b = 0; b < boxes.size(); ++b) {
-      for (std::size_t i = starts[b]; i < starts[b + 1]; ++i) boxes[b].push_back(centres[i].triangle);
-    }
-    std::vector<std::uint32_t> border = work_on(std::move(boxes));
-    if (starts.size() > 2 && !border.empty()) work_on({std::move(border)});
+    std::vector<std::uint32_t> order;
+    const std::vector<std::size_t> starts = cut_into_boxes(std::move(centres), kBoxTriangles, 0.5, order);
+    const std::vector<std::uint32_t> border = work_on(order, starts);
+    if (starts.size() > 2 && !border.empty()) work_on(border, std::array<std::size_t, 2>{0, border.size()});
   }
 
-  std::vector<std::uint32_t> work_on(std::vector<std::vector<std::uint32_t>> boxes) {
-    std::vector<ThinWindow::Part> parts(boxes.size());
-    std::vector<Matching::Result> results(boxes.size());
-    tbb::parallel_for(std::size_t{0}, boxes.size(), [&](std::size_t b) {
-      parts[b] = window_.part(std::move(boxes[b]), numbers_.local());
+  /// `order`: of the window's triangles those of one box after the other, which begin at `starts`.
+  std::vector<std::uint32_t> work_on(std::span<const std::uint32_t> order, std::span<const std::size_t> starts) {
+    const std::size_t boxes = starts.size() - 1;
+    std::vector<ThinWindow::Part> parts(boxes);
+    std::vector<Matching::Result> results(boxes);
+    tbb::parallel_for(std::size_t{0}, boxes, [&](std::size_t b) {
+      parts[b] = window_.part(order.subspan(starts[b], starts[b + 1] - starts[b]), numbers_.local());
       results[b] = matchings_.local().thin(parts[b].thin, tolerances_, run_);
     });
-    for (std::size_t b = 0; b < parts.size(); ++b) {
+    for (std::size_t b = 0; b < boxes; ++b) {
       window_.put_back(parts[b]);
       contractions_ += (parts[b].triangles.size() - results[b].triangles) / 2;
       deviation_ = std::max(deviation_, results[b].deviation);
