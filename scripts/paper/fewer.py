@@ -10,25 +10,33 @@ from plotter import plotter, save  # noqa: E402  (in scripts)
 
 UNIT = 1e5
 MODEL = "dragon"
-UNIFORM, OURS, FINE, MESHLAB = "uniform cells", "simplified", "cells of 0.55 r, simplified", "simplified by MeshLab"
-STYLES = {UNIFORM: ("o--", "#808080"), OURS: ("s-", "#1f5fa8"), FINE: ("^-", "#308040"), MESHLAB: ("x:", "#c06020")}
+UNIFORM, FLAT, OURS = "uniform cells", "thinned out where flat", "simplified"
+FINE, MESHLAB = "cells of 0.55 r, simplified", "simplified by MeshLab"
+STYLES = {UNIFORM: ("o--", "#808080"), FLAT: ("D-", "#803080"), OURS: ("s-", "#1f5fa8"), FINE: ("^-", "#308040"),
+          MESHLAB: ("x:", "#c06020")}
 NAMES = tuple(STYLES)
 CELLS = ("0.9r", "1.15r", "1.5r", "2r", "2.7r", "3.6r")
+DEVIATIONS = ("default", "0.02", "0.03", "0.05", "0.1")
 COUNTS = (850_000, 500_000, 300_000, 200_000, 100_000, 50_000)
 KEEP = ["--prune", "0"]  # the truth has small parts
+ALL = [*KEEP, "--deviation", "0"]  # with all triangles
 
 
 def measured(program, cloud, truth, folder, limit, wanted):
     """Rows; `wanted`: is a name?"""
     mesh, fewer = os.path.join(folder, "mesh.ply"), os.path.join(folder, "fewer.ply")
     for cell in CELLS if wanted(UNIFORM) else ():
-        cost = runs.chosen(program, cloud, mesh, [*KEEP, "--cell", cell])
+        cost = runs.chosen(program, cloud, mesh, [*ALL, "--cell", cell])
         yield {"name": UNIFORM, "wanted": cell, "cost": cost} | runs.judge(program, mesh, truth)
+    for deviation in DEVIATIONS if wanted(FLAT) else ():
+        options = KEEP if deviation == "default" else [*KEEP, "--deviation", deviation]
+        cost = runs.chosen(program, cloud, mesh, options)
+        yield {"name": FLAT, "wanted": deviation, "cost": cost} | runs.judge(program, mesh, truth)
     meshlab = shutil.which("meshlabserver") and shutil.which("xvfb-run")
     for name, options in ((OURS, []), (MESHLAB, []), (FINE, ["--cell", "0.55r"])):
         if not wanted(name) or (name == MESHLAB and not meshlab):
             continue
-        runs.chosen(program, cloud, mesh, [*KEEP, *options])
+        runs.chosen(program, cloud, mesh, [*ALL, *options])
         for count in COUNTS:
             print(f"  {name}, {count}", flush=True)
             row = {"name": name, "wanted": count}

@@ -17,6 +17,23 @@
 namespace lamina::simplify {
 namespace {
 
+/// Arrays one after the other.
+class ArrayReader {
+ public:
+  ArrayReader(const SpillFile& file, std::uint64_t offset) : file_(file), offset_(offset) {}
+  template <class T>
+  void read(std::vector<T>& out, std::size_t count) {
+    out.resize(count);
+    const auto bytes = std::as_writable_bytes(std::span(out));
+    if (!bytes.empty()) file_.read(offset_, bytes);
+    offset_ += bytes.size();
+  }
+
+ private:
+  const SpillFile& file_;
+  std::uint64_t offset_;
+};
+
 void require_running(const RunContext& run) {
   if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
 }
@@ -258,6 +275,83 @@ class PartRegions final : public Regions {
 };
 
 }  // namespace
+
+RegionTree::RegionTree(std::vector<meshes::Vec3> places, std::size_t most, double share) : nodes_(1) {
+  regions_ = 0;
+  divide(0, places, std::max<std::size_t>(most, 1), share);
+}
+
+void RegionTree::divide(std::uint32_t node, std::span<meshes::Vec3> places, std::size_t most, double share) {
+  const auto end_here = [&] { nodes_[node].low = regions_++; };
+  if (places.size() <= most) return end_here();
+  meshes::Vec3 low = places[0], high = low;
+  for (const meshes::Vec3& p : places) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], p[k]);
+      high[k] = std::max(high[k], p[k]);
+    }
+  }
+  std::size_t axis = 0;
+  for (std::size_t k = 1; k < 3; ++k) {
+    if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
+  }
+  if (!(high[axis] > low[axis])) return end_here();
+  const auto wanted =
+      std::clamp<std::ptrdiff_t>(static_cast<std::ptrdiff_t>(share * static_cast<double>(places.size())), 1,
+                                 static_cast<std::ptrdiff_t>(places.size()) - 1);
+  std::nth_element(places.begin(), places.begin() + wanted, places.end(),
+                   [axis](const meshes::Vec3& a, const meshes::Vec3& b) { return a[axis] < b[axis]; });
+  double cut = places[static_cast<std::size_t>(wanted)][axis];
+  if (!(cut > low[axis])) {  // many lie at the lower end
+    cut = high[axis];
+    for (const meshes::Vec3& p : places) {
+      if (p[axis] > low[axis]) cut = std::min(cut, p[axis]);
+    }
+  }
+  const auto above =
+      std::partition(places.begin(), places.end(), [axis, cut](const meshes::Vec3& p) { return p[axis] < cut; });
+  const auto below = static_cast<std::size_t>(above - places.begin());
+  const auto first = static_cast<std::uint32_t>(nodes_.size());
+  nodes_[node] = {cut, axis, first, first + 1};
+  nodes_.resize(nodes_.size() + 2);
+  divide(first, places.first(below), most, share);
+  divide(first + 1, places.subspan(below), most, share);
+}
+
+RegionFile::RegionFile(const std::string& tmp_dir, const TriangleMesh& layout, bool bound)
+    : file_(tmp_dir), attributes_(layout.layout), normals_(!layout.normals.empty()), bound_(bound) {}
+
+RegionFile::Place RegionFile::append(const RegionMesh& part) {
+  const Place place{file_.size(), part.mesh.positions.size(), part.mesh.triangles.size()};
+  const auto write = [this](const auto& array) { file_.append(std::as_bytes(std::span(array))); };
+  write(part.mesh.positions);
+  write(part.mesh.normals);
+  for (const std::vector<float>& values : part.mesh.attributes) write(values);
+  write(part.ids);
+  write(part.quadrics);
+  write(part.mesh.triangles);
+  write(part.errors);
+  write(part.tried);
+  return place;
+}
+
+RegionMesh RegionFile::read(const Place& place) const {
+  RegionMesh part;
+  ArrayReader from(file_, place.offset);
+  from.read(part.mesh.positions, place.vertices);
+  if (normals_) from.read(part.mesh.normals, place.vertices);
+  part.mesh.layout = attributes_;
+  part.mesh.attributes.resize(attributes_.size());
+  for (std::vector<float>& values : part.mesh.attributes) from.read(values, place.vertices);
+  from.read(part.ids, place.vertices);
+  from.read(part.quadrics, place.vertices);
+  from.read(part.mesh.triangles, place.triangles);
+  if (bound_) {
+    from.read(part.errors, place.triangles);
+    from.read(part.tried, place.vertices);
+  }
+  return part;
+}
 
 std::unique_ptr<Regions> regions_of_mesh(meshes::MeshBlocks& mesh, RegionTree tree, const std::string& tmp_dir,
                                          const RunContext& run) {

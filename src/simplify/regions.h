@@ -1,17 +1,83 @@
-// A mesh too large for memory, region by region.
+// A mesh too large for memory, region by region: where it is cut, and its parts on disk between the rounds of a
+// simplification.
 #pragma once
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
+#include "base/spill_file.h"
+#include "lamina/mesh.h"
 #include "lamina/run.h"
+#include "meshes/vec3.h"
 #include "meshes/writers.h"
-#include "simplify/region_file.h"
-#include "simplify/region_tree.h"
+#include "simplify/old_mesh.h"
+#include "simplify/quadric.h"
 
 namespace lamina::simplify {
+
+/// Boxes, cut across the longest side of what lies in them.
+class RegionTree {
+ public:
+  /// A single one.
+  RegionTree() : nodes_(1) {}
+  /// Boxes of at most `most` of these places; `share` of them below a cut, above 0 and below 1: another share, other
+  /// boxes.
+  RegionTree(std::vector<meshes::Vec3> places, std::size_t most, double share);
+
+  [[nodiscard]] std::uint32_t regions() const { return regions_; }
+  [[nodiscard]] std::uint32_t at(const meshes::Vec3& place) const {
+    const Node* node = nodes_.data();
+    while (node->high != 0) node = &nodes_[place[node->axis] < node->cut ? node->low : node->high];
+    return node->low;
+  }
+
+ private:
+  struct Node {
+    double cut = 0;
+    std::size_t axis = 0;
+    std::uint32_t low = 0, high = 0;  ///< nodes; of a leaf the region and 0
+  };
+  void divide(std::uint32_t node, std::span<meshes::Vec3> places, std::size_t most, double share);
+
+  std::vector<Node> nodes_;
+  std::uint32_t regions_ = 1;
+};
+
+/// Triangles of a mesh with their vertices, which other parts may have as well.
+struct RegionMesh {
+  TriangleMesh mesh;
+  std::vector<std::uint32_t> ids;      ///< of the vertices, in the whole mesh
+  std::vector<Quadric> quadrics;       ///< of the vertices, about their places; the quadrics of all copies add up
+  std::vector<Errors> errors;          ///< of the triangles; empty without a bound
+  std::vector<std::uint8_t> tried{};   ///< WorkMesh::tried; empty without a bound
+  std::vector<std::uint8_t> locked{};  ///< vertices that other regions have or may have; not written
+};
+
+/// Written from its beginning to its end; temporary.
+class RegionFile {
+ public:
+  struct Place {
+    std::uint64_t offset = 0;
+    std::size_t vertices = 0, triangles = 0;
+  };
+  /// `layout`: a mesh with the attributes of all that come, and normals if they have them; what else it has does not
+  /// matter.
+  RegionFile(const std::string& tmp_dir, const TriangleMesh& layout, bool bound);
+  /// Throws Error(budget) for a full disk. Its quadrics have to be there.
+  Place append(const RegionMesh& part);
+  void flush() { file_.flush(); }
+  /// Of a flushed file. Throws Error(budget) when it cannot be read.
+  [[nodiscard]] RegionMesh read(const Place& place) const;
+  [[nodiscard]] std::uint64_t size() const { return file_.size(); }
+
+ private:
+  SpillFile file_;
+  AttributeLayout attributes_;
+  bool normals_, bound_;
+};
 
 /// Every triangle is in one region. Vertices that triangles of several regions have, or might have, are locked.
 class Regions {

@@ -15,7 +15,7 @@
 #include "meshes/mesh_sink.h"
 #include "meshes/stored_mesh.h"
 #include "meshes/writers.h"
-#include "simplify/part.h"
+#include "simplify/matching.h"
 #include "simplify/rounds.h"
 #include "simplify/streamed.h"
 

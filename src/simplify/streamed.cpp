@@ -22,7 +22,7 @@
 #include "measure/edge_table.h"
 #include "meshes/mesh_blocks.h"
 #include "meshes/stored_mesh.h"
-#include "simplify/part.h"
+#include "simplify/matching.h"
 #include "simplify/regions.h"
 #include "simplify/rounds.h"
 #include "simplify/thinning.h"

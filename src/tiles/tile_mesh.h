@@ -14,7 +14,7 @@
 #include "meshes/mesh_pieces.h"
 #include "meshes/vec3.h"
 #include "meshes/writers.h"
-#include "simplify/part.h"
+#include "simplify/matching.h"
 #include "tiles/tile_octree.h"
 
 namespace lamina::tiles {

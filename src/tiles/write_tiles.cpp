@@ -26,7 +26,7 @@
 #include "lamina/error.h"
 #include "meshes/mesh_blocks.h"
 #include "meshes/stored_mesh.h"
-#include "simplify/part.h"
+#include "simplify/matching.h"
 #include "tiles/georeference.h"
 #include "tiles/tile_content.h"
 #include "tiles/tile_mesh.h"

@@ -1,4 +1,4 @@
-#include "simplify/part.h"
+#include "simplify/matching.h"
 
 #include <gtest/gtest.h>
 
