@@ -31,6 +31,8 @@ void make_empty(VertexBatch& batch, const VertexBatch& other) {
   for (auto& values : batch.attributes) clear(values);
   batch.radius.clear();
   if (!other.radius.empty()) batch.radius.reserve(room);
+  batch.density.clear();
+  if (!other.density.empty()) batch.density.reserve(room);
   batch.overhang.clear();
 }
 
@@ -43,6 +45,7 @@ void append_copy(const VertexBatch& from, std::size_t i, VertexBatch& to) {
   to.nz.push_back(from.nz[i]);
   for (std::size_t a = 0; a < from.attributes.size(); ++a) to.attributes[a].push_back(from.attributes[a][i]);
   if (!from.radius.empty()) to.radius.push_back(from.radius[i]);
+  if (!from.density.empty()) to.density.push_back(from.density[i]);
 }
 
 /// The point at t between two vertices.
@@ -72,6 +75,7 @@ void append_between(const VertexAt& a, const VertexAt& b, float t, VertexBatch& 
   for (std::size_t c = 0; c < a.batch->attributes.size(); ++c)
     to.attributes[c].push_back(blend(a.batch->attributes[c][a.i], b.batch->attributes[c][b.i]));
   if (!a.batch->radius.empty()) to.radius.push_back(blend(a.batch->radius[a.i], b.batch->radius[b.i]));
+  if (!a.batch->density.empty()) to.density.push_back(std::max(a.batch->density[a.i], b.batch->density[b.i]));
 }
 
 }  // namespace

@@ -30,6 +30,7 @@ struct SurfaceCorner {
   /// the value is extended from neighbours, or uncertain. A corner without any value has a zero normal.
   float offset_from_mean = -1;
   bool crease = false;  ///< the projected point lies on a sharp edge, and the normal is the mean of the sides'
+  float density = 0;    ///< samples along the surface around, 1/steps^2; 0 where none are seen
   float overhang = 0;   ///< how far the surface reaches beyond its samples here, support radii (mls/overhang.h)
 };
 

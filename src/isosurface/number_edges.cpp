@@ -145,6 +145,7 @@ void fill_corners(const Window& window, const TileView& tile, const CornerRule& 
       if (leaf.creased.test(z * 64 + bit) &&
           takes_crease(window, tile.level, cell, static_cast<std::int32_t>(out.slab), record()))
         put_on_crease(record(), cell_of_value(window, tile.level, cell), c);
+      if ((leaf.seen.words[z] & active & one) != 0) c.density = record()[kDensity];
       if (rule.trim > 0) c.overhang = overhang(leaf, z * 64 + bit, slab_layers, value.normal, rule.trim);
       for (int a = 0; a < attributes; ++a) out.corner_attributes[a][id] = extra[a];
       out.corners[id++] = c;

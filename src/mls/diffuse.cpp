@@ -73,6 +73,7 @@ class CentresMean {
     record[kOffsetFromMean] = sum_.offset_from_mean * inv;
     for (float& l : sum_.lean) l *= inv;
     record[kLean] = packed_lean(sum_.lean);
+    record[kDensity] = sum_.density * inv;
     for (std::size_t c = 0; c < attributes_.size(); ++c) record[kFirstAttribute + c] = attributes_[c] * inv;
     return trusted ? Found::trusted : Found::seen;
   }
@@ -84,7 +85,7 @@ class CentresMean {
 
   struct Sum {
     float weight = 0;
-    float distance = 0, curvature = 0, offset_from_mean = 0;
+    float distance = 0, curvature = 0, offset_from_mean = 0, density = 0;
     std::array<float, 3> normal{}, lean{};
   };
 
@@ -123,6 +124,7 @@ class CentresMean {
     sum_.distance += w * (v[kDistance] + along + 0.5F * v[kCurvature] * across);
     sum_.curvature += w * v[kCurvature];
     sum_.offset_from_mean += w * v[kOffsetFromMean];
+    sum_.density += w * v[kDensity];
     const std::array<float, 3> lean = unpacked_lean(v[kLean]);
     for (int k = 0; k < 3; ++k) sum_.lean[k] += w * lean[k];
     for (int k = 0; k < 3; ++k) sum_.normal[k] += w * n[k];

@@ -4,9 +4,13 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <numbers>
 
 namespace lamina {
 namespace {
+
+/// Of the support's own disc, what is left of it at least where it cuts the samples' plane far from its middle.
+constexpr float kLeastDisc = 0.25F;
 
 /// Whether a sample close enough contributed to a point.
 bool is_seen(const Lanes* sums, int lane) {
@@ -25,6 +29,16 @@ bool any_seen(const Lanes* sums) {
   bool any = false;
   for (int l = 0; l < kLanes; ++l) any = any || is_seen(sums, l);
   return any;
+}
+
+/// Samples per cell^2 of the surface around a seen point: those within its support lie on the disc that this cuts out
+/// of their plane.
+float density(const Lanes* sums, int l) {
+  const float inv = 1.0F / sums[kW][l];
+  const float support = sums[kWR][l] * inv;
+  const float height = sums[kPN][l] * inv;
+  const float square = support * support;
+  return sums[kSeen][l] / (std::numbers::pi_v<float> * std::max(square - height * height, kLeastDisc * square));
 }
 
 /// Makes a corner's projected point the average of its samples, on the side where the fit has it: a fit that reaches
@@ -180,6 +194,7 @@ void store_values(Window& window, int level, const Work& work, const std::vector
       v[kCurvature] = out.curvature[l] / cell;
       v[kOffsetFromMean] = out.offset_from_mean[l];
       v[kLean] = packed_lean({out.lean_x[l], out.lean_y[l], out.lean_z[l]});
+      v[kDensity] = density(sums, l) / (cell * cell);
       v[kCrease] = fit.creases.empty() ? 0.0F : fit.creases[query][0];
       v[kCreaseEnd] = fit.creases.empty() ? 0.0F : fit.creases[query][1];
       const float inv = 1.0F / sums[kW][l];

@@ -19,7 +19,7 @@ namespace lamina {
 /// from its normal, as a sphere seen from outside); offset from the mean is |projected point - weighted average| in
 /// units of the local support radius. Of a corner that is not trusted the projected point is that average itself (its
 /// offset is the fit's). Where a sharp edge passes the corner the crease channels, two, hold the place and the normal
-/// of its vertex (mls/sheets.h), else zero.
+/// of its vertex (mls/sheets.h), else zero. Density is that of the samples along the surface, 1/steps^2.
 enum Channel : int {
   kDistance = 0,
   kNormalX,
@@ -28,6 +28,7 @@ enum Channel : int {
   kCurvature,
   kOffsetFromMean,
   kLean,
+  kDensity,
   kCrease,
   kCreaseEnd,
   kFirstAttribute

@@ -61,6 +61,10 @@ inline constexpr double kLongestRim = 300;
 /// so many. A scan's samples carry about as many triangles.
 inline constexpr std::uint64_t kSpeckShare = 2000;
 inline constexpr std::uint64_t kMostSpeck = 500;
+/// And those with fewer samples than this share of as many, however many triangles they have: sheets of stray samples,
+/// each of which makes a disc of its own. A surface has as many samples as triangles, and a quarter where cells between
+/// two sheets are halved.
+inline constexpr double kSpeckSamples = 0.2;
 
 /// How far the mesh may be off its planes where triangles go (SimplifySettings::deviation): of clean samples, what each
 /// radius of median residual adds, and the most.

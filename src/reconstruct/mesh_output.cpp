@@ -122,6 +122,17 @@ void place_overhangs(const ClusteredSlab& from, VertexBatch& out) {
   }
 }
 
+void place_densities(const ClusteredSlab& from, double step, VertexBatch& out) {
+  out.density.clear();
+  out.density.reserve(from.slab.vertices.size());
+  const auto of = [&](SlabIndex i) { return (i.next() ? *from.next : from.here).corners[i.index()].density; };
+  for (const FinalVertex& v : from.slab.vertices) {
+    float density = of(v.corner);
+    if (v.kind == FinalVertex::Kind::isovertex) density = std::max(density, of(v.other));
+    out.density.push_back(static_cast<float>(static_cast<double>(density) / (step * step)));
+  }
+}
+
 void place_radii(const ClusteredSlab& from, const RadiusRule& rule, VertexBatch& out) {
   out.radius.clear();
   out.radius.reserve(from.slab.vertices.size());
@@ -140,6 +151,7 @@ void place_vertices(const ClusteredSlab& slab, const Frame& frame, const VertexS
   if (settings.curvature) place_curvatures(slab, frame.step, out);
   if (settings.filled) out.attributes.emplace_back(out.size(), 0.0F);
   if (settings.invented) out.attributes.emplace_back(out.size(), 0.0F);
+  if (settings.density) place_densities(slab, frame.step, out);
   if (settings.trim > 0) place_overhangs(slab, out);
   place_radii(slab, settings.radii, out);
 }

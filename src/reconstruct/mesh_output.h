@@ -39,6 +39,7 @@ struct VertexSettings {
   bool filled = false;     ///< another: 0, for those that close holes get 1
   bool invented = false;   ///< another, the last: 0, for those that close what nothing tells how to close get 1
   double finest_cell = 1;  ///< of the lattice, steps
+  bool density = false;    ///< VertexBatch::density
   double trim = 0;         ///< > 0: the mesh is cut where its overhang is this (boundary/rims.h)
   bool double_positions = false;  ///< as they are written
   RadiusRule radii;               ///< the influence radius around each vertex, by the finest cell around its corner

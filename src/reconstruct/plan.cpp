@@ -186,8 +186,10 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
   // between sheets tell nothing.
   plan.vertices.radii = {influence / static_cast<double>(plan.lattice.cell_size(plan.main_level)),
                          plan.feed.refine_sheets ? influence : 0};
-  plan.pruning = {s.prune_triangles ? *s.prune_triangles : specks(plan.samples),
-                  resolve(s.prune_size, median, plan.feed.blend)};
+  const std::uint64_t chosen = s.prune_triangles ? 0 : specks(plan.samples);
+  const auto least_samples = static_cast<std::uint64_t>(kSpeckSamples * static_cast<double>(chosen));
+  plan.pruning = {s.prune_triangles.value_or(chosen), least_samples, resolve(s.prune_size, median, plan.feed.blend)};
+  plan.vertices.density = plan.pruning.samples > 0;
   plan.mesh_attributes = plan.attributes;
   if (s.vertex_levels) plan.mesh_attributes.push_back({"level", ScalarType::uint8});
   if (s.vertex_curvature) plan.mesh_attributes.push_back({"curvature", ScalarType::float32});

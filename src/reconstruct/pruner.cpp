@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "lamina/error.h"
+#include "meshes/vec3.h"
 
 namespace lamina {
 namespace {
@@ -54,6 +55,7 @@ void Pruner::join(std::uint64_t a, std::uint64_t b) {
   Part& stays = part(b);
   part(a).parent = b;
   stays.triangles += old.triangles;
+  stays.samples += old.samples;
   for (std::size_t k = 0; k < 3; ++k) {
     stays.low[k] = std::min(stays.low[k], old.low[k]);
     stays.high[k] = std::max(stays.high[k], old.high[k]);
@@ -96,7 +98,7 @@ void Pruner::find_parts(Slab& slab) {
     if (r == i) {
       const std::uint64_t id = first_id_ + parts_.size();
       slab.part[i] = static_cast<std::uint32_t>(id - slab.first_part);
-      parts_.push_back({id, 0, {kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}});
+      parts_.push_back({id, 0, 0, {kInfinity, kInfinity, kInfinity}, {-kInfinity, -kInfinity, -kInfinity}});
     } else {
       slab.part[i] = slab.part[r];  // the least vertex of a part is its root
     }
@@ -116,14 +118,35 @@ void Pruner::find_parts(Slab& slab) {
     for (std::size_t k = 1; k < 3; ++k) {
       if (of(t[k]) != of(t[0])) join(of(t[k]), of(t[0]));
     }
-    ++part(root(of(t[0]))).triangles;
+    Part& p = part(root(of(t[0])));
+    ++p.triangles;
+    if (rule_.samples > 0) p.samples += samples_under(slab, t);
   }
+}
+
+/// Vertices that see no sample have the density of those that do.
+double Pruner::samples_under(const Slab& slab, const std::array<std::uint32_t, 3>& triangle) const {
+  std::array<meshes::Vec3, 3> at{};
+  double density = 0;
+  int seen = 0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const bool here = triangle[k] >= slab.first;
+    const VertexBatch& v = here ? slab.vertices : live_vertices_;
+    const std::size_t i = triangle[k] - (here ? slab.first : live_first_);
+    at[k] = {v.x[i], v.y[i], v.z[i]};
+    density += static_cast<double>(v.density[i]);
+    seen += v.density[i] > 0 ? 1 : 0;
+  }
+  if (seen == 0) return 0;
+  using meshes::operator-;
+  return 0.5 * meshes::norm(meshes::cross(at[1] - at[0], at[2] - at[0])) * density / seen;
 }
 
 bool Pruner::is_large(const Part& p) const {
   double square = 0;
   for (std::size_t k = 0; k < 3; ++k) square += (p.high[k] - p.low[k]) * (p.high[k] - p.low[k]);
-  return p.triangles >= std::max<std::uint64_t>(1, rule_.triangles) && std::sqrt(square) >= rule_.size;
+  return p.triangles >= std::max<std::uint64_t>(1, rule_.triangles) &&
+         p.samples >= static_cast<double>(rule_.samples) && std::sqrt(square) >= rule_.size;
 }
 
 void Pruner::judge(Part& p) const {
@@ -166,6 +189,13 @@ void Pruner::add(const VertexBatch& vertices, const Triangles& triangles) {
   live_first_part_ = slab.first_part;
   live_end_part_ = slab.end_part;
   live_part_ = slab.part;
+  if (rule_.samples > 0) {
+    live_vertices_.x = vertices.x;
+    live_vertices_.y = vertices.y;
+    live_vertices_.z = vertices.z;
+    live_vertices_.density = vertices.density;
+  }
+  slab.vertices.density = {};
   hold(std::move(slab));
   pass_on_decided();
 }

@@ -17,6 +17,7 @@ namespace lamina {
 /// What makes a part small; a part that is small by either is left out.
 struct PruneRule {
   std::uint64_t triangles = 0;  ///< fewer than this; 0: any number will do
+  std::uint64_t samples = 0;    ///< fewer than this lie under it, by VertexBatch::density; 0: nobody asks
   double size = 0;              ///< the diagonal of its box, input axes, is shorter than this; 0: any size will do
 };
 
@@ -50,6 +51,7 @@ class Pruner {
   struct Part {
     std::uint64_t parent = 0;
     std::uint64_t triangles = 0;
+    double samples = 0;  ///< under it
     std::array<double, 3> low{}, high{};
     Fate fate = Fate::open;
     bool ended = false;
@@ -70,6 +72,7 @@ class Pruner {
   [[nodiscard]] Part& part(std::uint64_t id) { return parts_[id - first_id_]; }
   std::uint64_t root(std::uint64_t id);
   void join(std::uint64_t a, std::uint64_t b);
+  [[nodiscard]] double samples_under(const Slab& slab, const std::array<std::uint32_t, 3>& triangle) const;
   void find_parts(Slab& slab);
   void end_part(std::uint64_t id);
   void end_parts(const Slab& live, std::uint64_t from);
@@ -94,6 +97,7 @@ class Pruner {
   // Of the slab added last: what the next one may refer to.
   std::uint64_t live_first_ = 0, live_first_part_ = 0, live_end_part_ = 0;
   std::vector<std::uint32_t> live_part_;
+  VertexBatch live_vertices_;  ///< where they are and what lies under them, for PruneRule::samples
 
   std::deque<Slab> waiting_;
   std::uint64_t held_bytes_ = 0;   ///< of the waiting slabs in memory

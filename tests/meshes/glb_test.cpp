@@ -139,6 +139,7 @@ TEST(Glb, OneOutputThatFailsLeavesTheOthers) {
                         .nz = {1, 1, 1},
                         .attributes = {},
                         .radius = {},
+                        .density = {},
                         .overhang = {}});
   sink.append_triangles({{0, 1, 2}});
   std::filesystem::remove(gone);

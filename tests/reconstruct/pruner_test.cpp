@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <rapidcheck/gtest.h>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <map>
 #include <numeric>
@@ -39,6 +40,7 @@ std::vector<SlabMesh> random_slabs(std::mt19937& random, std::size_t slabs, std:
       slab.vertices.z.push_back(static_cast<double>(s));
       slab.vertices.nx.push_back(0), slab.vertices.ny.push_back(0), slab.vertices.nz.push_back(1);
       slab.vertices.attributes[0].push_back(static_cast<float>(first + i) * 0.5F);
+      slab.vertices.density.push_back(uniform(random) < 0.3 ? 0.0F : static_cast<float>(uniform(random)));
     }
     const std::uint32_t range = first + n - below;
     for (std::uint32_t t = 0; range >= 3 && t < static_cast<std::uint32_t>(joined * n); ++t) {
@@ -60,10 +62,12 @@ struct Truth {
 
 Truth prune_whole(const std::vector<SlabMesh>& slabs, const PruneRule& rule) {
   std::vector<std::array<double, 3>> at;
+  std::vector<double> density;
   std::vector<Triangle> triangles;
   for (const SlabMesh& s : slabs) {
     for (std::size_t i = 0; i < s.vertices.size(); ++i)
       at.push_back({s.vertices.x[i], s.vertices.y[i], s.vertices.z[i]});
+    density.insert(density.end(), s.vertices.density.begin(), s.vertices.density.end());
     triangles.insert(triangles.end(), s.triangles.begin(), s.triangles.end());
   }
   // Labels spread until nothing changes.
@@ -81,6 +85,7 @@ Truth prune_whole(const std::vector<SlabMesh>& slabs, const PruneRule& rule) {
   }
   struct Part {
     std::uint64_t triangles = 0;
+    double samples = 0;
     std::array<double, 3> low{1e9, 1e9, 1e9}, high{-1e9, -1e9, -1e9};
   };
   std::map<std::uint32_t, Part> parts;
@@ -89,11 +94,19 @@ Truth prune_whole(const std::vector<SlabMesh>& slabs, const PruneRule& rule) {
     for (std::size_t k = 0; k < 3; ++k)
       p.low[k] = std::min(p.low[k], at[v][k]), p.high[k] = std::max(p.high[k], at[v][k]);
   }
-  for (const Triangle& t : triangles) ++parts[label[t[0]]].triangles;
+  for (const Triangle& t : triangles) {
+    Part& p = parts[label[t[0]]];
+    ++p.triangles;
+    const Eigen::Vector3d a(at[t[0]].data()), b(at[t[1]].data()), c(at[t[2]].data());
+    double sum = 0, known = 0;
+    for (const std::uint32_t v : t) sum += density[v], known += density[v] > 0 ? 1 : 0;
+    if (known > 0) p.samples += sum / known * (b - a).cross(c - a).norm() / 2;
+  }
   const auto stays = [&](std::uint32_t v) {
     const Part& p = parts[label[v]];
     const double size = std::hypot(p.high[0] - p.low[0], p.high[1] - p.low[1], p.high[2] - p.low[2]);
-    return p.triangles > 0 && p.triangles >= rule.triangles && size >= rule.size;
+    return p.triangles > 0 && p.triangles >= rule.triangles && p.samples >= static_cast<double>(rule.samples) &&
+           size >= rule.size;
   };
   Truth truth;
   std::vector<std::uint32_t> number(at.size());
@@ -137,6 +150,7 @@ RC_GTEST_PROP(Pruner, LeavesWhatTheWholeMeshWouldLeaveWhateverItsMemory, ()) {
   const auto slabs = random_slabs(random, *rc::gen::inRange<std::size_t>(1, 12), *rc::gen::inRange(1U, 30U),
                                   *rc::gen::element(0.2, 0.6, 2.0));
   const PruneRule rule{*rc::gen::element(std::uint64_t{0}, std::uint64_t{1}, std::uint64_t{3}, std::uint64_t{20}),
+                       *rc::gen::element(std::uint64_t{0}, std::uint64_t{5}, std::uint64_t{40}),
                        *rc::gen::element(0.0, 4.0, 30.0)};
   const Truth truth = prune_whole(slabs, rule);
   const test::TemporaryFolder folder;
@@ -162,13 +176,13 @@ RC_GTEST_PROP(Pruner, LeavesWhatTheWholeMeshWouldLeaveWhateverItsMemory, ()) {
 }
 
 TEST(Pruner, TrianglesThatReachFartherBackAreRefused) {
-  std::mt19937 random(1);
+  std::mt19937 random(4);
   const test::TemporaryFolder folder;
   auto slabs = random_slabs(random, 3, 8, 0);
   for (SlabMesh& s : slabs) ASSERT_GT(s.vertices.size(), 2U);
   slabs[2].triangles.push_back({0, 1, 2});
   PruneCounts counts;
-  EXPECT_THROW(prune_streamed(slabs, {2, 0}, 0, folder.path(), counts), Error);
+  EXPECT_THROW(prune_streamed(slabs, {.triangles = 2}, 0, folder.path(), counts), Error);
   EXPECT_EQ(folder.entries(), 0);
 }
 
@@ -187,7 +201,7 @@ TEST(Pruner, WhatWaitsInTheFileDoesNotWaitInMemory) {
   ASSERT_GT(bytes, 200'000U);
   const test::TemporaryFolder folder;
   Nowhere next;
-  Pruner pruner({1'000'000'000, 0}, folder.path(), next, 0);
+  Pruner pruner({.triangles = 1'000'000'000}, folder.path(), next, 0);
   const std::size_t before = test::heap_bytes();
   pruner.add(slabs[0].vertices, slabs[0].triangles);
   EXPECT_GE(pruner.disk_bytes(), bytes);
