@@ -54,8 +54,7 @@ void add_fit_options(CLI::App& tool, SurfaceSettings& s) {
 
   add_yes_no_or_auto(tool, "--features", s.features,
                      "Sharp edges and corners where the samples' normals show them; of clean clouds normals that were "
-                     "interpolated "
-                     "over edges are found again; auto: where --blend is auto and finds a clean cloud")
+                     "interpolated over edges are found again; auto: where --blend is auto and finds a clean cloud")
       ->group("Fit");
   const std::string lattice = "Octree";
   tool.add_option_function<std::string>(
@@ -99,8 +98,7 @@ void add_hole_options(CLI::App& tool, SurfaceSettings& settings, const std::stri
       tool, "--watertight", settings.watertight,
       "Close all holes, whatever lies around, unless a rim longer than 24 influence radii shows that the surface "
       "is an open one, since the surface does not lead into it; auto: where --blend auto finds a clean, even "
-      "cloud, "
-      "with rims longer than that only if its normals had to be found")
+      "cloud, with rims longer than that only if its normals had to be found")
       ->group(group);
 }
 

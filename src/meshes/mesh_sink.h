@@ -28,7 +28,7 @@ struct VertexBatch {
   std::vector<float> nx, ny, nz;
   std::vector<std::vector<float>> attributes;
   std::vector<float> radius;    ///< local influence radius R; empty where it is of no interest; never written
-  std::vector<float> density;   ///< samples along the surface, 1 / input unit^2, 0 where unknown; empty likewise
+  std::vector<float> density;   ///< samples, 1 / input unit^2, 0 where unknown; empty likewise; never written
   std::vector<float> overhang;  ///< by how much of R they reach beyond the samples; empty likewise; never written
   [[nodiscard]] std::size_t size() const { return x.size(); }
 };

@@ -14,19 +14,19 @@
 
 namespace lamina {
 
-/// What makes a part small; a part that is small by either is left out.
+/// What makes a part small; a part that is small by any of them is left out.
 struct PruneRule {
   std::uint64_t triangles = 0;  ///< fewer than this; 0: any number will do
-  std::uint64_t samples = 0;    ///< fewer than this lie under it, by VertexBatch::density; 0: nobody asks
+  std::uint64_t samples = 0;    ///< fewer than this lie under it, by VertexBatch::density; 0: any number will do
   double size = 0;              ///< the diagonal of its box, input axes, is shorter than this; 0: any size will do
 };
 
 /// Takes a mesh slab by slab and passes on to a sink what stays, vertices and triangles in the order in which they came
 /// and numbered anew. A part is known to be large as soon as it has grown so far, and known to be small once the sweep
 /// has left it; until then it and what came after it waits, beyond some megabytes in an unnamed file. A part that is
-/// small by its size ends within that length of the sweep, one of few triangles within as many cells: what waits is
-/// bounded by that, not by the mesh. Memory otherwise holds four bytes for each vertex of a slab and a record for each
-/// part of the slabs that wait.
+/// small by its size ends within that length of the sweep, one of few triangles within as many cells, one of few
+/// samples within as many supports: what waits is bounded by that, not by the mesh. Memory otherwise holds four bytes
+/// for each vertex of a slab (32 where samples are asked for) and a record for each part of the slabs that wait.
 ///
 /// The bytes that come out do not depend on how much was kept in memory.
 class Pruner {
