@@ -9,7 +9,7 @@
 #include "common/console.h"
 #include "common/help.h"
 #include "common/inputs.h"
-#include "common/option_values.h"
+#include "common/options.h"
 #include "common/outputs.h"
 #include "common/text.h"
 #include "lamina/error.h"

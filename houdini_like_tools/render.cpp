@@ -10,7 +10,7 @@
 #include "common/console.h"
 #include "common/help.h"
 #include "common/model.h"
-#include "common/option_values.h"
+#include "common/options.h"
 #include "common/outputs.h"
 #include "tables.h"
 #include "tool.h"

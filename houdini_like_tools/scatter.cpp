@@ -5,7 +5,7 @@
 
 #include "common/help.h"
 #include "common/inputs.h"
-#include "common/option_values.h"
+#include "common/options.h"
 #include "lamina/error.h"
 #include "lamina/scatter.h"
 #include "tool.h"

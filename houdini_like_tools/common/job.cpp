@@ -19,7 +19,6 @@
 #include "common/console.h"
 #include "common/help.h"
 #include "common/inputs.h"
-#include "common/job_values.h"
 #include "common/text.h"
 #include "lamina/error.h"
 #include "lamina/ranks.h"

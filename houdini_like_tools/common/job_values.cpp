@@ -1,4 +1,4 @@
-#include "common/job_values.h"
+#include "common/job.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

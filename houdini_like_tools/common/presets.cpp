@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <map>
 
-#include "common/option_values.h"
+#include "common/options.h"
 
 namespace lamina::tools {
 namespace {

@@ -1,4 +1,4 @@
-// Statistics as JSON: what --stats writes. docs/reference.md describes every field.
+// Statistics as JSON: what --stats writes. docs/statistics.md describes every field.
 #pragma once
 #include <nlohmann/json.hpp>
 #include <vector>

@@ -31,15 +31,15 @@ struct HoleSettings {
   /// Local influence radii: loops up to this length are closed where the surface around them tells how. 0: none.
   double longest = 8;
   /// Loops up to kWatertight (local influence radii) are closed by the triangulation of least area, longer ones by a
-  /// smooth surface (boundary/closure.h).
+  /// smooth surface (boundary/fill.h).
   Watertight watertight = Watertight::no;
   static constexpr double kWatertight = 24;
   /// Loops up to `longest` around which nothing flat tells how the surface goes on are closed by a smooth surface over
-  /// the rim (boundary/closure.h) where the surface leads into them from all around, the more so the longer they are.
+  /// the rim (boundary/fill.h) where the surface leads into them from all around, the more so the longer they are.
   bool bridge = false;
   /// Vertices' last attribute says which of them were added: those that are get 1.
   bool mark = false;
-  /// What stays open then is closed all the same, by surfaces that rest on nothing but the rims (boundary/closure.h).
+  /// What stays open then is closed all the same, by surfaces that rest on nothing but the rims (boundary/fill.h).
   /// Vertices' last attribute says which were added for that (1), the one before it is that of `mark`.
   bool all = false;
 };

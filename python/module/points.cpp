@@ -9,7 +9,7 @@
 #include "arrays.h"
 #include "common/console.h"
 #include "common/inputs.h"
-#include "common/point_options.h"
+#include "common/options.h"
 #include "functions.h"
 #include "keywords.h"
 #include "lamina/clean.h"

@@ -14,6 +14,15 @@ constexpr std::size_t cell_hash(std::int64_t x, std::int64_t y, std::int64_t z) 
   return static_cast<std::size_t>(mixed ^ mixed >> 32);
 }
 
+/// Every bit of the result depends on every bit of `n` (the finishing steps of MurmurHash3).
+constexpr std::uint64_t scrambled(std::uint64_t n) {
+  n ^= n >> 33U;
+  n *= 0xff51afd7ed558ccdU;
+  n ^= n >> 33U;
+  n *= 0xc4ceb9fe1a85ec53U;
+  return n ^ (n >> 33U);
+}
+
 /// Random numbers as a function of (seed, sample, draw): any sample can be made on any thread, in any order. The
 /// counter goes twice through the finaliser of SplitMix64 (Steele, Lea, Flood 2014).
 class CounterRng {

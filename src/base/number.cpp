@@ -1,5 +1,7 @@
 #include "base/number.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -8,7 +10,57 @@
 #include <limits>
 #include <string_view>
 
+#include "lamina/error.h"
+#include "lamina/length.h"
+
 namespace lamina {
+namespace {
+
+struct Names {
+  ScalarType type;
+  std::string_view classic, sized;
+};
+
+/// In the order of ScalarType.
+constexpr std::array<Names, 8> kNames{{{ScalarType::int8, "char", "int8"},
+                                       {ScalarType::uint8, "uchar", "uint8"},
+                                       {ScalarType::int16, "short", "int16"},
+                                       {ScalarType::uint16, "ushort", "uint16"},
+                                       {ScalarType::int32, "int", "int32"},
+                                       {ScalarType::uint32, "uint", "uint32"},
+                                       {ScalarType::float32, "float", "float32"},
+                                       {ScalarType::float64, "double", "float64"}}};
+
+}  // namespace
+
+double load_scalar(ScalarType type, bool swapped, const std::byte* from) {
+  return with_scalar_type(type, [=](auto zero) {
+    using T = decltype(zero);
+    return static_cast<double>(swapped ? load_big<T>(from) : load_little<T>(from));
+  });
+}
+
+ScalarRange scalar_range(ScalarType type) {
+  return with_scalar_type(type, [](auto zero) -> ScalarRange {
+    using T = decltype(zero);
+    constexpr bool kFloat = std::is_floating_point_v<T>;
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    return {kFloat ? -kInfinity : static_cast<double>(std::numeric_limits<T>::min()),
+            kFloat ? kInfinity : static_cast<double>(std::numeric_limits<T>::max())};
+  });
+}
+
+std::string_view ply_name(ScalarType type) {
+  return kNames.at(static_cast<std::size_t>(type)).classic;
+}
+
+std::optional<ScalarType> ply_type(std::string_view name) {
+  for (const Names& names : kNames) {
+    if (name == names.classic || name == names.sized) return names.type;
+  }
+  return std::nullopt;
+}
+
 namespace {
 
 /// The rest of a number whose beginning, [p, stop), was read as `value`: a word for what is no number, or an exponent
@@ -99,6 +151,54 @@ std::optional<std::uint64_t> parse_whole(std::string_view word) {
   const char* const end = word.data() + word.size();
   const auto [stop, error] = std::from_chars(word.data(), end, value);
   return error == std::errc{} && stop == end ? std::optional(value) : std::nullopt;
+}
+
+Length parse_length(std::string_view text) {
+  const auto refuse = [&](std::string_view why) {
+    throw Error(ExitCode::usage,
+                fmt::format("'{}' is not a length: {}; write 0.01 (input units), 0.6r (sample radii) or "
+                            "0.9R (influence radii)",
+                            text, why));
+  };
+  Length length;
+  const char* const end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data(), end, length.value);
+  if (error != std::errc{}) refuse(error == std::errc::result_out_of_range ? "number out of range" : "no number");
+  if (!std::isfinite(length.value)) refuse("not finite");
+  if (length.value < 0 || std::signbit(length.value)) refuse("negative");
+  const std::string_view suffix(rest, static_cast<std::size_t>(end - rest));
+  if (suffix == "r") {
+    length.unit = Length::Unit::sample_radius;
+  } else if (suffix == "R") {
+    length.unit = Length::Unit::influence_radius;
+  } else if (!suffix.empty()) {
+    refuse(fmt::format("unknown unit '{}'", suffix));
+  }
+  return length;
+}
+
+std::string to_string(const Length& length) {
+  switch (length.unit) {
+    case Length::Unit::sample_radius:
+      return fmt::format("{}r", length.value);
+    case Length::Unit::influence_radius:
+      return fmt::format("{}R", length.value);
+    case Length::Unit::world:
+      break;
+  }
+  return fmt::format("{}", length.value);
+}
+
+double resolve(const Length& length, double sample_radius, double blend) {
+  switch (length.unit) {
+    case Length::Unit::sample_radius:
+      return length.value * sample_radius;
+    case Length::Unit::influence_radius:
+      return length.value * sample_radius * blend;
+    case Length::Unit::world:
+      break;
+  }
+  return length.value;
 }
 
 }  // namespace lamina

@@ -1,4 +1,4 @@
-#include "base/staged_folder.h"
+#include "base/output_file.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -11,7 +11,6 @@
 #include <filesystem>
 #include <system_error>
 
-#include "base/output_file.h"
 #include "lamina/error.h"
 
 namespace lamina {

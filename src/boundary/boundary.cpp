@@ -7,7 +7,9 @@
 #include <type_traits>
 #include <utility>
 
+#include "base/hashing.h"
 #include "lamina/error.h"
+#include "meshes/vec3.h"
 
 namespace lamina::boundary {
 namespace {
@@ -38,25 +40,6 @@ void get(std::span<const std::byte>& left, std::vector<T>& values) {
   values.resize(before + count);
   if (count > 0) std::memcpy(values.data() + before, left.data(), count * sizeof(T));
   left = left.subspan(count * sizeof(T));
-}
-
-/// Spreads a number over 64 bits (the finishing steps of MurmurHash3), so that sums vanish for nothing but pairs.
-std::uint64_t spread(std::uint64_t n) {
-  n ^= n >> 33U;
-  n *= 0xff51afd7ed558ccdU;
-  n ^= n >> 33U;
-  n *= 0xc4ceb9fe1a85ec53U;
-  return n ^ (n >> 33U);
-}
-
-std::array<double, 3> triangle_normal(const std::array<double, 3>& a, const std::array<double, 3>& b,
-                                      const std::array<double, 3>& c) {
-  std::array<double, 3> u{}, v{};
-  for (std::size_t k = 0; k < 3; ++k) {
-    u[k] = b[k] - a[k];
-    v[k] = c[k] - a[k];
-  }
-  return {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]};
 }
 
 }  // namespace
@@ -95,7 +78,8 @@ void BoundaryFinder::count(const Triangles& triangles) {
     if (t[0] < slabs_[1].first || t[1] < slabs_[1].first || t[2] < slabs_[1].first || t[0] >= end || t[1] >= end ||
         t[2] >= end)
       throw Error(ExitCode::internal, "boundary: a triangle names a vertex of none of the last two slabs");
-    const std::uint64_t a = spread(t[0]), b = spread(t[1]), c = spread(t[2]);
+    // Scrambled, so that sums vanish for nothing but pairs.
+    const std::uint64_t a = scrambled(t[0]), b = scrambled(t[1]), c = scrambled(t[2]);
     turns_[t[0] - base_] += b - c;
     turns_[t[1] - base_] += c - a;
     turns_[t[2] - base_] += a - b;
@@ -144,7 +128,7 @@ void BoundaryFinder::settle(bool loose, BoundaryBatch& out) {
     }
     const auto& t = e.triangle;
     BoundaryEdge boundary{number(e.up ? e.low : e.high), number(e.up ? e.high : e.low),
-                          triangle_normal(position(t[0]), position(t[1]), position(t[2]))};
+                          meshes::area_normal(position(t[0]), position(t[1]), position(t[2]))};
     (loose ? out.loose : out.edges).push_back(boundary);
   }
 }

@@ -1,4 +1,4 @@
-#include "boundary/closure.h"
+#include "boundary/fill.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,8 +8,6 @@
 #include <Eigen/Geometry>
 #include <Eigen/Sparse>
 #include <Eigen/SparseCholesky>
-
-#include "boundary/closure_mesh.h"
 
 namespace lamina::boundary {
 namespace {

@@ -1,4 +1,4 @@
-#include "boundary/closure_mesh.h"
+#include "boundary/fill.h"
 
 #include <algorithm>
 #include <cmath>

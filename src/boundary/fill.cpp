@@ -8,7 +8,6 @@
 #include <Eigen/Geometry>
 
 #include "boundary/gap_surface.h"
-#include "boundary/triangulate_polygon.h"
 
 namespace lamina::boundary {
 namespace {

@@ -1,10 +1,11 @@
 // A closed boundary loop's filling: whether the samples around support one, and its triangles.
 #pragma once
+#include <Eigen/Core>
+
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <vector>
-
-#include <Eigen/Core>
 
 #include "boundary/boundary.h"
 #include "boundary/gap_surface.h"
@@ -35,7 +36,7 @@ enum class Verdict : std::uint8_t {
   bent,            ///< normals around it do not agree, or do not belong to one quadric: nothing says what lies between
   occupied,        ///< other boundary loops run through the gap
   joined,          ///< an island's outer boundary: the filling around it goes on to it
-  invented,        ///< by a closure that rests on nothing but the rim (closure.h)
+  invented,        ///< by a closure that rests on nothing but the rim (close_loop())
 };
 
 /// For stats and messages.
@@ -79,5 +80,57 @@ class FilledPlace {
   std::vector<Eigen::Vector3d> points_;
   std::vector<std::array<std::uint32_t, 3>> triangles_;
 };
+
+// The triangles of an invented closure: a disc within a closed polygon in space, no chord of the polygon in it.
+
+/// Edges grow by this much for each length of distance from the rim.
+inline constexpr double kClosureGrading = 0.4;
+/// Edges are split and contracted beyond these multiples of the length wanted.
+inline constexpr double kLongestEdge = 1.4;
+inline constexpr double kShortestEdge = 0.6;
+
+using Points = std::vector<Eigen::Vector3d>;
+using Triangles = std::vector<std::array<std::uint32_t, 3>>;
+
+/// Of `points` the first `rim` are the polygon's, in its order; every other one is new.
+struct Disc {
+  std::size_t rim = 0;
+  Points points;
+  Triangles triangles;
+};
+
+/// Rings of ever fewer vertices around one in the middle. The new vertices have no places yet.
+Disc nested_rings(const Points& polygon);
+
+/// Long edges are split, short ones contracted, and edges flipped to Delaunay's, until they are about as long as the
+/// rim's beside them, longer ones farther inside. Never joins two vertices of the rim.
+void make_even(Disc& disc);
+
+// A boundary loop closed whatever lies around it: for loops around which nothing tells how the surface goes on, in
+// meshes that have to be closed all the same, or are those of closed things.
+
+/// A closure that would lie flat across the opening at no more than this angle to the surface around goes on as that
+/// does: an opening in something round. From the second angle on it leaves the rim at a right angle to it.
+inline constexpr double kGoesOn = 0.52;    // 30 degrees
+inline constexpr double kTurnsOff = 1.57;  // 90 degrees
+/// A loop whose closure lies, on the average, back over the surface itself (cosine of that angle) is the outer boundary
+/// of a sheet, and closed behind it.
+inline constexpr double kLiesBack = -0.3;
+/// Directions along a rim are means over this share of its edges to either side.
+inline constexpr double kRimWindow = 0.02;
+
+struct Closure {
+  Filling filling;
+  /// Mean cosine, along the rim, of the angle between the flat closure and the surface's continuation: 1 where the
+  /// surface goes on into the opening, 0 at the end of a tube, -1 at the outer boundary of a sheet.
+  double leads_in = 0;
+};
+
+/// A disc of new vertices and triangles, whatever the loop looks like, so that a mesh whose loops all get theirs is
+/// closed and manifold. Every triangle has a new vertex, so that no edge of the mesh is used again. Triangles grow
+/// with the distance from the rim. The surface is a membrane over the rim, moved by the displacement of least bending
+/// that lets it leave the rim as the constants above say (Botsch and Kobbelt 2004; Jacobson et al. 2010). Depends on
+/// the loop alone. Memory: some ten kilobytes for each of its edges.
+Closure close_loop(const Loop& loop);
 
 }  // namespace lamina::boundary

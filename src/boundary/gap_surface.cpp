@@ -9,7 +9,6 @@
 #include <cmath>
 #include <map>
 
-#include "boundary/triangulate_polygon.h"
 #include "lamina/error.h"
 
 namespace lamina::boundary {

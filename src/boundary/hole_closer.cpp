@@ -9,7 +9,7 @@
 #include <map>
 #include <set>
 
-#include "boundary/closure.h"
+#include "boundary/fill.h"
 #include "lamina/error.h"
 
 namespace lamina {

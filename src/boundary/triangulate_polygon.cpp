@@ -1,4 +1,4 @@
-#include "boundary/triangulate_polygon.h"
+#include "boundary/gap_surface.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "chunks/merge_parts.h"
+#include "chunks/part_file.h"
 
 #include <fmt/format.h>
 
@@ -10,9 +10,9 @@
 #include "boundary/hole_closer.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
+#include "meshes/formats.h"
+#include "meshes/mesh_sink.h"
 #include "meshes/stored_mesh.h"
-#include "meshes/streamed_ply.h"
-#include "meshes/writers.h"
 #include "simplify/streamed.h"
 
 namespace lamina {

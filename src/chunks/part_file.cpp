@@ -12,11 +12,11 @@
 #include <limits>
 #include <utility>
 
-#include "base/scalar_type.h"
+#include "base/number.h"
 #include "boundary/boundary.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
-#include "meshes/streamed_ply.h"
+#include "meshes/mesh_sink.h"
 
 namespace lamina {
 namespace {

@@ -15,14 +15,13 @@
 
 #include "base/descriptor.h"
 #include "base/output_file.h"
-#include "base/staged_folder.h"
 #include "chunks/cuts.h"
 #include "chunks/part_file.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "lamina/run.h"
 #include "reconstruct/job.h"
-#include "reconstruct/kept_input.h"
+#include "reconstruct/stored_cloud.h"
 
 namespace lamina {
 namespace {

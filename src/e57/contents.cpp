@@ -1,4 +1,4 @@
-#include "e57/contents.h"
+#include "e57/e57.h"
 
 #include <expat.h>
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-#include "e57/paged_file.h"
+#include "e57/e57.h"
 
 #include <fmt/format.h>
 #include <nmmintrin.h>
@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "base/descriptor.h"
-#include "base/little_endian.h"
+#include "base/number.h"
 #include "lamina/error.h"
 
 namespace lamina::e57 {

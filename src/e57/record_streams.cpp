@@ -1,4 +1,4 @@
-#include "e57/record_streams.h"
+#include "e57/e57.h"
 
 #include <fmt/format.h>
 
@@ -9,7 +9,7 @@
 #include <span>
 #include <utility>
 
-#include "base/little_endian.h"
+#include "base/number.h"
 
 namespace lamina::e57 {
 namespace {

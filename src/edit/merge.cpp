@@ -6,7 +6,7 @@
 #include <limits>
 #include <optional>
 
-#include "base/scalar_type.h"
+#include "base/number.h"
 #include "lamina/error.h"
 
 namespace lamina {

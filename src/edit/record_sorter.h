@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "base/background_writer.h"
 #include "base/spill_file.h"
 
 namespace lamina::edit {

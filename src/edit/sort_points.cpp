@@ -19,7 +19,7 @@
 #include "edit/batch_pipe.h"
 #include "edit/record_sorter.h"
 #include "lamina/error.h"
-#include "points/binary_rows.h"
+#include "points/point_columns.h"
 
 namespace lamina {
 namespace {

@@ -5,7 +5,7 @@
 #include <memory>
 #include <utility>
 
-#include "base/little_endian.h"
+#include "base/number.h"
 #include "laz/arithmetic_coder.h"
 #include "laz/core_layer.h"
 #include "laz/field_codecs.h"

@@ -8,7 +8,7 @@
 #include <memory>
 #include <utility>
 
-#include "base/little_endian.h"
+#include "base/number.h"
 #include "laz/arithmetic_coder.h"
 #include "laz/field_codecs.h"
 

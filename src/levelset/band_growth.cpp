@@ -1,4 +1,4 @@
-#include "levelset/band_growth.h"
+#include "levelset/band.h"
 
 #include <tbb/parallel_for.h>
 
@@ -8,7 +8,6 @@
 #include <optional>
 
 #include "lattice/morphology.h"
-#include "levelset/band.h"
 
 namespace lamina::volume {
 namespace {

@@ -22,7 +22,7 @@ inline constexpr int kMaxRounds = 8;
 /// whoever reads one wants the other.
 typedef float Plane __attribute__((vector_size(16)));  // NOLINT(modernize-use-using): attributes on typedefs
 
-/// The band grows by steps that lead away from the surface by so much at least (Stencil in band_growth.h), voxels;
+/// The band grows by steps that lead away from the surface by so much at least (Stencil in band.h), voxels;
 /// those along two axes or three at once by more.
 inline constexpr float kShortestStep = 0.5F, kShortestOblique = 1.118F;
 

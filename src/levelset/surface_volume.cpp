@@ -23,7 +23,7 @@
 #include "lamina/frame.h"
 #include "lamina/volume_export.h"
 #include "lamina/volume_points.h"
-#include "levelset/brick_leaves.h"
+#include "levelset/band.h"
 #include "vdb/points_grid.h"
 #include "vdb/streamed_vdb.h"
 #include "vdb/vdb_file.h"

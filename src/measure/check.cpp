@@ -104,7 +104,7 @@ void check_triangles(const TriangleMesh& mesh, CheckReport& r) {
     }
     const Vec3 a = mesh.positions[t[0]], b = mesh.positions[t[1]], c = mesh.positions[t[2]];
     const double longest = std::max({norm(b - a), norm(c - b), norm(a - c)});
-    if (norm(cross(b - a, c - a)) <= 1e-12 * longest * longest) ++r.zero_area_triangles;
+    if (norm(area_normal(a, b, c)) <= 1e-12 * longest * longest) ++r.zero_area_triangles;
   }
   r.duplicate_triangles = count_duplicate_triangles(mesh);
 }

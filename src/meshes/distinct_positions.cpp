@@ -9,17 +9,10 @@
 #include <type_traits>
 #include <utility>
 
+#include "base/hashing.h"
+
 namespace lamina {
 namespace {
-
-/// The finishing steps of MurmurHash3: every bit of the result depends on every bit of `n`.
-std::uint64_t scramble(std::uint64_t n) {
-  n ^= n >> 33U;
-  n *= 0xff51afd7ed558ccdU;
-  n ^= n >> 33U;
-  n *= 0xc4ceb9fe1a85ec53U;
-  return n ^ (n >> 33U);
-}
 
 /// The bits of a coordinate; 0 and -0 are one position.
 template <class T>
@@ -30,9 +23,9 @@ std::uint64_t bits_of(double c) {
 
 template <class T>
 std::uint64_t hash_of(double x, double y, double z) {
-  std::uint64_t h = scramble(bits_of<T>(x) + 0x9E3779B97F4A7C15U);
-  h = scramble(h ^ bits_of<T>(y));
-  return scramble(h ^ bits_of<T>(z));
+  std::uint64_t h = scrambled(bits_of<T>(x) + 0x9E3779B97F4A7C15U);
+  h = scrambled(h ^ bits_of<T>(y));
+  return scrambled(h ^ bits_of<T>(z));
 }
 
 /// `c` as a T, so many steps further on, each the spacing of numbers at `largest`.

@@ -11,7 +11,7 @@
 #include <system_error>
 #include <utility>
 
-#include "base/little_endian.h"
+#include "base/number.h"
 #include "lamina/error.h"
 #include "meshes/glb.h"
 

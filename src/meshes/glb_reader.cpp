@@ -15,13 +15,12 @@
 #include <utility>
 #include <vector>
 
-#include "base/scalar_type.h"
+#include "base/number.h"
 #include "lamina/error.h"
 #include "lamina/mesh.h"
 #include "meshes/colours.h"
+#include "meshes/formats.h"
 #include "meshes/glb_file.h"
-#include "meshes/glb_seats.h"
-#include "meshes/readers.h"
 
 namespace lamina::meshes {
 namespace {

@@ -17,9 +17,8 @@
 #include <utility>
 #include <vector>
 
-#include "base/little_endian.h"
+#include "base/number.h"
 #include "lamina/error.h"
-#include "meshes/glb_writer.h"
 #include "meshes/mesh_blocks.h"
 
 namespace lamina::meshes {

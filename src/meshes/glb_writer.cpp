@@ -1,4 +1,4 @@
-#include "meshes/glb_writer.h"
+#include "meshes/glb.h"
 
 #include <fmt/format.h>
 
@@ -16,14 +16,12 @@
 #include <utility>
 #include <vector>
 
-#include "base/little_endian.h"
+#include "base/number.h"
 #include "base/output_file.h"
-#include "base/scalar_type.h"
 #include "lamina/error.h"
 #include "meshes/colours.h"
-#include "meshes/glb.h"
+#include "meshes/formats.h"
 #include "meshes/mesh_blocks.h"
-#include "meshes/writers.h"
 
 namespace lamina::meshes {
 namespace {

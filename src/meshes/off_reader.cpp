@@ -10,7 +10,7 @@
 
 #include "base/number.h"
 #include "lamina/error.h"
-#include "meshes/readers.h"
+#include "meshes/formats.h"
 
 namespace lamina::meshes {
 namespace {

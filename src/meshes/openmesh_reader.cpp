@@ -15,10 +15,9 @@
 #include <istream>
 #include <mutex>
 
-#include "base/little_endian.h"
 #include "base/number.h"
 #include "lamina/error.h"
-#include "meshes/readers.h"
+#include "meshes/formats.h"
 
 namespace lamina::meshes {
 namespace {

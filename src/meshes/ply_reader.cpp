@@ -10,9 +10,8 @@
 
 #include "base/descriptor.h"
 #include "base/number.h"
-#include "base/scalar_type.h"
 #include "lamina/error.h"
-#include "meshes/readers.h"
+#include "meshes/formats.h"
 #include "points/ply_header.h"
 
 namespace lamina::meshes {

@@ -11,8 +11,8 @@
 #include "lamina/error.h"
 #include "lamina/file_ending.h"
 #include "lamina/mesh.h"
-#include "meshes/readers.h"
-#include "points/sniff.h"
+#include "meshes/formats.h"
+#include "points/formats.h"
 #include "points/text_rows.h"
 
 namespace lamina::meshes {

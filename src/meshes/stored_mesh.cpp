@@ -18,13 +18,11 @@
 #include <vector>
 
 #include "base/descriptor.h"
-#include "base/little_endian.h"
+#include "base/number.h"
 #include "base/output_file.h"
-#include "base/scalar_type.h"
 #include "lamina/error.h"
-#include "meshes/readers.h"
-#include "meshes/streamed_ply.h"
-#include "meshes/writers.h"
+#include "meshes/formats.h"
+#include "meshes/mesh_sink.h"
 #include "points/ply_header.h"
 
 namespace lamina {

@@ -8,12 +8,12 @@
 
 #include "base/descriptor.h"
 #include "lamina/run.h"
+#include "meshes/formats.h"
 #include "meshes/mesh_sink.h"
-#include "meshes/writers.h"
 
 namespace lamina {
 
-/// Where the records of streamed_ply.h begin, vertices and faces each in one piece.
+/// Where the records of a streamed mesh (mesh_sink.h) begin, vertices and faces each in one piece.
 struct StoredMesh {
   int vertex_file = -1;
   std::uint64_t vertex_offset = 0;

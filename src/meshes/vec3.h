@@ -25,6 +25,13 @@ inline Vec3 cross(const Vec3& a, const Vec3& b) {
 inline double norm(const Vec3& a) {
   return std::sqrt(dot(a, a));
 }
+/// Across the triangle of these corners, anticlockwise as seen from its end; as long as twice the area.
+inline Vec3 area_normal(const Vec3& a, const Vec3& b, const Vec3& c) {
+  return cross(b - a, c - a);
+}
+inline double triangle_area(const Vec3& a, const Vec3& b, const Vec3& c) {
+  return 0.5 * norm(area_normal(a, b, c));
+}
 /// a of length one; zero stays zero.
 inline Vec3 unit(const Vec3& a) {
   const double n = norm(a);

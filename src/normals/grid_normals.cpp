@@ -12,6 +12,7 @@
 
 #include "base/spill_file.h"
 #include "lamina/error.h"
+#include "points/filters.h"
 
 namespace lamina::normals {
 namespace {
@@ -111,16 +112,13 @@ using Normal = std::array<float, 3>;
 constexpr std::size_t kPiece = std::size_t{1} << 15;  ///< rows
 
 /// The source's rows with the normals of a file that holds one for each.
-class WithGridNormals final : public PointSource {
+class WithGridNormals final : public WithNormals {
  public:
   WithGridNormals(std::unique_ptr<PointSource> source, SpillFile file)
-      : source_(std::move(source)), file_(std::move(file)) {
-    info_ = source_->info();
-    info_.found_normals = !info_.has_normals;
-    info_.has_normals = true;
-  }
-  void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
-    source_->read(first, count, out);
+      : WithNormals(std::move(source)), file_(std::move(file)) {}
+
+ private:
+  void give_normals(SampleBatch& out) const override {
     std::vector<Normal> normals(out.size());
     file_.read(out.first * sizeof(Normal), std::as_writable_bytes(std::span(normals)));
     for (auto* axis : {&out.nx, &out.ny, &out.nz}) axis->resize(out.size());
@@ -131,8 +129,6 @@ class WithGridNormals final : public PointSource {
     }
   }
 
- private:
-  std::unique_ptr<PointSource> source_;
   SpillFile file_;
 };
 

@@ -8,7 +8,7 @@
 
 #include "base/union_find.h"
 #include "normals/sample_window.h"
-#include "normals/sides.h"
+#include "normals/sight.h"
 
 namespace lamina::normals {
 namespace {

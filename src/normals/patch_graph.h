@@ -63,7 +63,7 @@ struct PatchSigns {
 /// patches joins the one that it has most to say about, for or against, and the sums are taken anew between the
 /// clusters. Votes are links to the fixed node. Clusters whose links contradict each other too much to follow wait
 /// until those that enclose a volume have been turned outside out, or inside out if it is a room. What then still is
-/// not joined to the fixed node gets its side by itself (normals/sides.h). Deterministic.
+/// not joined to the fixed node gets its side by itself (Sides). Deterministic.
 PatchSigns find_signs(const PatchGraph& graph, const InputAxes& axes);
 
 /// Conflicts that remain, by slab.

@@ -1,4 +1,4 @@
-#include "normals/patches.h"
+#include "normals/sample_window.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>

@@ -8,6 +8,7 @@
 
 #include "lamina/error.h"
 #include "normals/sample_window.h"
+#include "points/filters.h"
 #include "store/block_codec.h"
 
 namespace lamina::normals {
@@ -36,22 +37,14 @@ RowRecord record_at(const std::byte* bytes) {
   return r;
 }
 
-class PointsWithNormals final : public PointSource {
+class WithRowNormals final : public WithNormals {
  public:
-  PointsWithNormals(std::unique_ptr<PointSource> source, std::unique_ptr<RowNormals> normals)
-      : source_(std::move(source)), normals_(std::move(normals)) {
-    info_ = source_->info();
-    info_.found_normals = !info_.has_normals;
-    info_.has_normals = true;
-  }
-  void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
-    source_->read(first, count, out);
-    out.first = first;
-    normals_->apply(out);
-  }
+  WithRowNormals(std::unique_ptr<PointSource> source, std::unique_ptr<RowNormals> normals)
+      : WithNormals(std::move(source)), normals_(std::move(normals)) {}
 
  private:
-  std::unique_ptr<PointSource> source_;
+  void give_normals(SampleBatch& rows) const override { normals_->apply(rows); }
+
   std::unique_ptr<RowNormals> normals_;
 };
 
@@ -120,7 +113,7 @@ void RowNormals::apply(SampleBatch& batch) const {
 }
 
 std::unique_ptr<PointSource> give_normals(std::unique_ptr<PointSource> source, std::unique_ptr<RowNormals> normals) {
-  return std::make_unique<PointsWithNormals>(std::move(source), std::move(normals));
+  return std::make_unique<WithRowNormals>(std::move(source), std::move(normals));
 }
 
 }  // namespace lamina::normals

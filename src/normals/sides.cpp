@@ -1,4 +1,4 @@
-#include "normals/sides.h"
+#include "normals/sight.h"
 
 #include <algorithm>
 #include <cmath>

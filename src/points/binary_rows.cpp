@@ -1,4 +1,4 @@
-#include "points/binary_rows.h"
+#include "points/point_columns.h"
 
 #include <fmt/format.h>
 
@@ -8,8 +8,7 @@
 #include <string_view>
 
 #include "base/descriptor.h"
-#include "base/little_endian.h"
-#include "base/scalar_type.h"
+#include "base/number.h"
 #include "lamina/error.h"
 
 namespace lamina {

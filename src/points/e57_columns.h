@@ -7,8 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "e57/contents.h"
-#include "e57/paged_file.h"
+#include "e57/e57.h"
 #include "points/point_columns.h"
 #include "points/scans.h"
 

@@ -11,13 +11,11 @@
 #include <utility>
 #include <vector>
 
-#include "e57/contents.h"
-#include "e57/paged_file.h"
-#include "e57/record_streams.h"
+#include "e57/e57.h"
 #include "lamina/points.h"
 #include "points/e57_columns.h"
+#include "points/formats.h"
 #include "points/point_columns.h"
-#include "points/readers.h"
 #include "points/scans.h"
 
 namespace lamina {

@@ -13,13 +13,12 @@
 #include <string_view>
 #include <vector>
 
-#include "base/little_endian.h"
-#include "base/scalar_type.h"
-#include "e57/paged_file.h"
+#include "base/number.h"
+#include "e57/e57.h"
 #include "lamina/error.h"
 #include "lamina/run.h"
-#include "points/binary_rows.h"
-#include "points/writers.h"
+#include "points/formats.h"
+#include "points/point_columns.h"
 
 namespace lamina {
 namespace {

@@ -11,7 +11,7 @@
 #include <memory>
 
 #include "lamina/error.h"
-#include "points/sniff.h"
+#include "points/formats.h"
 
 namespace lamina {
 namespace {

@@ -1,4 +1,4 @@
-#include "points/las_header.h"
+#include "points/las.h"
 
 #include <fmt/format.h>
 
@@ -10,9 +10,8 @@
 #include <string_view>
 #include <utility>
 
-#include "base/little_endian.h"
+#include "base/number.h"
 #include "lamina/error.h"
-#include "points/laz_chunks.h"
 #include "points/ply_header.h"
 #include "points/point_columns.h"
 

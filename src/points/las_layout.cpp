@@ -1,4 +1,4 @@
-#include "points/las_layout.h"
+#include "points/las.h"
 
 #include <fmt/format.h>
 
@@ -10,11 +10,9 @@
 #include <string_view>
 #include <utility>
 
-#include "base/little_endian.h"
-#include "base/scalar_type.h"
+#include "base/number.h"
 #include "lamina/error.h"
 #include "lamina/run.h"
-#include "points/las_header.h"
 
 namespace lamina {
 

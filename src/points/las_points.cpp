@@ -13,13 +13,10 @@
 #include <utility>
 #include <vector>
 
-#include "points/binary_rows.h"
-#include "points/las_header.h"
-#include "points/las_layout.h"
-#include "points/las_records.h"
+#include "points/filters.h"
+#include "points/formats.h"
+#include "points/las.h"
 #include "points/point_columns.h"
-#include "points/readers.h"
-#include "points/select_points.h"
 
 namespace lamina {
 namespace {

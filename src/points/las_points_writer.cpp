@@ -12,16 +12,13 @@
 #include <string>
 #include <vector>
 
-#include "base/background_writer.h"
 #include "base/descriptor.h"
-#include "base/little_endian.h"
+#include "base/number.h"
 #include "base/spill_file.h"
 #include "laz/chunks.h"
-#include "points/binary_rows.h"
-#include "points/las_header.h"
-#include "points/las_layout.h"
-#include "points/laz_packing.h"
-#include "points/writers.h"
+#include "points/formats.h"
+#include "points/las.h"
+#include "points/point_columns.h"
 
 namespace lamina {
 namespace {

@@ -1,4 +1,4 @@
-#include "points/laz_chunks.h"
+#include "points/las.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 #include <span>
 #include <string>
 
-#include "base/little_endian.h"
+#include "base/number.h"
 #include "lamina/error.h"
 #include "laz/arithmetic_coder.h"
 #include "laz/chunks.h"

@@ -5,11 +5,9 @@
 #include <utility>
 
 #include "base/descriptor.h"
-#include "base/little_endian.h"
-#include "base/scalar_type.h"
+#include "base/number.h"
 #include "base/spill_file.h"
 #include "lamina/error.h"
-#include "points/binary_rows.h"
 #include "points/point_columns.h"
 
 namespace lamina {

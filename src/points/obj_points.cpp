@@ -6,8 +6,8 @@
 
 #include "base/number.h"
 #include "lamina/error.h"
+#include "points/formats.h"
 #include "points/point_columns.h"
-#include "points/readers.h"
 #include "points/text_rows.h"
 
 namespace lamina {

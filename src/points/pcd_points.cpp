@@ -6,13 +6,12 @@
 #include <bit>
 #include <optional>
 
-#include "base/little_endian.h"
+#include "base/number.h"
 #include "lamina/error.h"
-#include "points/binary_rows.h"
+#include "points/formats.h"
 #include "points/input_file.h"
 #include "points/pcd_header.h"
 #include "points/point_columns.h"
-#include "points/readers.h"
 #include "points/scans.h"
 #include "points/text_rows.h"
 

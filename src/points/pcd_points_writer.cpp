@@ -8,11 +8,11 @@
 #include <set>
 #include <string_view>
 
-#include "base/background_writer.h"
 #include "base/descriptor.h"
+#include "base/spill_file.h"
 #include "lamina/error.h"
-#include "points/binary_rows.h"
-#include "points/writers.h"
+#include "points/formats.h"
+#include "points/point_columns.h"
 
 namespace lamina {
 namespace {

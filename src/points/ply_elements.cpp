@@ -1,4 +1,4 @@
-#include "points/ply_elements.h"
+#include "points/ply_header.h"
 
 #include <fmt/format.h>
 
@@ -9,10 +9,9 @@
 #include <string_view>
 
 #include "base/number.h"
-#include "base/scalar_type.h"
 #include "lamina/error.h"
+#include "points/filters.h"
 #include "points/input_file.h"
-#include "points/project_degrees.h"
 #include "points/text_rows.h"
 
 namespace lamina {

@@ -8,7 +8,6 @@
 #include <set>
 
 #include "base/number.h"
-#include "base/scalar_type.h"
 #include "lamina/error.h"
 
 namespace lamina {

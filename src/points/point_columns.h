@@ -2,11 +2,14 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "lamina/attributes.h"
 #include "lamina/points.h"
+#include "points/input_file.h"
 
 namespace lamina {
 
@@ -60,5 +63,60 @@ std::vector<ColumnTarget> prepare_batch(const PointSourceInfo& info, const std::
 
 /// Once the rows are read: the floats of the attributes that were read as doubles.
 void round_exact_attributes(SampleBatch& batch);
+
+// Rows of points as bytes of fixed size: read a block at a time and taken apart column by column, and written.
+
+/// out[i] = the value of `type` at row + i * stride, for i < count. `swapped`: bytes stand in the other order than this
+/// machine's.
+template <class Out>
+void convert_column(ScalarType type, bool swapped, const std::byte* row, std::size_t stride, std::size_t count,
+                    Out* out);
+
+extern template void convert_column(ScalarType, bool, const std::byte*, std::size_t, std::size_t, float*);
+extern template void convert_column(ScalarType, bool, const std::byte*, std::size_t, std::size_t, double*);
+
+/// Where rows lie in a file.
+struct BinaryRows {
+  std::uint64_t data = 0;  ///< offset of row 0
+  std::size_t stride = 0;  ///< bytes of a row
+  bool swapped = false;    ///< the other byte order than this machine's
+};
+
+/// Called with rows `bytes` on: `count` of them, which are those from `at` on of a range.
+using TakeRows = std::function<void(const std::byte* bytes, std::size_t at, std::size_t count)>;
+
+/// Hands the rows of the range over, in order and a block at a time. From any thread.
+/// Throws Error(unreadable) when the file has become shorter since it was opened.
+void read_row_blocks(const InputFile& file, const BinaryRows& rows, RowRange range, const TakeRows& take);
+
+/// Takes `count` rows apart: their values go to the targets' places from `at` on.
+void convert_rows(const BinaryRows& layout, const std::vector<PointColumn>& columns, const std::byte* bytes,
+                  std::size_t at, std::size_t count, const std::vector<ColumnTarget>& targets);
+
+/// Fills the targets with the rows of the range. From any thread.
+/// Throws Error(unreadable) when the file has become shorter since it was opened.
+void read_binary_rows(const InputFile& file, const BinaryRows& rows, const std::vector<PointColumn>& columns,
+                      RowRange range, const std::vector<ColumnTarget>& targets);
+
+/// Rows as bytes and back: x y z, nx ny nz, radius, quality, attributes, each in its own type, little-endian, without
+/// gaps.
+class RowCodec {
+ public:
+  explicit RowCodec(const PointColumns& columns);
+  [[nodiscard]] std::size_t row_bytes() const { return row_bytes_; }
+
+  /// Throws Error(internal) when an array the columns need is missing or shorter than the batch, or a number is not
+  /// finite in the type it is written as; `first` is the number of the batch's first row and `name` the file's, for the
+  /// message.
+  void require_writable(const SampleBatch& batch, std::uint64_t first, const std::string& name) const;
+  /// Writes rows [first, first + count) of a batch that is writable. Floats are rounded to integers and clamped.
+  void encode(const SampleBatch& batch, std::size_t first, std::size_t count, std::byte* out) const;
+  /// The batch of `count` rows that stand `stride` bytes apart.
+  void decode(const std::byte* rows, std::size_t stride, std::size_t count, SampleBatch& out) const;
+
+ private:
+  PointColumns columns_;
+  std::size_t row_bytes_ = 0;
+};
 
 }  // namespace lamina

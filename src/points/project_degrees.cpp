@@ -1,5 +1,5 @@
 // Longitude and latitude to metres in a plane.
-#include "points/project_degrees.h"
+#include "points/filters.h"
 
 #include <fmt/format.h>
 

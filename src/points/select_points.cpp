@@ -1,4 +1,4 @@
-#include "points/select_points.h"
+#include "points/filters.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

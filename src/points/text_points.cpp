@@ -6,13 +6,11 @@
 #include <string_view>
 
 #include "base/number.h"
-#include "base/scalar_type.h"
 #include "lamina/error.h"
 #include "lamina/file_ending.h"
+#include "points/formats.h"
 #include "points/point_columns.h"
-#include "points/readers.h"
 #include "points/text_rows.h"
-#include "points/text_sample.h"
 
 namespace lamina {
 namespace {

@@ -1,4 +1,4 @@
-#include "points/text_sample.h"
+#include "points/text_rows.h"
 
 #include <fmt/format.h>
 
@@ -11,7 +11,6 @@
 #include "base/number.h"
 #include "lamina/error.h"
 #include "points/point_columns.h"
-#include "points/text_rows.h"
 
 namespace lamina {
 namespace {

@@ -4,9 +4,9 @@
 
 #include "lamina/error.h"
 #include "lamina/volume_points.h"
+#include "points/formats.h"
 #include "points/input_file.h"
 #include "points/point_columns.h"
-#include "points/readers.h"
 
 namespace lamina {
 namespace {

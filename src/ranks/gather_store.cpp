@@ -1,4 +1,4 @@
-#include "ranks/gather_store.h"
+#include "ranks/together.h"
 
 #include <algorithm>
 #include <array>
@@ -7,7 +7,8 @@
 #include <utility>
 
 #include "lamina/error.h"
-#include "store/store_blocks.h"
+#include "store/block_codec.h"
+#include "store/slab_store.h"
 
 namespace lamina::ranks {
 namespace {

@@ -1,4 +1,4 @@
-#include "ranks/read_together.h"
+#include "ranks/together.h"
 
 #include <algorithm>
 #include <array>
@@ -9,11 +9,12 @@
 #include <vector>
 
 #include "lamina/error.h"
+#include "points/formats.h"
 #include "points/input_file.h"
-#include "points/sniff.h"
 #include "ranks/ranks.h"
 #include "reconstruct/stored_cloud.h"
-#include "store/store_blocks.h"
+#include "store/block_codec.h"
+#include "store/slab_store.h"
 
 namespace lamina::ranks {
 

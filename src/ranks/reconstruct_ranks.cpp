@@ -16,12 +16,10 @@
 #include "chunks/cuts.h"
 #include "lamina/error.h"
 #include "lamina/ranks.h"
-#include "ranks/gather_store.h"
-#include "ranks/read_together.h"
-#include "ranks/write_together.h"
+#include "ranks/together.h"
 #include "reconstruct/job.h"
-#include "reconstruct/kept_input.h"
 #include "reconstruct/pipeline.h"
+#include "reconstruct/stored_cloud.h"
 
 namespace lamina::ranks {
 namespace {

@@ -1,4 +1,4 @@
-#include "ranks/write_together.h"
+#include "ranks/together.h"
 
 #include <fmt/format.h>
 
@@ -16,12 +16,11 @@
 #include "base/output_file.h"
 #include "boundary/boundary.h"
 #include "boundary/hole_closer.h"
-#include "chunks/merge_parts.h"
 #include "chunks/part_file.h"
 #include "lamina/error.h"
+#include "meshes/formats.h"
+#include "meshes/mesh_sink.h"
 #include "meshes/stored_mesh.h"
-#include "meshes/streamed_ply.h"
-#include "meshes/writers.h"
 #include "reconstruct/job.h"
 #include "simplify/streamed.h"
 

@@ -1,4 +1,4 @@
-#include "reconstruct/choose_support.h"
+#include "reconstruct/plan.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,7 +14,7 @@ namespace {
 constexpr int kMostProjections = 16;
 
 /// What noise asks for: a wider support, the wider the more of it, on the same cells, and normals that agree.
-void choose_for_noise(const RadiusSurvey& survey, bool cell_given, StageSettings& out) {
+void choose_for_noise(const RadiusSurvey& survey, bool cell_given, ReconstructionPlan& out) {
   const bool rough = static_cast<double>(survey.normal_noise) * 180 / std::numbers::pi > kRoughNormals;
   const double most = static_cast<double>((rough ? kVeryNoisyRough : kVeryNoisy) - kNoisy);
   const double share = std::min(1.0, static_cast<double>(survey.noise - kNoisy) / most);
@@ -26,7 +26,7 @@ void choose_for_noise(const RadiusSurvey& survey, bool cell_given, StageSettings
 }
 
 /// What an even, clean sampling allows: the narrowest support, and finer cells between sheets.
-void choose_for_even(bool cell_given, double cell, StageSettings& out) {
+void choose_for_even(bool cell_given, double cell, ReconstructionPlan& out) {
   out.feed.blend = 1;
   out.feed.cell = {cell, Length::Unit::sample_radius};
   out.projection.trusted_offset = kEvenTrust;
@@ -44,8 +44,8 @@ double choose_deviation(const RadiusSurvey& survey) {
   return kStep * std::round(std::min(wanted, kMostDeviation) / kStep);
 }
 
-StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& survey, const PointSourceInfo& info) {
-  StageSettings out;
+void choose_support(const SurfaceSettings& s, const RadiusSurvey& survey, const PointSourceInfo& info,
+                    ReconstructionPlan& out) {
   out.feed.blend = kDefaultBlend;
   if (s.blend) {
     out.feed.blend = *s.blend;
@@ -84,7 +84,6 @@ StageSettings choose_support(const SurfaceSettings& s, const RadiusSurvey& surve
   out.projection.steps = s.steps == 0 ? kMostProjections : s.steps;
   if (s.steps == 0) out.projection.tolerance = static_cast<float>(s.step_tolerance / out.feed.blend);
   out.projection.centres = s.diffuse;
-  return out;
 }
 
 }  // namespace lamina

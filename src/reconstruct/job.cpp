@@ -15,9 +15,8 @@
 #include <utility>
 
 #include "lamina/error.h"
-#include "meshes/writers.h"
+#include "meshes/formats.h"
 #include "mls/refit_normals.h"
-#include "reconstruct/cost.h"
 #include "reconstruct/pipeline.h"
 #include "reconstruct/plan.h"
 

@@ -1,4 +1,4 @@
-#include "reconstruct/kept_input.h"
+#include "reconstruct/stored_cloud.h"
 
 #include <fmt/format.h>
 
@@ -7,11 +7,10 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "base/number.h"
 #include "base/output_file.h"
-#include "base/scalar_type.h"
 #include "lamina/error.h"
 #include "meshes/mesh_sink.h"
-#include "reconstruct/stored_cloud.h"
 #include "samples/cleaning.h"
 
 namespace lamina {

@@ -11,12 +11,12 @@
 #include <memory>
 #include <utility>
 
-#include "base/scalar_type.h"
+#include "base/number.h"
 #include "base/vectors.h"
 #include "lamina/error.h"
 #include "lamina/mesh_receiver.h"
 #include "meshes/mesh_sink.h"
-#include "meshes/streamed_ply.h"
+#include "reconstruct/plan.h"
 
 namespace lamina {
 namespace {
@@ -145,24 +145,20 @@ void place_radii(const ClusteredSlab& from, const RadiusRule& rule, VertexBatch&
 
 }  // namespace
 
-void place_vertices(const ClusteredSlab& slab, const Frame& frame, const VertexSettings& settings, VertexBatch& out) {
-  place_points(slab, frame, settings.chord, out);
-  if (settings.levels) place_levels(slab, settings.finest_cell, out);
-  if (settings.curvature) place_curvatures(slab, frame.step, out);
-  if (settings.filled) out.attributes.emplace_back(out.size(), 0.0F);
-  if (settings.invented) out.attributes.emplace_back(out.size(), 0.0F);
-  if (settings.density) place_densities(slab, frame.step, out);
-  if (settings.trim > 0) place_overhangs(slab, out);
-  place_radii(slab, settings.radii, out);
+void place_vertices(const ClusteredSlab& slab, const ReconstructionPlan& plan, VertexBatch& out) {
+  place_points(slab, plan.frame, plan.chord, out);
+  if (plan.vertex_levels) place_levels(slab, plan.lattice.cell_size(0), out);
+  if (plan.vertex_curvature) place_curvatures(slab, plan.frame.step, out);
+  if (plan.holes.mark) out.attributes.emplace_back(out.size(), 0.0F);
+  if (plan.holes.all) out.attributes.emplace_back(out.size(), 0.0F);
+  if (plan.pruning.samples > 0) place_densities(slab, plan.frame.step, out);
+  if (plan.trim > 0) place_overhangs(slab, out);
+  place_radii(slab, plan.vertex_radii, out);
 }
 
-MeshOutput::MeshOutput(ClusterMode mode, const VertexSettings& vertices, const Frame& frame, SlabSink& sink)
-    : settings_(vertices),
-      frame_(frame),
-      sink_(sink),
-      clusterer_(ClusterSettings{mode}),
-      distinct_(vertices.double_positions) {
-  const auto level = static_cast<float>(vertices.trim);
+MeshOutput::MeshOutput(const ReconstructionPlan& plan, SlabSink& sink)
+    : plan_(plan), sink_(sink), clusterer_(ClusterSettings{plan.cluster}), distinct_(plan.double_positions) {
+  const auto level = static_cast<float>(plan.trim);
   if (level > 0) rims_ = Rims{RimSmoother(level), RimTrimmer(level)};
 }
 
@@ -215,7 +211,7 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
   while (clusterer_.pop(done_)) {
     const IsoSlab* next = clustered_.size() > 1 ? clustered_[1].get() : nullptr;
     mesh_.slab = done_.slab;
-    place_vertices({done_, *clustered_.front(), next}, frame_, settings_, mesh_.vertices);
+    place_vertices({done_, *clustered_.front(), next}, plan_, mesh_.vertices);
     std::swap(mesh_.triangles, done_.triangles);
     if (rims_) {
       rims_->smoother.push(std::exchange(mesh_, rims_->trimmer.spare()));

@@ -24,26 +24,7 @@
 
 namespace lamina {
 
-/// The influence radius R that goes with a cell, input units.
-struct RadiusRule {
-  double per_cell = 1;  ///< for each step of its side
-  double least = 0;     ///< whatever the cell
-};
-
-/// What vertices are given.
-struct VertexSettings {
-  float chord = 0.2F;      ///< SurfaceSettings::chord
-  bool levels = false;     ///< an attribute behind the samples' own: the octree level of the finest cell around, 0 the
-                           ///< finest
-  bool curvature = false;  ///< another: mean curvature of the fit, 1 / input unit
-  bool filled = false;     ///< another: 0, for those that close holes get 1
-  bool invented = false;   ///< another, the last: 0, for those that close what nothing tells how to close get 1
-  double finest_cell = 1;  ///< of the lattice, steps
-  bool density = false;    ///< VertexBatch::density
-  double trim = 0;         ///< > 0: the mesh is cut where its overhang is this (boundary/rims.h)
-  bool double_positions = false;  ///< as they are written
-  RadiusRule radii;               ///< the influence radius around each vertex, by the finest cell around its corner
-};
+struct ReconstructionPlan;
 
 /// A finished slab with what it refers to.
 struct ClusteredSlab {
@@ -53,8 +34,9 @@ struct ClusteredSlab {
 };
 
 /// A clustered vertex goes to its corner's projected point, moved outward by chord * curvature * cell^2 (at most a
-/// quarter of a cell), which makes up for triangles cutting inside a curved surface.
-void place_vertices(const ClusteredSlab& slab, const Frame& frame, const VertexSettings& settings, VertexBatch& out);
+/// quarter of a cell), which makes up for triangles cutting inside a curved surface. Behind the samples' attributes it
+/// has those of plan.mesh_attributes that the run itself makes.
+void place_vertices(const ClusteredSlab& slab, const ReconstructionPlan& plan, VertexBatch& out);
 
 /// Where finished slabs go, in ascending order, by one thread at a time.
 class SlabSink {
@@ -86,7 +68,7 @@ std::unique_ptr<WholeMesh> open_whole_mesh(const MeshSinkSettings& settings, Mes
 class MeshOutput {
  public:
   /// The sink is the caller's; nobody else may write to it.
-  MeshOutput(ClusterMode mode, const VertexSettings& vertices, const Frame& frame, SlabSink& sink);
+  MeshOutput(const ReconstructionPlan& plan, SlabSink& sink);
   /// Drops what is not written yet.
   ~MeshOutput();
   MeshOutput(const MeshOutput&) = delete;
@@ -113,8 +95,7 @@ class MeshOutput {
   void trim(bool last);
   void pass_on(MeshSlab& slab);
 
-  VertexSettings settings_;
-  const Frame& frame_;
+  const ReconstructionPlan& plan_;
   SlabSink& sink_;
   Clusterer clusterer_;
   std::vector<std::shared_ptr<IsoSlab>> queued_;

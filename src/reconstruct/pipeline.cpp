@@ -20,7 +20,7 @@ Pipeline::Pipeline(const ReconstructionPlan& plan, SampleFeed& feed, const SlabS
       kernel_(select_kernel()),
       window_(plan.lattice, static_cast<int>(plan.attributes.size()), plan.extent),
       projector_(plan.projection, kernel_),
-      output_(plan.cluster, plan.vertices, plan.frame, output.mesh),
+      output_(plan, output.mesh),
       stages_(plan.stages_of(span)),
       sample_reach_(sample_reach(plan)),
       refined_(stages_.of(Stage::refine).begin),
@@ -86,7 +86,7 @@ void Pipeline::number_to(std::int32_t slab, Stopwatch& watch) {
   for (; numbered_ < std::min(slab + 1, stages_.of(Stage::number).end); ++numbered_) {
     IsoSlab* below = iso_.empty() ? nullptr : iso_.back().get();
     std::shared_ptr<IsoSlab> here = output_.spare();
-    number_edges(window_, numbered_, {plan_.doubtful, static_cast<float>(plan_.vertices.trim)}, below, *here);
+    number_edges(window_, numbered_, {plan_.doubtful, static_cast<float>(plan_.trim)}, below, *here);
     isovertices_ += here->vertices.size();
     if (volume_ != nullptr) watch.time("volume", [&] { volume_->add(window_, *here, numbered_); });
     iso_.push_back(std::move(here));

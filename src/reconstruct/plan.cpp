@@ -11,11 +11,9 @@
 
 #include "lamina/error.h"
 #include "levelset/surface_volume.h"
-#include "meshes/streamed_ply.h"
-#include "meshes/writers.h"
-#include "reconstruct/choose_support.h"
+#include "meshes/formats.h"
+#include "meshes/mesh_sink.h"
 #include "reconstruct/constants.h"
-#include "reconstruct/cost.h"
 #include "simplify/goal.h"
 
 namespace lamina {
@@ -176,27 +174,22 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
   const double median = plan.radius.median * plan.frame.step;
   const double influence = plan.feed.blend * median;
   plan.cluster = s.cluster;
-  plan.vertices.chord = static_cast<float>(s.chord);
-  plan.vertices.levels = s.vertex_levels;
-  plan.vertices.curvature = s.vertex_curvature;
-  plan.vertices.filled = s.vertex_filled;
-  plan.vertices.invented = s.fill_all;
-  plan.vertices.finest_cell = plan.lattice.cell_size(0);
+  plan.chord = static_cast<float>(s.chord);
+  plan.vertex_levels = s.vertex_levels;
+  plan.vertex_curvature = s.vertex_curvature;
   // Cells follow the radii, so most cells tell the median radius and larger ones as much more. Cells that are smaller
   // between sheets tell nothing.
-  plan.vertices.radii = {influence / static_cast<double>(plan.lattice.cell_size(plan.main_level)),
-                         plan.feed.refine_sheets ? influence : 0};
+  plan.vertex_radii = {influence / static_cast<double>(plan.lattice.cell_size(plan.main_level)),
+                       plan.feed.refine_sheets ? influence : 0};
   const std::uint64_t chosen = s.prune_triangles ? 0 : specks(plan.samples);
   const auto least_samples = static_cast<std::uint64_t>(kSpeckSamples * static_cast<double>(chosen));
   plan.pruning = {s.prune_triangles.value_or(chosen), least_samples, resolve(s.prune_size, median, plan.feed.blend)};
-  plan.vertices.density = plan.pruning.samples > 0;
   plan.mesh_attributes = plan.attributes;
   if (s.vertex_levels) plan.mesh_attributes.push_back({"level", ScalarType::uint8});
   if (s.vertex_curvature) plan.mesh_attributes.push_back({"curvature", ScalarType::float32});
   if (s.vertex_filled) plan.mesh_attributes.push_back({"filled", ScalarType::uint8});
   if (s.fill_all) plan.mesh_attributes.push_back({"invented", ScalarType::uint8});
   plan.double_positions = needs_double(cloud.ingested.census, plan.lattice.cell * plan.frame.step);
-  plan.vertices.double_positions = plan.double_positions;
   const std::vector<std::string> outputs = output_names(s);
   if (std::none_of(outputs.begin(), outputs.end(),
                    [](const std::string& name) { return meshes::mesh_format(name) == meshes::MeshFormat::ply; }))
@@ -266,20 +259,14 @@ ReconstructionPlan make_plan(const SurfaceSettings& s, const StoredCloud& cloud,
   plan.window = s.window;
   plan.boundary = static_cast<float>(s.boundary);
 
-  const StageSettings stages = choose_support(s, survey, cloud.info);
-  plan.feed = stages.feed;
-  plan.refit = stages.refit;
+  choose_support(s, survey, cloud.info, plan);
   // Normals that were found from the positions tell nothing that a fit over more of them does not.
   plan.refit.noise = cloud.info.found_normals ? static_cast<float>(std::numbers::pi) : survey.normal_noise;
-  plan.projection = stages.projection;
-  plan.holes = stages.holes;
   double max_radius = 0;
   plan.radius = scaled_radii(s, survey, plan, plan.feed.blend, max_radius);
   plan.feed.max_radius = static_cast<float>(max_radius);
   plan_lattice(s, s.levels, plan);
   if (wants_lower_slabs(s, plan, store)) plan_lattice(s, kDefaultLevels - 1, plan);
-  plan.vertices.trim = stages.trim;
-  plan.doubtful = stages.doubtful;
   plan_mesh(s, cloud, plan);
   plan.expected = expected_cost(plan, cloud.ingested);
   return plan;
@@ -340,7 +327,7 @@ SurfacePlan summary_of(const ReconstructionPlan& p) {
   out.refine_sheets = p.feed.refine_sheets;
   out.watertight = p.holes.watertight != Watertight::no;
   out.bridge = p.holes.bridge;
-  out.trim = p.vertices.trim;
+  out.trim = p.trim;
   out.deviation = p.simplify.deviation;
   out.longest_rim = p.holes.longest;
   out.finest_cell = p.lattice.cell * step;

@@ -30,6 +30,12 @@ struct ExpectedCost {
   double reading_seconds = 0;  ///< of these for reading the input
 };
 
+/// The influence radius R that goes with a cell, input units.
+struct RadiusRule {
+  double per_cell = 1;  ///< for each step of its side
+  double least = 0;     ///< whatever the cell
+};
+
 /// Lengths are in fixed-point steps of the frame where nothing else is said.
 struct ReconstructionPlan {
   // The cloud.
@@ -56,7 +62,11 @@ struct ReconstructionPlan {
   float boundary = 0;  ///< SurfaceSettings::boundary
   DoubtfulPoints doubtful = DoubtfulPoints::near_samples;
   ClusterMode cluster = ClusterMode::preserving;
-  VertexSettings vertices;
+  float chord = 0;                ///< SurfaceSettings::chord
+  bool vertex_levels = false;     ///< SurfaceSettings::vertex_levels
+  bool vertex_curvature = false;  ///< SurfaceSettings::vertex_curvature
+  RadiusRule vertex_radii;        ///< the influence radius around each vertex, by the finest cell around its corner
+  double trim = 0;                ///< R, > 0: the mesh is cut where its overhang is this (boundary/rims.h)
   HoleSettings holes;
   PruneRule pruning;
   SimplifySettings simplify;
@@ -80,6 +90,16 @@ void check_settings(const SurfaceSettings& settings);
 /// the cell asked for cannot be represented for this cloud, or vertices would have two attributes of one name;
 /// Error(empty) where no sampling density can be estimated.
 ReconstructionPlan make_plan(const SurfaceSettings& settings, const StoredCloud& cloud, const RadiusSurvey& survey);
+
+/// The part of make_plan() that says how far samples act and how fine the cells are, what is trusted and what closed:
+/// as the user says, else by what the survey saw of the cloud. Lengths that need the lattice are left for the rest of
+/// it.
+void choose_support(const SurfaceSettings& settings, const RadiusSurvey& survey, const PointSourceInfo& info,
+                    ReconstructionPlan& plan);
+
+/// SimplifySettings::deviation of a mesh of such samples: noise says how much of what is not flat is none of the
+/// surface's.
+double choose_deviation(const RadiusSurvey& survey);
 
 /// The mesh file's layout, without its name.
 MeshSinkSettings mesh_layout(const ReconstructionPlan& plan);
@@ -105,5 +125,24 @@ std::string describe(const SurfacePlan& plan);
 /// the samples, their scans, spacing, noise and where it is most, normals and strays; then every choice that the
 /// settings left open, as the option that would have made it.
 std::string describe_findings(const SurfaceSettings& settings, const SurfaceStats& stats);
+
+// What a run is expected to take: memory, temporary disk, processor time. The models' coefficients are fitted to runs
+// of 1 M to 380 M samples (docs/performance.md).
+
+/// Of the mesh.
+double expected_triangles(const ReconstructionPlan& plan);
+
+/// Bytes at the peak without a volume and without the window's look-up tables.
+std::uint64_t expected_mesh_memory(const ReconstructionPlan& plan, const SlabStore& store);
+
+/// The whole of it, for a plan that is complete but for its cost.
+ExpectedCost expected_cost(const ReconstructionPlan& plan, const Ingested& cloud);
+
+/// Processor seconds of a whole run on the machine the model was made on.
+double expected_cpu_seconds(const ReconstructionPlan& plan);
+
+/// The window's look-up tables cover all the slabs a bucket of samples lies in, empty ones too: next to nothing, unless
+/// a few samples are scattered over a long way.
+std::uint64_t table_bytes(const ReconstructionPlan& plan, const SlabStore& store);
 
 }  // namespace lamina

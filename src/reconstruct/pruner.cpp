@@ -139,7 +139,7 @@ double Pruner::samples_under(const Slab& slab, const std::array<std::uint32_t, 3
   }
   if (seen == 0) return 0;
   using meshes::operator-;
-  return 0.5 * meshes::norm(meshes::cross(at[1] - at[0], at[2] - at[0])) * density / seen;
+  return meshes::triangle_area(at[0], at[1], at[2]) * density / seen;
 }
 
 bool Pruner::is_large(const Part& p) const {

@@ -15,8 +15,8 @@
 #include "lamina/attributes.h"
 #include "lamina/error.h"
 #include "lamina/normals.h"
+#include "points/filters.h"
 #include "reconstruct/job.h"
-#include "reconstruct/kept_input.h"
 #include "samples/cleaning.h"
 #include "store/input_survey.h"
 
@@ -26,22 +26,16 @@ namespace {
 constexpr std::size_t kRowsAtOnce = std::size_t{1} << 15;
 
 /// Normals that say nothing: what a plan comes to does not depend on them.
-class PlannedNormals final : public PointSource {
+class PlannedNormals final : public WithNormals {
  public:
-  explicit PlannedNormals(std::unique_ptr<PointSource> source) : source_(std::move(source)) {
-    info_ = source_->info();
-    info_.found_normals = !info_.has_normals;
-    info_.has_normals = true;
-  }
-  void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
-    source_->read(first, count, out);
+  using WithNormals::WithNormals;
+
+ private:
+  void give_normals(SampleBatch& out) const override {
     out.nx.assign(out.size(), 0);
     out.ny.assign(out.size(), 0);
     out.nz.assign(out.size(), 1);
   }
-
- private:
-  std::unique_ptr<PointSource> source_;
 };
 
 /// How many of the rows looked at lack a usable normal.

@@ -37,7 +37,7 @@ std::vector<std::string> output_names(const SurfaceSettings& settings);
 /// What messages call the input.
 std::string input_name(const SurfaceSettings& settings);
 
-/// Whether the settings name one input, and that is a kept one (kept_input.h).
+/// Whether the settings name one input, and that is a kept one (is_kept_input()).
 bool names_kept_input(const SurfaceSettings& settings);
 
 /// Folder for temporary files: next to the output unless told otherwise; the system's for standard output, pipes and
@@ -89,5 +89,20 @@ std::unique_ptr<PointsWriter> open_rejected(const StoredCloud& cloud, const Surf
 
 /// Appends the samples that have a reason: buckets along the sweep axis, in each the input's order.
 void write_rejected(const StoredCloud& cloud, const Reasons& reasons, PointsWriter& writer);
+
+// A cloud that has been read once and is kept: its store, and beside it what else a sweep must know.
+
+/// Whether a folder holds a kept input.
+bool is_kept_input(const std::string& directory);
+
+/// Completes the folder that read_cloud() kept the store in. Throws Error(budget) when it cannot be written.
+void save_input(const StoredCloud& input, const SurfaceSettings& settings, const std::string& directory);
+
+/// Opens it. Throws Error(unreadable) naming the file that is damaged or of another version, Error(usage) where the
+/// settings ask for another frame, other samples or other radii than the input was read with.
+StoredCloud open_kept_input(const std::string& directory, const SurfaceSettings& settings);
+
+/// A name of the kept input's contents: other samples, another frame, another name.
+std::string kept_input_id(const std::string& directory);
 
 }  // namespace lamina

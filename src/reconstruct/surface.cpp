@@ -7,11 +7,11 @@
 #include <string>
 #include <utility>
 
-#include "base/staged_folder.h"
+#include "base/output_file.h"
 #include "lamina/error.h"
 #include "levelset/surface_volume.h"
+#include "meshes/formats.h"
 #include "meshes/mesh_sink.h"
-#include "meshes/writers.h"
 #include "reconstruct/job.h"
 #include "reconstruct/mesh_output.h"
 #include "reconstruct/plan.h"

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "render/canvas.h"
-#include "render/draw.h"
 #include "render/ray_field.h"
 #include "vdb/grids.h"
 #include "vdb/vdb_file.h"

@@ -11,9 +11,8 @@
 #include <optional>
 #include <vector>
 
+#include "meshes/triangle_geometry.h"
 #include "render/canvas.h"
-#include "render/draw.h"
-#include "render/view.h"
 
 namespace lamina::render_detail {
 namespace {
@@ -128,11 +127,6 @@ constexpr float kWireDarkening = 0.25F;
 constexpr double kLeastRadius = 0.5;  // pixels: a point never vanishes between samples
 constexpr float kLeastSlant = 0.05F;  // a disc seen from its side keeps this much of its width
 
-Eigen::Vector3d position(const TriangleMesh& mesh, std::uint32_t v) {
-  const auto& p = mesh.positions[v];
-  return {p[0], p[1], p[2]};
-}
-
 std::vector<Projected> project_all(const TriangleMesh& mesh, const View& view) {
   std::vector<Projected> projected(mesh.positions.size());
   tbb::parallel_for(std::size_t{0}, projected.size(),
@@ -147,9 +141,7 @@ class Surface {
           const std::optional<ColourReader>& colours, const View& view, std::size_t triangle)
       : settings_(settings) {
     const auto& t = mesh.triangles[triangle];
-    const Eigen::Vector3d face =
-        (position(mesh, t[1]) - position(mesh, t[0])).cross(position(mesh, t[2]) - position(mesh, t[0])).normalized();
-    face_ = view.direction({static_cast<float>(face[0]), static_cast<float>(face[1]), static_cast<float>(face[2])});
+    face_ = view.direction(meshes::to_float(meshes::unit(meshes::area_normal(mesh, triangle))));
     back_ = face_.z() < 0;
     if (back_) face_ = -face_;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -203,22 +195,6 @@ struct Disc {
 };
 
 }  // namespace
-
-std::vector<std::array<float, 3>> vertex_normals(const TriangleMesh& mesh) {
-  std::vector<Eigen::Vector3d> sums(mesh.positions.size(), Eigen::Vector3d::Zero());
-  for (const auto& t : mesh.triangles) {
-    const Eigen::Vector3d area =
-        (position(mesh, t[1]) - position(mesh, t[0])).cross(position(mesh, t[2]) - position(mesh, t[0]));
-    if (!area.allFinite()) continue;
-    for (const std::uint32_t v : t) sums[v] += area;
-  }
-  std::vector<std::array<float, 3>> normals(sums.size());
-  for (std::size_t i = 0; i < sums.size(); ++i) {
-    const Eigen::Vector3f n = sums[i].normalized().cast<float>();
-    normals[i] = {n[0], n[1], n[2]};
-  }
-  return normals;
-}
 
 void draw_mesh(const TriangleMesh& mesh, const std::vector<std::array<float, 3>>& normals,
                const RenderSettings& settings, const View& view, Canvas& canvas) {

@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "render/canvas.h"
-#include "render/view.h"
 #include "vdb/grids.h"
 
 namespace lamina::render_detail {

@@ -8,9 +8,8 @@
 #include "lamina/error.h"
 #include "lamina/render.h"
 #include "measure/edge_table.h"
+#include "meshes/triangle_geometry.h"
 #include "render/canvas.h"
-#include "render/draw.h"
-#include "render/view.h"
 
 namespace lamina {
 
@@ -156,7 +155,7 @@ void Renderer::draw(const TriangleMesh& mesh) {
       throw Error(ExitCode::unreadable, "a triangle names a vertex that is not there");
   }
   const bool has_normals = mesh.normals.size() == mesh.positions.size();
-  const auto computed = has_normals ? std::vector<std::array<float, 3>>{} : vertex_normals(mesh);
+  const auto computed = has_normals ? std::vector<std::array<float, 3>>{} : meshes::vertex_normals(mesh);
   const auto& normals = has_normals ? mesh.normals : computed;
   impl_->draw([&](const View& view) { draw_mesh(mesh, normals, impl_->settings, view, impl_->canvas); });
   if (!impl_->settings.mark_boundary) return;

@@ -1,6 +1,7 @@
 #include "lamina/scatter.h"
 
 #include <fmt/format.h>
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_pipeline.h>
 #include <tbb/task_arena.h>
 
@@ -12,6 +13,8 @@
 #include "base/output_file.h"
 #include "base/run.h"
 #include "lamina/error.h"
+#include "measure/triangle_bvh.h"
+#include "meshes/triangle_geometry.h"
 #include "scatter/point_rows.h"
 #include "scatter/shapes.h"
 
@@ -130,6 +133,142 @@ ScatterReport scatter(const Surface& surface, const ScatterSettings& settings, c
   if (run.cancelled()) throw Error(ExitCode::internal, "scatter: cancelled");
   out.commit();
   return {surface.area(), std::sqrt(surface.area() / static_cast<double>(settings.count))};
+}
+
+namespace {
+
+using namespace meshes;
+
+/// A direction to the scanner and the axes of its image.
+struct View {
+  Vec3 towards, right, up;
+};
+
+/// Directions on a Fibonacci lattice: even over the sphere for any number of views.
+View view_number(int i, int views) {
+  constexpr double kGoldenTurn = 0.61803398874989484820;
+  const double z = 1 - (2 * i + 1) / static_cast<double>(views);
+  const auto [s, c] = scatter_detail::sincos_turns(i * kGoldenTurn);
+  const double across = std::sqrt(1 - z * z);
+  const Vec3 towards{across * c, across * s, z};
+  const Vec3 right = unit(cross(std::fabs(z) < 0.9 ? Vec3{0, 0, 1} : Vec3{1, 0, 0}, towards));
+  return {towards, right, cross(towards, right)};
+}
+
+/// Near enough to a normal deviate of variance 1: four uniform ones added up.
+double bell(CounterRng& rng) {
+  return 0.86602540378443864676 * (rng.symmetric() + rng.symmetric() + rng.symmetric() + rng.symmetric());
+}
+
+class Scanner {
+ public:
+  Scanner(const TriangleMesh& mesh, const ScanSettings& settings)
+      : settings_(settings), tree_(mesh), attributes_(mesh), mesh_(mesh) {
+    const measure::Bounds bounds = measure::triangle_bounds(mesh);
+    centre_ = 0.5 * (bounds.low + bounds.high);
+    half_width_ = 0.51 * norm(bounds.high - bounds.low);
+  }
+  [[nodiscard]] bool has_colour() const { return attributes_.has_colour(); }
+
+  /// The grid spacing at which all views together see about `count` samples.
+  [[nodiscard]] double spacing_for(std::uint64_t count) const {
+    constexpr int kTrialRows = 160;
+    const double trial = 2 * half_width_ / kTrialRows;
+    std::uint64_t seen = 0, hits = 0;
+    for (int view = 0; view < settings_.views; ++view)
+      for (const auto& row : look(view, trial)) {
+        seen += row.samples.size();
+        hits += row.hits;
+      }
+    // A few rays slip through between the triangles: what they see is not the mesh.
+    if (seen == 0 || seen < hits / 1000)
+      throw Error(ExitCode::empty, "scan: no ray hits the mesh's outside; are its triangles turned inside out?");
+    return trial * std::sqrt(static_cast<double>(seen) / static_cast<double>(count));
+  }
+
+  struct Sample {
+    Vec3 position, normal;
+    std::array<float, 3> colour;
+    float confidence;
+  };
+  struct Row {
+    std::vector<Sample> samples;
+    std::uint64_t hits = 0;  ///< rays that met the mesh, seen or not
+  };
+
+  [[nodiscard]] std::vector<Row> look(int number, double spacing) const {
+    const View view = view_number(number, settings_.views);
+    const auto half = static_cast<long>(std::ceil(half_width_ / spacing));
+    std::vector<Row> rows(static_cast<std::size_t>(2 * half + 1));
+    tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t r) {
+      const double y = spacing * static_cast<double>(static_cast<long>(r) - half);
+      for (long column = -half; column <= half; ++column)
+        shoot(view, spacing * static_cast<double>(column), y, spacing,
+              (static_cast<std::uint64_t>(number) << 48) + (r << 24) + static_cast<std::uint64_t>(column + half),
+              rows[r]);
+    });
+    return rows;
+  }
+
+ private:
+  void shoot(const View& view, double x, double y, double spacing, std::uint64_t ray, Row& row) const {
+    const Vec3 origin = centre_ + x * view.right + y * view.up + (2 * half_width_) * view.towards;
+    const auto hit = tree_.first_hit(origin, -1.0 * view.towards);
+    if (!hit) return;
+    ++row.hits;
+    const SurfacePoint at{hit->triangle, hit->weights};
+    const Vec3 normal = attributes_.normal(at);
+    const double facing = dot(normal, view.towards);
+    const bool outside = dot(area_normal(mesh_, hit->triangle), view.towards) > 0;
+    if (!outside || facing < settings_.least_facing) return;
+    CounterRng rng(settings_.seed, ray);
+    const double error = settings_.noise * spacing * bell(rng);
+    const Vec3 shaken = normal + settings_.normal_noise * Vec3{bell(rng), bell(rng), bell(rng)};
+    row.samples.push_back({origin - (hit->distance + error) * view.towards, unit(shaken), attributes_.colour(at),
+                           static_cast<float>(facing)});
+  }
+
+  const ScanSettings& settings_;
+  measure::TriangleBvh tree_;
+  scatter_detail::MeshAttributes attributes_;
+  const TriangleMesh& mesh_;
+  Vec3 centre_{};
+  double half_width_ = 0;  ///< of a view's image
+};
+
+void require_sane(const TriangleMesh& mesh, const ScanSettings& s) {
+  if (mesh.triangles.empty()) throw Error(ExitCode::unreadable, "scan: the mesh has no triangles");
+  if (s.views < 1 || s.views > 10000)
+    throw Error(ExitCode::usage, fmt::format("scan: {} views; from 1 to 10000 are possible", s.views));
+  if (s.count == 0) throw Error(ExitCode::usage, "scan: --count must be at least 1");
+  if (!(s.noise >= 0) || !(s.normal_noise >= 0)) throw Error(ExitCode::usage, "scan: noise must be 0 or more");
+  if (!(s.least_facing >= 0) || s.least_facing >= 1)
+    throw Error(ExitCode::usage, "scan: the least facing must lie in [0, 1)");
+}
+
+}  // namespace
+
+ScanReport scan(const TriangleMesh& mesh, const ScanSettings& settings, const std::string& path,
+                const RunContext& run) {
+  require_sane(mesh, settings);
+  ScanReport report;
+  with_threads(run.threads, [&] {
+    const Scanner scanner(mesh, settings);
+    report.spacing = scanner.spacing_for(settings.count);
+    const scatter_detail::RowLayout layout{false, scanner.has_colour(), true};
+    scatter_detail::RowPacker rows(layout);
+    for (int view = 0; view < settings.views; ++view)
+      for (const auto& row : scanner.look(view, report.spacing))
+        for (const auto& s : row.samples) {
+          rows.add(s.position, s.normal, s.colour, s.confidence);
+          ++report.samples;
+        }
+    ResultFile out(path);
+    out.write(scatter_detail::ply_header(layout, report.samples));
+    out.write(rows.bytes());
+    out.commit();
+  });
+  return report;
 }
 
 }  // namespace lamina

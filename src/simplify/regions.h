@@ -11,8 +11,8 @@
 #include "base/spill_file.h"
 #include "lamina/mesh.h"
 #include "lamina/run.h"
+#include "meshes/formats.h"
 #include "meshes/vec3.h"
-#include "meshes/writers.h"
 #include "simplify/old_mesh.h"
 #include "simplify/quadric.h"
 

@@ -7,8 +7,8 @@
 #include "lamina/mesh.h"
 #include "lamina/run.h"
 #include "lamina/simplify.h"
+#include "meshes/formats.h"
 #include "meshes/mesh_sink.h"
-#include "meshes/writers.h"
 #include "simplify/goal.h"
 
 namespace lamina::simplify {

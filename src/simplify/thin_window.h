@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "lamina/mesh.h"
+#include "meshes/formats.h"
 #include "meshes/vec3.h"
-#include "meshes/writers.h"
 #include "simplify/matching.h"
 #include "simplify/quadric.h"
 #include "simplify/stars.h"

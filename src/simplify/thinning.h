@@ -6,7 +6,7 @@
 #include "lamina/mesh.h"
 #include "lamina/run.h"
 #include "lamina/simplify.h"
-#include "meshes/writers.h"
+#include "meshes/formats.h"
 
 namespace lamina::simplify {
 

@@ -12,7 +12,8 @@
 
 #include "base/output_file.h"
 #include "lamina/error.h"
-#include "store/store_blocks.h"
+#include "store/block_codec.h"
+#include "store/slab_store.h"
 
 namespace lamina {
 namespace {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "lamina/error.h"
-#include "store/store_blocks.h"
+#include "store/block_codec.h"
 
 namespace lamina {
 

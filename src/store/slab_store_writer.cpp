@@ -15,7 +15,8 @@
 
 #include "lamina/error.h"
 #include "lattice/lattice.h"
-#include "store/store_blocks.h"
+#include "store/block_codec.h"
+#include "store/slab_store.h"
 
 namespace lamina {
 namespace {

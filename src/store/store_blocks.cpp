@@ -1,4 +1,4 @@
-#include "store/store_blocks.h"
+#include "store/block_codec.h"
 
 #include <fmt/format.h>
 

@@ -16,8 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "base/little_endian.h"
-#include "base/scalar_type.h"
+#include "base/number.h"
 #include "lamina/attributes.h"
 #include "lamina/error.h"
 #include "meshes/colours.h"

@@ -11,9 +11,9 @@
 
 #include "lamina/mesh.h"
 #include "lamina/run.h"
+#include "meshes/formats.h"
 #include "meshes/mesh_pieces.h"
 #include "meshes/vec3.h"
-#include "meshes/writers.h"
 #include "simplify/matching.h"
 #include "tiles/tile_octree.h"
 

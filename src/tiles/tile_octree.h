@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "meshes/formats.h"
 #include "meshes/vec3.h"
-#include "meshes/writers.h"
 
 namespace lamina::tiles {
 

@@ -20,8 +20,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/output_file.h"
 #include "base/run.h"
-#include "base/staged_folder.h"
 #include "base/vectors.h"
 #include "lamina/error.h"
 #include "meshes/mesh_blocks.h"

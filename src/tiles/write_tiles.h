@@ -7,7 +7,7 @@
 
 #include "lamina/run.h"
 #include "lamina/tiles.h"
-#include "meshes/writers.h"
+#include "meshes/formats.h"
 #include "tiles/georeference.h"
 #include "tiles/tile_content.h"
 #include "tiles/tile_mesh.h"

@@ -1,9 +1,12 @@
-// A leaf's record in a .vdb file, made from masks and values without a leaf of OpenVDB's in between.
+// Leaves as they stand in .vdb files, made without a leaf of OpenVDB's in between, and which empty places between those
+// of a narrow band lie inside.
 #pragma once
 #include <array>
 #include <cstdint>
+#include <map>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "lattice/block_mask.h"
 #include "vdb/grids.h"
@@ -34,5 +37,56 @@ void pack(const openvdb::Coord& origin, const LeafMasks& masks, std::span<const 
 /// are not active where LeafMasks::inside is set.
 std::array<std::int8_t, 6> face_votes(const BlockMask& active, const BlockMask& negative);
 std::array<std::int8_t, 6> face_votes(const openvdb::FloatTree::LeafNodeType& leaf);
+
+// Which empty places between the leaves of a narrow band lie inside: what OpenVDB keeps as the signs of tiles.
+
+/// A leaf's place in units of leaves (8 voxels), and how its faces vote: negative when the voxels there are inside.
+struct LeafVotes {
+  std::array<std::int32_t, 3> leaf{};
+  std::array<std::int8_t, 6> faces{};  ///< low and high end of axis 0, 1, 2; 0: no opinion
+};
+
+/// A tile beside leaves takes their sign. A region of tiles that leaves enclose takes the sign of the leaves around it;
+/// one that is connected with the outside counts as outside, but for two tiles next to leaves that say otherwise: there
+/// the surface is open and nothing is known farther away.
+class TileSigns {
+ public:
+  using Place = std::array<std::int32_t, 3>;
+  static constexpr int kSlots = 16 * 16 * 16;  ///< leaves in a node: OpenVDB's lower internal node, 128 voxels wide
+
+  explicit TileSigns(const std::vector<LeafVotes>& leaves);
+  /// Of the leaf-sized tiles of a node that has leaves, [x][y][z]; `node` in units of nodes.
+  [[nodiscard]] const std::uint8_t* inside_tiles(const Place& node) const;
+  /// Of a node without leaves.
+  [[nodiscard]] bool inside(const Place& node) const;
+
+ private:
+  enum State : std::uint8_t { kUnknown, kLeaf, kOutside, kInside };
+  struct Node {
+    std::vector<std::uint8_t> state;  ///< in the end 1 where the tile lies inside, 0 elsewhere
+    std::vector<std::int8_t> votes;
+  };
+  struct Slot {
+    std::uint32_t cell;  ///< of the grid of nodes
+    std::uint32_t slot;  ///< kSlots: the whole empty node
+  };
+  [[nodiscard]] std::uint32_t cell_of(const Place& node) const;
+  void vote(const LeafVotes& leaf);
+  template <class Visit>
+  void for_each_neighbour(const Slot& s, const Visit& visit) const;
+  void flood(const Slot& seed, bool outside);
+  void spread_local();
+  std::uint8_t& state(const Slot& s);
+  [[nodiscard]] std::int32_t vote_of(const Slot& s) const;
+
+  Place low_{}, size_{};               ///< of the grid of nodes, one empty node around all of them
+  std::vector<std::int32_t> node_at_;  ///< index into nodes_, or -1
+  std::vector<std::uint8_t> empty_;    ///< state of the nodes without leaves
+  std::map<std::uint32_t, std::int32_t> empty_votes_;
+  std::vector<Node> nodes_;
+};
+
+/// Decides anew which tiles of a grid lie inside, from the leaves beside them.
+void sign_tiles(openvdb::FloatGrid& grid);
 
 }  // namespace lamina::volume

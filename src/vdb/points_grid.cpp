@@ -13,8 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/number.h"
 #include "base/run.h"
-#include "base/scalar_type.h"
 #include "lamina/error.h"
 #include "vdb/vdb_file.h"
 

@@ -10,7 +10,6 @@
 #include "base/spill_file.h"
 #include "vdb/grids.h"
 #include "vdb/packed_leaf.h"
-#include "vdb/tile_signs.h"
 
 namespace lamina::volume {
 
@@ -23,7 +22,7 @@ class StreamedVdb {
   StreamedVdb& operator=(const StreamedVdb&) = delete;
 
   /// An empty FloatGrid or Vec3SGrid that carries name, background, transform and metadata; returns its number. A float
-  /// grid's tiles get the signs of the leaves around (tile_signs.h) when it is a level set.
+  /// grid's tiles get the signs of the leaves around (packed_leaf.h) when it is a level set.
   std::size_t add_grid(const openvdb::GridBase::Ptr& empty);
   /// Each place once. Those of a node of 128^3 voxels are read fastest when they came one after the other.
   void add(std::size_t grid, const PackedLeaf& leaf);

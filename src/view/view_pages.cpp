@@ -19,7 +19,7 @@
 #include "lamina/mesh.h"
 #include "lamina/view.h"
 #include "measure/edge_table.h"
-#include "meshes/writers.h"
+#include "meshes/formats.h"
 #include "view/page_writer.h"
 #include "view/tile_files.h"
 

@@ -1,4 +1,4 @@
-#include "volume/distance_grid.h"
+#include "volume/volume_data.h"
 
 #include <openvdb/math/Proximity.h>
 #include <openvdb/tools/ChangeBackground.h>

@@ -9,9 +9,9 @@
 #include "base/run.h"
 #include "lamina/error.h"
 #include "measure/edge_table.h"
-#include "meshes/vec3.h"
+#include "meshes/triangle_geometry.h"
 #include "vdb/vdb_file.h"
-#include "volume/distance_grid.h"
+#include "volume/volume_data.h"
 
 namespace lamina {
 namespace {
@@ -51,10 +51,7 @@ Edges look_at_edges(const TriangleMesh& mesh) {
 
 double area_of(const TriangleMesh& mesh) {
   double area = 0;
-  for (const auto& t : mesh.triangles) {
-    const Vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
-    area += 0.5 * norm(cross(b - a, c - a));
-  }
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) area += triangle_area(mesh, t);
   return area;
 }
 

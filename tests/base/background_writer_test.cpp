@@ -1,4 +1,4 @@
-#include "base/background_writer.h"
+#include "base/spill_file.h"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

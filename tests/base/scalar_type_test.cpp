@@ -1,4 +1,4 @@
-#include "base/scalar_type.h"
+#include "base/number.h"
 
 #include <gtest/gtest.h>
 

@@ -82,7 +82,7 @@ std::uint64_t Replay::write() const {
   VertexBatch vertices;
   for (std::size_t k = 0; k < final_.size(); ++k) {
     const IsoSlab* next = k + 1 < iso_.size() ? iso_[k + 1].get() : nullptr;
-    place_vertices({final_[k], *iso_[k], next}, scene_.plan.frame, scene_.plan.vertices, vertices);
+    place_vertices({final_[k], *iso_[k], next}, scene_.plan, vertices);
     sink.append_vertices(vertices);
     sink.append_triangles(final_[k].triangles);
   }

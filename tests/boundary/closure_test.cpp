@@ -1,5 +1,5 @@
 // Closures invented for boundary loops: always a disc within the rim, smooth where that is known to be right.
-#include "boundary/closure.h"
+#include "boundary/fill.h"
 
 #include <gtest/gtest.h>
 

@@ -8,10 +8,9 @@
 #include <random>
 
 #include "base/temporary_folder.h"
-#include "chunks/merge_parts.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
-#include "meshes/streamed_ply.h"
+#include "meshes/mesh_sink.h"
 
 namespace lamina {
 namespace {

@@ -1,4 +1,4 @@
-#include "points/readers.h"
+#include "points/formats.h"
 
 #include "harness.h"
 

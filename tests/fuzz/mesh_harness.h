@@ -6,7 +6,7 @@
 
 #include "harness.h"
 #include "lamina/mesh.h"
-#include "meshes/readers.h"
+#include "meshes/formats.h"
 
 namespace lamina::fuzz {
 

@@ -1,6 +1,6 @@
 // OpenVDB reads its own files, and is not what is looked at here.
 #include "lamina/error.h"
-#include "points/readers.h"
+#include "points/formats.h"
 
 namespace lamina {
 

@@ -2,7 +2,7 @@
 #include <string_view>
 
 #include "harness.h"
-#include "points/readers.h"
+#include "points/formats.h"
 
 FUZZED(text) {
   using namespace lamina;

@@ -1,4 +1,4 @@
-#include "levelset/band_growth.h"
+#include "levelset/band.h"
 
 #include <gtest/gtest.h>
 

@@ -23,12 +23,12 @@
 #include "base/output_file.h"
 #include "lamina/error.h"
 #include "lamina/mesh.h"
+#include "meshes/formats.h"
 #include "meshes/glb.h"
 #include "meshes/glb_files.h"
 #include "meshes/mesh_blocks.h"
 #include "meshes/mesh_files.h"
 #include "meshes/mesh_sink.h"
-#include "meshes/writers.h"
 
 namespace lamina {
 namespace {

@@ -13,10 +13,10 @@
 #include <vector>
 
 #include "lamina/mesh.h"
+#include "meshes/formats.h"
 #include "meshes/glb_files.h"
 #include "meshes/mesh_files.h"
 #include "meshes/mesh_sink.h"
-#include "meshes/writers.h"
 
 namespace lamina {
 namespace {

@@ -8,7 +8,6 @@
 #include "base/temporary_folder.h"
 #include "lamina/error.h"
 #include "meshes/mesh_sink.h"
-#include "meshes/streamed_ply.h"
 #include "points/ply_header.h"
 
 namespace lamina {

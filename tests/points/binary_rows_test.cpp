@@ -1,4 +1,4 @@
-#include "points/binary_rows.h"
+#include "points/point_columns.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "base/scalar_type.h"
+#include "base/number.h"
 #include "points/ply_files.h"
 
 namespace lamina {

@@ -1,5 +1,5 @@
 // LAS of every version and point format, written field by field from the specification's tables, and files that lie.
-#include "points/readers.h"
+#include "points/formats.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

@@ -1,12 +1,11 @@
 // LAS as written comes back: positions to the step, everything else exactly.
-#include "points/writers.h"
+#include "points/formats.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "base/temporary_folder.h"
 #include "points/point_rows.h"
-#include "points/writers.h"
 
 namespace lamina {
 namespace {

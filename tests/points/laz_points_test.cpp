@@ -17,9 +17,9 @@
 #include "base/temporary_folder.h"
 #include "lamina/points.h"
 #include "laz/chunks.h"
-#include "points/las_records.h"
+#include "points/formats.h"
+#include "points/las.h"
 #include "points/point_rows.h"
-#include "points/readers.h"
 #include "support/paths.h"
 
 namespace lamina {

@@ -1,5 +1,5 @@
 // OBJ vertices as points: colours, normals by order or by faces, and what is left out.
-#include "points/readers.h"
+#include "points/formats.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

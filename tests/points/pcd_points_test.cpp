@@ -1,5 +1,5 @@
 // PCD in its three encodings from one table of values, an independent LZF packer, and headers that lie.
-#include "points/readers.h"
+#include "points/formats.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

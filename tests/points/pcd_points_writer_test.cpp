@@ -1,5 +1,5 @@
 // PCD as written comes back as it was, colours packed on the way.
-#include "points/writers.h"
+#include "points/formats.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -5,7 +5,7 @@
 #include "base/temporary_folder.h"
 #include "lamina/error.h"
 #include "lamina/points.h"
-#include "points/ply_elements.h"
+#include "points/ply_header.h"
 
 namespace lamina {
 namespace {

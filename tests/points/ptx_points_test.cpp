@@ -1,5 +1,5 @@
 // PTX: poses, missing returns, several scans.
-#include "points/readers.h"
+#include "points/formats.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-#include "points/sniff.h"
+#include "points/formats.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Text clouds: columns told, named and guessed; separators; counts; what is refused and why.
-#include "points/readers.h"
+#include "points/formats.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

@@ -1,5 +1,5 @@
 // XYZ and CSV as written come back as they were.
-#include "points/writers.h"
+#include "points/formats.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // Points grids come through open_points like any other format.
-#include "points/readers.h"
+#include "points/formats.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

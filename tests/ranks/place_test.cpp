@@ -6,7 +6,7 @@
 
 #include "lamina/error.h"
 #include "ranks/ranks.h"
-#include "ranks/write_together.h"
+#include "ranks/together.h"
 
 namespace lamina::ranks {
 namespace {

@@ -1,5 +1,5 @@
-#include "reconstruct/choose_support.h"
 #include "reconstruct/constants.h"
+#include "reconstruct/plan.h"
 
 #include <gtest/gtest.h>
 
@@ -11,10 +11,15 @@ RadiusSurvey survey(float noise, float high) {
 }
 
 /// For samples that come with their normals, or have none.
-StageSettings choice_of(const SurfaceSettings& settings, const RadiusSurvey& survey, bool found_normals = false) {
+ReconstructionPlan choice_of(const SurfaceSettings& settings, const RadiusSurvey& survey, const PointSourceInfo& info) {
+  ReconstructionPlan plan;
+  choose_support(settings, survey, info, plan);
+  return plan;
+}
+ReconstructionPlan choice_of(const SurfaceSettings& settings, const RadiusSurvey& survey, bool found_normals = false) {
   PointSourceInfo info;
   info.found_normals = found_normals;
-  return choose_support(settings, survey, info);
+  return choice_of(settings, survey, info);
 }
 
 SurfaceSettings by_noise() {
@@ -24,15 +29,15 @@ SurfaceSettings by_noise() {
 }
 
 TEST(ChooseSupport, NothingIsChosenUnlessAskedFor) {
-  const StageSettings choice = choice_of({}, survey(0.2F, 2));
+  const ReconstructionPlan choice = choice_of({}, survey(0.2F, 2));
   EXPECT_EQ(choice.feed.blend, 1.2);
   EXPECT_EQ(choice.refit.support, 0);
   EXPECT_EQ(choice.feed.cell, (Length{0.9, Length::Unit::influence_radius}));
 }
 
 TEST(ChooseSupport, EvenCleanCloudsGetTheNarrowestSupport) {
-  const StageSettings even = choice_of(by_noise(), survey(0.01F, 2.5F));
-  const StageSettings varying = choice_of(by_noise(), survey(0.01F, 8));
+  const ReconstructionPlan even = choice_of(by_noise(), survey(0.01F, 2.5F));
+  const ReconstructionPlan varying = choice_of(by_noise(), survey(0.01F, 8));
   EXPECT_EQ(even.feed.blend, 1);
   EXPECT_EQ(even.feed.cell.unit, Length::Unit::sample_radius);
   EXPECT_EQ(varying.feed.blend, 1.2);
@@ -52,19 +57,19 @@ TEST(ChooseSupport, PositionsAloneMayHaveWideGaps) {
 TEST(ChooseSupport, GapsThatNobodySawAreBridged) {
   EXPECT_TRUE(choice_of(by_noise(), survey(0.2F, 8), true).holes.bridge);
   PointSourceInfo info;
-  EXPECT_FALSE(choose_support(by_noise(), survey(0.2F, 8), info).holes.bridge);
+  EXPECT_FALSE(choice_of(by_noise(), survey(0.2F, 8), info).holes.bridge);
   info.attributes.push_back({"scan", ScalarType::uint8});
-  EXPECT_TRUE(choose_support(by_noise(), survey(0.2F, 8), info).holes.bridge);
-  EXPECT_FALSE(choose_support({}, survey(0.2F, 8), info).holes.bridge) << "nothing is chosen unless asked for";
+  EXPECT_TRUE(choice_of(by_noise(), survey(0.2F, 8), info).holes.bridge);
+  EXPECT_FALSE(choice_of({}, survey(0.2F, 8), info).holes.bridge) << "nothing is chosen unless asked for";
   info.attributes.clear();
   info.scans.resize(2);
-  EXPECT_TRUE(choose_support(by_noise(), survey(0.01F, 2), info).holes.bridge);
+  EXPECT_TRUE(choice_of(by_noise(), survey(0.01F, 2), info).holes.bridge);
   SurfaceSettings settings = by_noise();
   settings.bridge = false;
-  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2), info).holes.bridge);
+  EXPECT_FALSE(choice_of(settings, survey(0.01F, 2), info).holes.bridge);
   settings = by_noise();
   settings.close_holes = 0;
-  EXPECT_FALSE(choose_support(settings, survey(0.01F, 2), info).holes.bridge);
+  EXPECT_FALSE(choice_of(settings, survey(0.01F, 2), info).holes.bridge);
 }
 
 TEST(ChooseSupport, ClosedMeshesAreMadeWhereAskedFor) {
@@ -80,7 +85,7 @@ TEST(ChooseSupport, ClosedMeshesAreMadeWhereAskedFor) {
 TEST(ChooseSupport, NoiseWidensTheSupportAndRefitsNormals) {
   double before = 1.2;
   for (const float noise : {0.06F, 0.1F, kVeryNoisy}) {
-    const StageSettings choice = choice_of(by_noise(), survey(noise, 2));
+    const ReconstructionPlan choice = choice_of(by_noise(), survey(noise, 2));
     EXPECT_GT(choice.feed.blend, before);
     EXPECT_GT(choice.refit.support, 0);
     EXPECT_EQ(choice.feed.cell.unit, Length::Unit::sample_radius);
@@ -91,9 +96,9 @@ TEST(ChooseSupport, NoiseWidensTheSupportAndRefitsNormals) {
 
 TEST(ChooseSupport, RoughNormalsWantTheWideSupportSooner) {
   RadiusSurvey cloud = survey(kVeryNoisyRough, 2);
-  const StageSettings even = choice_of(by_noise(), cloud);
+  const ReconstructionPlan even = choice_of(by_noise(), cloud);
   cloud.normal_noise = 0.25F;  // 14 degrees
-  const StageSettings rough = choice_of(by_noise(), cloud);
+  const ReconstructionPlan rough = choice_of(by_noise(), cloud);
   EXPECT_EQ(rough.feed.blend, kVeryNoisyBlend);
   EXPECT_LT(even.feed.blend, rough.feed.blend);
   EXPECT_EQ(rough.refit.support, kRoughRefit);

@@ -5,7 +5,6 @@
 
 #include "lamina/error.h"
 #include "reconstruct/clouds.h"
-#include "reconstruct/cost.h"
 
 namespace lamina {
 namespace {

@@ -8,7 +8,6 @@
 #include "lamina/render.h"
 #include "lamina/volume.h"
 #include "render/canvas.h"
-#include "render/draw.h"
 #include "support/program.h"
 #include "vdb/grids.h"
 #include "vdb/vdb_file.h"

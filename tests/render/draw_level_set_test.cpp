@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "lamina/render.h"
-#include "render/draw.h"
+#include "render/canvas.h"
 #include "vdb/grids.h"
 #include "volume/volume_data.h"
 

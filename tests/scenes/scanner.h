@@ -11,7 +11,7 @@
 
 #include "lamina/mesh.h"
 #include "measure/triangle_bvh.h"
-#include "meshes/area_sampler.h"
+#include "meshes/triangle_geometry.h"
 #include "meshes/vec3.h"
 #include "reconstruct/clouds.h"
 

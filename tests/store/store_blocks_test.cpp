@@ -1,5 +1,6 @@
 // Stores of parts of a cloud, put together: the store of the whole.
-#include "store/store_blocks.h"
+#include "store/block_codec.h"
+#include "store/slab_store.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck.h>

@@ -6,7 +6,7 @@
 #include <csignal>
 #include <cstdlib>
 
-#include "common/option_values.h"
+#include "common/options.h"
 #include "support/program.h"
 
 namespace lamina::tools {

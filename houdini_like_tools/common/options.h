@@ -1,7 +1,8 @@
-// The values that options take: one of a few words, a length, or several numbers in one word such as 1024x768 or
-// 0.5,1,2.
+// Options that tools share, and the values that options take: one of a few words, a length, or several numbers in one
+// word such as 1024x768 or 0.5,1,2.
 #pragma once
 #include <CLI/CLI.hpp>
+
 #include <cstddef>
 #include <functional>
 #include <map>
@@ -10,7 +11,10 @@
 #include <string_view>
 #include <vector>
 
+#include "lamina/clean.h"
 #include "lamina/length.h"
+#include "lamina/normals.h"
+#include "lamina/surface.h"
 
 namespace lamina::tools {
 
@@ -56,5 +60,29 @@ CLI::Option* add_yes_no_or_auto(CLI::App& app, const std::string& name, std::opt
 
 /// Of a count: why its text cannot be one where it is below 0, which the conversion takes for a huge number.
 std::string refuse_below_zero(const std::string& text);
+
+// Options for what happens to points before they are reconstructed, shared by the tools that can: cleaning, and
+// normals.
+
+/// --clip, --every, --merge, --outliers, --neighbours, --spacing.
+void add_clean_options(CLI::App& app, CleanSettings& settings, const std::string& group);
+
+/// --align.
+void add_align(CLI::App& tool, bool& align, const std::string& group);
+
+/// --normals.
+void add_normals_choice(CLI::App& tool, std::optional<NormalsChoice>& normals, const std::string& group);
+
+/// --k, --radius, --viewpoint, --up, --flip.
+void add_normals_options(CLI::App& tool, NormalsSettings& settings, const std::string& group);
+
+// Options of `lamina surface` by subject.
+
+/// The fit, and the octree's cells.
+void add_fit_options(CLI::App& tool, SurfaceSettings& settings);
+/// The mesh's holes.
+void add_hole_options(CLI::App& tool, SurfaceSettings& settings, const std::string& group);
+/// The grids written beside the mesh.
+void add_volume_options(CLI::App& tool, VolumeExport& v);
 
 }  // namespace lamina::tools

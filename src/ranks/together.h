@@ -1,7 +1,8 @@
-// One mesh, written by all ranks at their places in one file.
+// What ranks do together: read the input, gather the samples where they are worked on, write one mesh.
 #pragma once
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -10,12 +11,57 @@
 #include "boundary/boundary.h"
 #include "chunks/part_file.h"
 #include "lamina/holes.h"
+#include "lamina/points.h"
 #include "ranks/ranks.h"
 #include "reconstruct/job.h"
 #include "reconstruct/mesh_output.h"
 #include "reconstruct/stages.h"
+#include "samples/sample_feed.h"
+#include "samples/sampling_survey.h"
+#include "store/ingest.h"
 
 namespace lamina::ranks {
+
+/// In the place of the input on the other ranks: the rows that rank 0 sends, in order.
+class DealtRows : public PointSource {
+ public:
+  DealtRows(Ranks& ranks, const PointSourceInfo& info);
+  /// Runs work that reads. Rank 0 meanwhile is in deal_rows().
+  void take(const std::function<void()>& work);
+  /// Throws Error(internal) when rank 0 has no more, for it or another has failed.
+  void read(std::uint64_t first, std::size_t count, SampleBatch& out) override;
+
+ private:
+  Ranks& ranks_;
+};
+
+/// Rank 0: does its own `work` with the source, then deals out what the others want, rank after rank, a batch ahead of
+/// them. Whatever fails, no rank is left waiting. `share`: the rows of a rank.
+void deal_rows(Ranks& ranks, PointSource& source, const std::function<void()>& work,
+               const std::function<RowSpan(int rank)>& share);
+
+struct SharedInput {
+  StoredCloud cloud;       ///< its store has this rank's samples, and counts those of all (declare_shares())
+  std::uint64_t rows = 0;  ///< read by this rank
+};
+
+/// Rows are cut into one run per rank, in order: a bucket's samples in input order are those of rank 0, then of rank 1,
+/// ... Frame and buckets are those of one process. The job's run differs by rank in what it says, not in what is
+/// cancelled; where rank 0 has found normals, its statistics say so.
+SharedInput read_together(Ranks& ranks, const SurfaceSettings& settings, const std::string& directory, Job& job);
+
+// Samples go where they are worked on: each rank's store holds a part of every bucket, and then whole buckets.
+
+/// survey_radii() of all ranks' samples, on all ranks: rank 0 looks, the others send what it asks for.
+RadiusSurvey survey_together(Ranks& ranks, const SlabStore& store, std::uint64_t sample_limit,
+                             std::uint32_t min_samples);
+
+/// A store in `directory` with the buckets that wanted[rank()] names, out of all ranks' stores, compressed blocks as
+/// they are. Memory: some 16 MB, whatever the cloud.
+SlabStore gather_buckets(Ranks& ranks, const SlabStore& store, const std::vector<BucketSpan>& wanted,
+                         const std::string& directory, const RunContext& run);
+
+// One mesh, written by all ranks at their places in one file.
 
 // A rank's part of the mesh, in unnamed files until all ranks know where theirs begin.
 

@@ -1,16 +1,23 @@
-// The formats' readers behind read_mesh(), and the stream they read from: plain and gzip-compressed files, seekable.
+// Mesh files by format: their readers and writers. The writers are ours: OpenMesh's hold the mesh and round positions
+// to float, and its OBJ writer refuses colours.
 #pragma once
 #include <zlib.h>
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <istream>
 #include <optional>
 #include <streambuf>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "base/output_file.h"
 #include "lamina/mesh.h"
+#include "lamina/run.h"
+#include "meshes/mesh_blocks.h"
 
 namespace lamina::meshes {
 
@@ -78,5 +85,62 @@ struct TextCensus {
 /// One pass from the start of `file`. Throws Error(unreadable) where the file contradicts itself (a vertex that is
 /// not three numbers, binary STL of the wrong length, OBJ with continued lines).
 TextCensus take_census(FileBuffer& file, const std::string& path, TextFormat format);
+
+}  // namespace lamina::meshes
+
+namespace lamina {
+
+// The formats a mesh is written in, by the ending of its name, and the writers behind write_mesh() and the streamed
+// meshes.
+struct MeshSinkSettings;
+}  // namespace lamina
+
+namespace lamina::meshes {
+
+enum class MeshFormat : std::uint8_t { ply, obj, off, stl, glb };
+
+/// How much goes into the files of a GLB.
+struct GlbLimits {
+  std::uint64_t file = 0xFFFFFFFF;  ///< the GLB's own length has 32 bits
+  /// Of each piece where one file does not hold all of a mesh: what programs like to have in one array.
+  std::uint64_t buffer = 2'000'000'000;
+};
+
+/// By the ending, in any case; nothing for another one.
+std::optional<MeshFormat> known_mesh_format(std::string_view path);
+
+/// The same; PLY for every name that says nothing else: "-", pipes, names without an ending.
+MeshFormat mesh_format(std::string_view path);
+
+/// Warns of the properties of a mesh that the formats of its names cannot hold, a line for each.
+void warn_of_losses(const MeshSinkSettings& mesh, const RunContext& run);
+
+/// Positions as float where that loses nothing, else double; normals; attributes in their own types (rounded and
+/// clamped to them); faces as `list uchar int vertex_indices` (uint beyond 2^31 - 1 vertices).
+void write_ply(const TriangleMesh& mesh, ResultFile& out);
+
+/// Bytes of a GLB's data where one buffer holds it.
+std::uint64_t glb_data_bytes(const AttributeLayout& layout, bool normals, std::uint64_t vertices,
+                             std::uint64_t triangles);
+
+/// GLB, binary glTF 2.0: one mesh of one node, each of positions, normals, colours and attributes in a piece of its
+/// own. Positions are floats; where those lose something, floats from a middle that the node's translation holds in
+/// double. Colours become linear, as glTF has them, in numbers from which they come back unchanged. Normals of no
+/// length become 0 0 1, others of another length than 1 are made unit; attributes that are not finite become 0. Meshes
+/// beyond what one file holds are split into primitives with files of their own (glb.h). Throws Error(usage) for
+/// positions that are not finite or too far apart for floats.
+void write_glb(MeshBlocks& mesh, ResultFile& out, const GlbLimits& limits = {});
+
+/// The same of a mesh in memory, or of points where it has no triangles, handed on in pieces; `name` is for messages.
+/// Throws Error(budget) for meshes beyond 4 GB.
+void write_glb(const TriangleMesh& mesh, const std::string& name, const std::function<void(std::string_view)>& sink);
+void write_glb(MeshBlocks& mesh, const std::string& name, const std::function<void(std::string_view)>& sink);
+
+/// Of the other formats. Keeps blocks, for STL at most a million positions, too.
+/// OBJ: `v x y z [r g b]` with colours from 0 to 1, `vn`, faces `f v//vn`. Positions read back as the same bits.
+/// OFF: [C][N]OFF with colours as r g b a bytes. Positions read back as the same bits.
+/// STL: positions as floats, facet normals computed; vertices and colours are not shared by this format. Throws
+/// Error(budget) for more than 2^32 - 1 triangles.
+void write_blocks(MeshBlocks& mesh, MeshFormat format, ResultFile& out, const GlbLimits& limits = {});
 
 }  // namespace lamina::meshes
