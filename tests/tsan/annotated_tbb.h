@@ -98,6 +98,83 @@ void parallel_invoke(const Bodies&... bodies) {
   ordered(order, [&] { ::tbb::parallel_invoke(job(bodies, order)...); });
 }
 
+/// A body of a reduction as TBB splits and joins it: the body itself lies beside it, in memory whose reuse the
+/// sanitizer sees, with what it happens after: the body it was split from, what it did before, and in the end those
+/// joined to it.
+template <class Body>
+class Reduced {
+ public:
+  explicit Reduced(Body& body) : kept_(new Kept{&body, nullptr, {}}) { __tsan_release(&kept_->order.begun); }
+  __attribute__((no_sanitize("thread"))) Reduced(Reduced& from, ::tbb::split split) {
+    __tsan_acquire(&from.kept_->order.begun);
+    auto own = std::make_unique<Body>(*from.kept_->body, split);
+    Body* const body = own.get();
+    kept_ = new Kept{body, std::move(own), {}};
+    __tsan_release(&kept_->order.begun);
+  }
+  Reduced(const Reduced&) = delete;
+  Reduced& operator=(const Reduced&) = delete;
+  __attribute__((no_sanitize("thread"))) ~Reduced() {
+    __tsan_acquire(&kept_->order.begun);
+    __tsan_acquire(&kept_->order.ended);
+    delete kept_;
+  }
+  template <class Range>
+  __attribute__((no_sanitize("thread"))) void operator()(const Range& range) {
+    __tsan_acquire(&kept_->order.begun);
+    __tsan_acquire(&kept_->order.ended);
+    (*kept_->body)(range);
+    __tsan_release(&kept_->order.ended);
+  }
+  __attribute__((no_sanitize("thread"))) void join(Reduced& other) {
+    __tsan_acquire(&kept_->order.ended);
+    __tsan_acquire(&other.kept_->order.ended);
+    kept_->body->join(*other.kept_->body);
+    __tsan_release(&kept_->order.ended);
+  }
+  [[nodiscard]] Order& order() { return kept_->order; }
+
+ private:
+  struct Kept {
+    Body* body;
+    std::unique_ptr<Body> own;  ///< null: the caller's
+    Order order;
+  };
+  Kept* kept_;
+};
+
+template <class Range, class Body, class... Partitioner>
+void parallel_reduce(const Range& range, Body& body, Partitioner&&... partitioner) {
+  Reduced<Body> reduced(body);
+  ordered(reduced.order(), [&] { ::tbb::parallel_reduce(range, reduced, std::forward<Partitioner>(partitioner)...); });
+}
+
+/// The body of a reduction that was told as functions.
+template <class Value, class Work, class Join>
+struct FunctionBody {
+  const Value& identity;
+  const Work& work;
+  const Join& joined;
+  Value value;
+  FunctionBody(const Value& start, const Work& w, const Join& j) : identity(start), work(w), joined(j), value(start) {}
+  FunctionBody(FunctionBody& from, ::tbb::split /*split*/) : FunctionBody(from.identity, from.work, from.joined) {}
+  template <class Range>
+  void operator()(const Range& range) {
+    value = work(range, std::as_const(value));
+  }
+  void join(FunctionBody& other) { value = joined(std::as_const(value), std::as_const(other.value)); }
+};
+
+template <class Range, class Value, class Work, class Join, class... Partitioner>
+requires std::is_invocable_v<Join, const Value&, const Value&> Value parallel_reduce(const Range& range,
+                                                                                     const Value& identity,
+                                                                                     const Work& work, const Join& join,
+                                                                                     Partitioner&&... partitioner) {
+  FunctionBody<Value, Work, Join> body(identity, work, join);
+  parallel_reduce(range, body, std::forward<Partitioner>(partitioner)...);
+  return body.value;
+}
+
 /// In the caller's thread: TBB's own threads would have no order.
 template <class Iterator, class... Compare>
 void parallel_sort(Iterator begin, Iterator end, Compare&&... compare) {
