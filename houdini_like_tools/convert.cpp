@@ -85,18 +85,7 @@ void convert_points(const ConvertOptions& o, const RunContext& context) {
 }
 
 void write_vertices(const ConvertOptions& o, const TriangleMesh& mesh, const RunContext& context) {
-  SampleBatch rows;
-  for (const auto& p : mesh.positions) {
-    rows.x.push_back(p[0]);
-    rows.y.push_back(p[1]);
-    rows.z.push_back(p[2]);
-  }
-  for (const auto& n : mesh.normals) {
-    rows.nx.push_back(n[0]);
-    rows.ny.push_back(n[1]);
-    rows.nz.push_back(n[2]);
-  }
-  rows.attributes = mesh.attributes;
+  const SampleBatch rows = vertices_of(mesh);
   const bool exact_as_float = std::all_of(mesh.positions.begin(), mesh.positions.end(), [](const auto& p) {
     return std::all_of(p.begin(), p.end(), [](double c) { return static_cast<double>(static_cast<float>(c)) == c; });
   });

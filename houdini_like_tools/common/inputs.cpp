@@ -148,4 +148,20 @@ TriangleMesh read_mesh_input(const std::string& path, const RunContext& context,
   return mesh;
 }
 
+SampleBatch vertices_of(const TriangleMesh& mesh) {
+  SampleBatch rows;
+  for (const auto& p : mesh.positions) {
+    rows.x.push_back(p[0]);
+    rows.y.push_back(p[1]);
+    rows.z.push_back(p[2]);
+  }
+  for (const auto& n : mesh.normals) {
+    rows.nx.push_back(n[0]);
+    rows.ny.push_back(n[1]);
+    rows.nz.push_back(n[2]);
+  }
+  rows.attributes = mesh.attributes;
+  return rows;
+}
+
 }  // namespace lamina::tools

@@ -36,4 +36,7 @@ TriangleMesh read_mesh_input(const std::string& path, const RunContext& context,
 /// The same for tools with --bad-samples: vertices that are not finite are refused, or left out, which is told.
 TriangleMesh read_mesh_input(const std::string& path, const RunContext& context, BadSamples bad);
 
+/// A mesh's vertices as points.
+SampleBatch vertices_of(const TriangleMesh& mesh);
+
 }  // namespace lamina::tools

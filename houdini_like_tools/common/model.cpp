@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/inputs.h"
 #include "common/point_models.h"
 #include "common/text.h"
 #include "lamina/error.h"
@@ -56,18 +57,7 @@ class HeldFog : public Model {
 /// A mesh file's vertices, where it has nothing but vertices.
 PointArrays as_points(TriangleMesh& mesh) {
   PointArrays points;
-  SampleBatch& s = points.samples;
-  for (const auto& p : mesh.positions) {
-    s.x.push_back(p[0]);
-    s.y.push_back(p[1]);
-    s.z.push_back(p[2]);
-  }
-  for (const auto& n : mesh.normals) {
-    s.nx.push_back(n[0]);
-    s.ny.push_back(n[1]);
-    s.nz.push_back(n[2]);
-  }
-  s.attributes = std::move(mesh.attributes);
+  points.samples = vertices_of(mesh);
   points.layout = std::move(mesh.layout);
   return points;
 }

@@ -79,38 +79,44 @@ class ValueLayer {
   Channels<State> channels_;
 };
 
-class HeightState {
+/// What the state of a layer knows of its value, a T at that place of the record.
+template <class T, std::size_t kPlace>
+class FieldState {
  public:
-  explicit HeightState(std::uint32_t z) : last_(z) { by_level_.fill(z); }
-  static std::uint32_t value_in(const std::byte* record) { return load_little<std::uint32_t>(record + kPlace); }
-  [[nodiscard]] std::uint32_t value() const { return last_; }
+  explicit FieldState(T value) : last_(value) {}
+  static T value_in(const std::byte* record) { return load_little<T>(record + kPlace); }
+  [[nodiscard]] T value() const { return last_; }
+
+ protected:
+  void put(std::byte* record) const { store_little(record + kPlace, last_); }
+  T last_;
+};
+
+class HeightState : public FieldState<std::uint32_t, 8> {
+ public:
+  explicit HeightState(std::uint32_t z) : FieldState(z) { by_level_.fill(z); }
   template <class Coder>
   void code(Coder& coder, const PointContext& c, std::byte* record) {
     last_ = by_level_[c.level] = code_.code(coder, by_level_[c.level], c.height_context, value_in(record));
-    store_little(record + kPlace, last_);
+    put(record);
   }
 
  private:
-  static constexpr std::size_t kPlace = 8;
-  std::uint32_t last_;
   std::array<std::uint32_t, 8> by_level_{};
   IntegerCodec<32, 20> code_;
 };
 
-class ClassState {
+class ClassState : public FieldState<std::uint8_t, 16> {
  public:
-  explicit ClassState(unsigned value) : last_(value) {}
-  static unsigned value_in(const std::byte* record) { return std::to_integer<unsigned>(record[kPlace]); }
-  [[nodiscard]] unsigned value() const { return last_; }
+  using FieldState::FieldState;
   template <class Coder>
   void code(Coder& coder, const PointContext& c, std::byte* record) {
-    last_ = coder.symbol(models_[(last_ & 0x1F) * 2 + (c.place == PointContext::kSingle ? 1 : 0)], value_in(record));
-    record[kPlace] = static_cast<std::byte>(last_);
+    last_ = static_cast<std::uint8_t>(
+        coder.symbol(models_[(last_ & 0x1FU) * 2 + (c.place == PointContext::kSingle ? 1 : 0)], value_in(record)));
+    put(record);
   }
 
  private:
-  static constexpr std::size_t kPlace = 16;
-  unsigned last_;
   ModelBank<256, 64> models_;
 };
 
@@ -135,92 +141,72 @@ class FlagsState {
   ModelBank<64, 64> models_;
 };
 
-class IntensityState {
+class IntensityState : public FieldState<std::uint16_t, 12> {
  public:
-  explicit IntensityState(std::uint16_t value) : last_(value) { by_place_.fill(value); }
-  static std::uint16_t value_in(const std::byte* record) { return load_little<std::uint16_t>(record + kPlace); }
-  [[nodiscard]] std::uint16_t value() const { return last_; }
+  explicit IntensityState(std::uint16_t value) : FieldState(value) { by_place_.fill(value); }
   template <class Coder>
   void code(Coder& coder, const PointContext& c, std::byte* record) {
     std::uint16_t& at_place = by_place_[c.place * 2U + (c.time_changed ? 1 : 0)];
     last_ = at_place = static_cast<std::uint16_t>(code_.code(coder, at_place, c.place, value_in(record)));
-    store_little(record + kPlace, last_);
+    put(record);
   }
 
  private:
-  static constexpr std::size_t kPlace = 12;
-  std::uint16_t last_;
   std::array<std::uint16_t, 8> by_place_{};
   IntegerCodec<16, 4> code_;
 };
 
-class AngleState {
+class AngleState : public FieldState<std::uint16_t, 18> {
  public:
-  explicit AngleState(std::uint16_t value) : last_(value) {}
-  static std::uint16_t value_in(const std::byte* record) { return load_little<std::uint16_t>(record + kPlace); }
-  [[nodiscard]] std::uint16_t value() const { return last_; }
+  using FieldState::FieldState;
   template <class Coder>
   void code(Coder& coder, const PointContext& c, std::byte* record) {
     if (c.angle_changed) {
       last_ = static_cast<std::uint16_t>(code_.code(coder, last_, c.time_changed ? 1 : 0, value_in(record)));
     }
-    store_little(record + kPlace, last_);
+    put(record);
   }
 
  private:
-  static constexpr std::size_t kPlace = 18;
-  std::uint16_t last_;
   IntegerCodec<16, 2> code_;
 };
 
-class UserState {
+class UserState : public FieldState<std::uint8_t, 17> {
  public:
-  explicit UserState(unsigned value) : last_(value) {}
-  static unsigned value_in(const std::byte* record) { return std::to_integer<unsigned>(record[kPlace]); }
-  [[nodiscard]] unsigned value() const { return last_; }
+  using FieldState::FieldState;
   template <class Coder>
   void code(Coder& coder, const PointContext&, std::byte* record) {
-    last_ = coder.symbol(models_[last_ / 4], value_in(record));
-    record[kPlace] = static_cast<std::byte>(last_);
+    last_ = static_cast<std::uint8_t>(coder.symbol(models_[last_ / 4U], value_in(record)));
+    put(record);
   }
 
  private:
-  static constexpr std::size_t kPlace = 17;
-  unsigned last_;
   ModelBank<256, 64> models_;
 };
 
-class SourceState {
+class SourceState : public FieldState<std::uint16_t, 20> {
  public:
-  explicit SourceState(std::uint16_t value) : last_(value) {}
-  static std::uint16_t value_in(const std::byte* record) { return load_little<std::uint16_t>(record + kPlace); }
-  [[nodiscard]] std::uint16_t value() const { return last_; }
+  using FieldState::FieldState;
   template <class Coder>
   void code(Coder& coder, const PointContext& c, std::byte* record) {
     if (c.source_changed) last_ = static_cast<std::uint16_t>(code_.code(coder, last_, 0, value_in(record)));
-    store_little(record + kPlace, last_);
+    put(record);
   }
 
  private:
-  static constexpr std::size_t kPlace = 20;
-  std::uint16_t last_;
   IntegerCodec<16, 1> code_;
 };
 
-class TimeState {
+class TimeState : public FieldState<std::uint64_t, 22> {
  public:
-  explicit TimeState(std::uint64_t value) : last_(value), code_(value) {}
-  static std::uint64_t value_in(const std::byte* record) { return load_little<std::uint64_t>(record + kPlace); }
-  [[nodiscard]] std::uint64_t value() const { return last_; }
+  explicit TimeState(std::uint64_t value) : FieldState(value), code_(value) {}
   template <class Coder>
   void code(Coder& coder, const PointContext& c, std::byte* record) {
     if (c.time_changed) last_ = code_.code(coder, value_in(record));
-    store_little(record + kPlace, last_);
+    put(record);
   }
 
  private:
-  static constexpr std::size_t kPlace = 22;
-  std::uint64_t last_;
   GpsTimeCodec<false> code_;
 };
 

@@ -64,6 +64,19 @@ std::vector<ColumnTarget> prepare_batch(const PointSourceInfo& info, const std::
 /// Once the rows are read: the floats of the attributes that were read as doubles.
 void round_exact_attributes(SampleBatch& batch);
 
+/// Calls use(values of one, values of the other) for each column of two batches; the other gets as many attributes.
+template <class From, class Use>
+void for_columns(From& from, SampleBatch& to, const Use& use) {
+  for (const auto axis : {&SampleBatch::x, &SampleBatch::y, &SampleBatch::z}) use(from.*axis, to.*axis);
+  for (const auto column :
+       {&SampleBatch::nx, &SampleBatch::ny, &SampleBatch::nz, &SampleBatch::radius, &SampleBatch::quality})
+    use(from.*column, to.*column);
+  to.attributes.resize(from.attributes.size());
+  for (std::size_t a = 0; a < from.attributes.size(); ++a) use(from.attributes[a], to.attributes[a]);
+  to.exact.resize(from.exact.size());
+  for (std::size_t a = 0; a < from.exact.size(); ++a) use(from.exact[a], to.exact[a]);
+}
+
 // Rows of points as bytes of fixed size: read a block at a time and taken apart column by column, and written.
 
 /// out[i] = the value of `type` at row + i * stride, for i < count. `swapped`: bytes stand in the other order than this

@@ -190,31 +190,17 @@ void keep_rows(const Mask& stays, SampleBatch& batch) {
 
 /// Moves `count` rows from the first-th on to `to`, whose other rows go; all before them go from `from`, too.
 void cut_rows(std::size_t first, std::size_t count, SampleBatch& from, SampleBatch& to) {
-  const auto cut = [&](auto& values, auto& out) {
+  for_columns(from, to, [&](auto& values, auto& out) {
     if (values.empty()) return out.clear();
     const auto begin = values.begin() + static_cast<std::ptrdiff_t>(first);
     const auto end = begin + static_cast<std::ptrdiff_t>(count);
     out.assign(begin, end);
     values.erase(values.begin(), end);
-  };
-  to.attributes.resize(from.attributes.size());
-  to.exact.resize(from.exact.size());
-  cut(from.nx, to.nx), cut(from.ny, to.ny), cut(from.nz, to.nz);
-  cut(from.radius, to.radius), cut(from.quality, to.quality);
-  for (std::size_t a = 0; a < from.attributes.size(); ++a) cut(from.attributes[a], to.attributes[a]);
-  for (std::size_t a = 0; a < from.exact.size(); ++a) cut(from.exact[a], to.exact[a]);
-  cut(from.x, to.x), cut(from.y, to.y), cut(from.z, to.z);
+  });
 }
 
 void append_rows(const SampleBatch& from, SampleBatch& to) {
-  const auto append = [](const auto& values, auto& out) { out.insert(out.end(), values.begin(), values.end()); };
-  to.attributes.resize(from.attributes.size());
-  to.exact.resize(from.exact.size());
-  append(from.nx, to.nx), append(from.ny, to.ny), append(from.nz, to.nz);
-  append(from.radius, to.radius), append(from.quality, to.quality);
-  for (std::size_t a = 0; a < from.attributes.size(); ++a) append(from.attributes[a], to.attributes[a]);
-  for (std::size_t a = 0; a < from.exact.size(); ++a) append(from.exact[a], to.exact[a]);
-  append(from.x, to.x), append(from.y, to.y), append(from.z, to.z);
+  for_columns(from, to, [](const auto& values, auto& out) { out.insert(out.end(), values.begin(), values.end()); });
 }
 
 /// How many rows stay.

@@ -47,26 +47,12 @@ class VdbPoints final : public PointSource {
 
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override {
     const RowRange rows = rows_there(info_, first, count);
-    const auto cut = [&](const auto& from, auto& to) {
+    out.first = rows.first;
+    for_columns(rows_, out, [&](const auto& from, auto& to) {
       if (from.empty()) return to.clear();
       const auto begin = from.begin() + static_cast<std::ptrdiff_t>(rows.first);
       to.assign(begin, begin + static_cast<std::ptrdiff_t>(rows.count));
-    };
-    out.first = rows.first;
-    cut(rows_.x, out.x);
-    cut(rows_.y, out.y);
-    cut(rows_.z, out.z);
-    cut(rows_.nx, out.nx);
-    cut(rows_.ny, out.ny);
-    cut(rows_.nz, out.nz);
-    cut(rows_.radius, out.radius);
-    cut(rows_.quality, out.quality);
-    out.attributes.resize(rows_.attributes.size());
-    out.exact.resize(rows_.exact.size());
-    for (std::size_t a = 0; a < rows_.attributes.size(); ++a) {
-      cut(rows_.attributes[a], out.attributes[a]);
-      cut(rows_.exact[a], out.exact[a]);
-    }
+    });
   }
 
  private:
