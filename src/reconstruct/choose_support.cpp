@@ -14,26 +14,26 @@ namespace {
 constexpr int kMostProjections = 16;
 
 /// What noise asks for: a wider support, the wider the more of it, on the same cells, and normals that agree.
-void choose_for_noise(const RadiusSurvey& survey, bool cell_given, ReconstructionPlan& out) {
+void choose_for_noise(const RadiusSurvey& survey, bool cell_given, ReconstructionPlan& plan) {
   const bool rough = static_cast<double>(survey.normal_noise) * 180 / std::numbers::pi > kRoughNormals;
   const double most = static_cast<double>((rough ? kVeryNoisyRough : kVeryNoisy) - kNoisy);
   const double share = std::min(1.0, static_cast<double>(survey.noise - kNoisy) / most);
-  out.feed.blend = kNoisyBlend + (kVeryNoisyBlend - kNoisyBlend) * share;
-  out.feed.cell = {kChosenCell, Length::Unit::sample_radius};
-  out.refit.support = rough ? kRoughRefit : kNoisyRefit;
-  out.trim = kRimOverhang;
-  if (!cell_given) out.projection.band = kNoisyBand;
+  plan.feed.blend = kNoisyBlend + (kVeryNoisyBlend - kNoisyBlend) * share;
+  plan.feed.cell = {kChosenCell, Length::Unit::sample_radius};
+  plan.refit.support = rough ? kRoughRefit : kNoisyRefit;
+  plan.trim = kRimOverhang;
+  if (!cell_given) plan.projection.band = kNoisyBand;
 }
 
 /// What an even, clean sampling allows: the narrowest support, and finer cells between sheets.
-void choose_for_even(bool cell_given, double cell, ReconstructionPlan& out) {
-  out.feed.blend = 1;
-  out.feed.cell = {cell, Length::Unit::sample_radius};
-  out.projection.trusted_offset = kEvenTrust;
-  out.projection.trusted_samples = kEvenTrustedSamples;
+void choose_for_even(bool cell_given, double cell, ReconstructionPlan& plan) {
+  plan.feed.blend = 1;
+  plan.feed.cell = {cell, Length::Unit::sample_radius};
+  plan.projection.trusted_offset = kEvenTrust;
+  plan.projection.trusted_samples = kEvenTrustedSamples;
   if (cell_given) return;
-  out.feed.refine_sheets = true;
-  out.projection.band = kSheetBand;
+  plan.feed.refine_sheets = true;
+  plan.projection.band = kSheetBand;
 }
 
 }  // namespace
@@ -45,45 +45,45 @@ double choose_deviation(const RadiusSurvey& survey) {
 }
 
 void choose_support(const SurfaceSettings& s, const RadiusSurvey& survey, const PointSourceInfo& info,
-                    ReconstructionPlan& out) {
-  out.feed.blend = kDefaultBlend;
+                    ReconstructionPlan& plan) {
+  plan.feed.blend = kDefaultBlend;
   if (s.blend) {
-    out.feed.blend = *s.blend;
+    plan.feed.blend = *s.blend;
   } else if (survey.noise > kNoisy) {
-    choose_for_noise(survey, s.cell.has_value(), out);
+    choose_for_noise(survey, s.cell.has_value(), plan);
   } else if (survey.high < kEven * survey.low) {
     const bool thins = !s.simplify.wanted() && s.deviation.value_or(kCleanDeviation) > 0;
-    choose_for_even(s.cell.has_value(), thins && survey.noise <= kSharp ? kThinnedCell : kChosenCell, out);
+    choose_for_even(s.cell.has_value(), thins && survey.noise <= kSharp ? kThinnedCell : kChosenCell, plan);
     // A closed mesh. Normals come with samples of a surface, which ends where they do; positions alone say nothing of
     // wide gaps among them.
-    out.holes.watertight = info.found_normals ? Watertight::any_loops : Watertight::short_loops;
+    plan.holes.watertight = info.found_normals ? Watertight::any_loops : Watertight::short_loops;
   }
-  if (!s.blend && survey.noise <= kNoisy) out.trim = kCleanRimOverhang;
-  if (s.trim) out.trim = *s.trim;
+  if (!s.blend && survey.noise <= kNoisy) plan.trim = kCleanRimOverhang;
+  if (s.trim) plan.trim = *s.trim;
   // Rims that are cut where the samples end may run on before.
-  if (out.trim > 0 && survey.noise > kNoisy) out.doubtful = DoubtfulPoints::as_extended;
-  if (s.cell) out.feed.cell = *s.cell;
-  if (s.refit) out.refit.support = *s.refit;
-  out.projection.creases = s.features.value_or(!s.blend && survey.noise <= kSharp) && !s.diffuse;
-  if (out.projection.creases && !s.refit && survey.noise <= kExact && survey.blurred > kBlurred) {
-    out.refit.support = double{kConsensusReach};
-    out.refit.only_blurred = true;
+  if (plan.trim > 0 && survey.noise > kNoisy) plan.doubtful = DoubtfulPoints::as_extended;
+  if (s.cell) plan.feed.cell = *s.cell;
+  if (s.refit) plan.refit.support = *s.refit;
+  plan.projection.creases = s.features.value_or(!s.blend && survey.noise <= kSharp) && !s.diffuse;
+  if (plan.projection.creases && !s.refit && survey.noise <= kExact && survey.blurred > kBlurred) {
+    plan.refit.support = double{kConsensusReach};
+    plan.refit.only_blurred = true;
   }
   // Free clustering joins sheets: a boundary loop may pass through a vertex several times.
-  out.holes.longest = s.cluster == ClusterMode::free ? 0 : s.close_holes.value_or(kLongestRim);
-  out.holes.mark = s.vertex_filled;
-  out.holes.all = s.fill_all;
-  if (s.watertight) out.holes.watertight = *s.watertight ? Watertight::any_loops : Watertight::no;
-  out.holes.bridge = s.bridge.value_or(!s.blend && (info.found_normals || tells_scans(info)));
-  if (out.holes.longest == 0) {
-    out.holes.watertight = Watertight::no;
-    out.holes.bridge = false;
+  plan.holes.longest = s.cluster == ClusterMode::free ? 0 : s.close_holes.value_or(kLongestRim);
+  plan.holes.mark = s.vertex_filled;
+  plan.holes.all = s.fill_all;
+  if (s.watertight) plan.holes.watertight = *s.watertight ? Watertight::any_loops : Watertight::no;
+  plan.holes.bridge = s.bridge.value_or(!s.blend && (info.found_normals || tells_scans(info)));
+  if (plan.holes.longest == 0) {
+    plan.holes.watertight = Watertight::no;
+    plan.holes.bridge = false;
   }
-  out.feed.radius_scale = static_cast<float>(s.radius_scale);
-  out.projection.fit = s.fit == FitMode::sphere ? Fit::sphere : Fit::plane;
-  out.projection.steps = s.steps == 0 ? kMostProjections : s.steps;
-  if (s.steps == 0) out.projection.tolerance = static_cast<float>(s.step_tolerance / out.feed.blend);
-  out.projection.centres = s.diffuse;
+  plan.feed.radius_scale = static_cast<float>(s.radius_scale);
+  plan.projection.fit = s.fit == FitMode::sphere ? Fit::sphere : Fit::plane;
+  plan.projection.steps = s.steps == 0 ? kMostProjections : s.steps;
+  if (s.steps == 0) plan.projection.tolerance = static_cast<float>(s.step_tolerance / plan.feed.blend);
+  plan.projection.centres = s.diffuse;
 }
 
 }  // namespace lamina
