@@ -232,17 +232,6 @@ std::uint64_t mixed(std::uint32_t v) {
   return m ^ m >> 29;
 }
 
-/// Calls use(vertex, next, before) for the corners of the slab's vertices [first, end) in triangles.
-template <typename Use>
-void for_corners(const std::vector<std::array<std::uint32_t, 3>>& triangles, std::uint32_t first, std::uint32_t end,
-                 const Use& use) {
-  for (const auto& t : triangles) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (t[k] >= first && t[k] < end) use(t[k] - first, t[(k + 1) % 3], t[(k + 2) % 3]);
-    }
-  }
-}
-
 }  // namespace
 
 void RimSmoother::push(MeshSlab slab) {

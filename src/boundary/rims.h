@@ -23,6 +23,18 @@ struct MeshSlab {
   std::vector<std::array<std::uint32_t, 3>> triangles;
 };
 
+/// Calls use(vertex, next, before) for the corners in triangles of a slab's vertices [first, end); `vertex` counts from
+/// the first.
+template <typename Use>
+void for_corners(const std::vector<std::array<std::uint32_t, 3>>& triangles, std::uint32_t first, std::uint32_t end,
+                 const Use& use) {
+  for (const auto& t : triangles) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (t[k] >= first && t[k] < end) use(t[k] - first, t[(k + 1) % 3], t[(k + 2) % 3]);
+    }
+  }
+}
+
 /// Takes a streamed mesh slab by slab and gives back what lies within the level, one slab later, in the order in which
 /// it came: of every slab the vertices that stay, then those of its cuts by the edge they lie on. A manifold stays one.
 /// What comes out of a slab depends on it and on the slabs on either side alone.

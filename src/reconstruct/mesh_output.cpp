@@ -159,7 +159,7 @@ void place_vertices(const ClusteredSlab& slab, const ReconstructionPlan& plan, V
 MeshOutput::MeshOutput(const ReconstructionPlan& plan, SlabSink& sink)
     : plan_(plan), sink_(sink), clusterer_(ClusterSettings{plan.cluster}), distinct_(plan.double_positions) {
   const auto level = static_cast<float>(plan.trim);
-  if (level > 0) rims_ = Rims{RimSmoother(level), RimTrimmer(level)};
+  if (level > 0) rims_.emplace(Rims{RimSmoother(level), RimTrimmer(level), {}});
 }
 
 MeshOutput::~MeshOutput() {
@@ -232,7 +232,9 @@ void MeshOutput::trim(bool last) {
   MeshSlab smoothed;
   while (rims_->smoother.pop(smoothed)) rims_->trimmer.push(std::move(smoothed));
   if (last) rims_->trimmer.finish();
-  while (rims_->trimmer.pop(trimmed_)) pass_on(trimmed_);
+  while (rims_->trimmer.pop(trimmed_)) rims_->fairer.push(std::exchange(trimmed_, std::exchange(faired_, {})));
+  if (last) rims_->fairer.finish();
+  while (rims_->fairer.pop(faired_)) pass_on(faired_);
 }
 
 void MeshOutput::pass_on(MeshSlab& slab) {

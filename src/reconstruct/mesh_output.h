@@ -13,6 +13,7 @@
 
 #include "boundary/boundary.h"
 #include "boundary/hole_closer.h"
+#include "boundary/rim_fairing.h"
 #include "boundary/rims.h"
 #include "clustering/clusterer.h"
 #include "isosurface/iso_mesh.h"
@@ -102,13 +103,14 @@ class MeshOutput {
   std::deque<std::shared_ptr<IsoSlab>> clustered_;  ///< by the clusterer, not yet written
   FinalSlab done_;                                  ///< lent to the clusterer and back: its storage is kept
   MeshSlab mesh_;                                   ///< of `done_`
-  /// What cuts the rims.
+  /// What makes the rims.
   struct Rims {
     RimSmoother smoother;
     RimTrimmer trimmer;
+    RimFairer fairer;
   };
   std::optional<Rims> rims_;
-  MeshSlab trimmed_;
+  MeshSlab trimmed_, faired_;
   DistinctPositions distinct_;
   std::mutex mutex_;  ///< of spares_
   std::vector<std::shared_ptr<IsoSlab>> spares_;

@@ -34,16 +34,15 @@ struct StageReach {
 };
 
 inline constexpr std::array<StageReach, kStages> kStageReach{{
-    {"mark", 3 + kTouchSlabs, 10 + kTouchSlabs, 8 + kTouchSlabs, "samples touch cells three slabs away"},
-    {"refine", 3, 10, 8, "a corner belongs to the cells of the slab below, too"},
-    {"place", 3, 9, 8, "corners of the cells; the values of a slab are extended from those above it"},
-    {"project", 3, 9, 8, "as place; with diffusion a slab more below, for the centres of its cells"},
-    {"extend", 2, 8, 7, "signs by the values around, a slab either way"},
-    {"number", 1, 8, 7, "an edge's ends lie in its slab and on the first plane above"},
-    {"triangulate", 0, 8, 6,
-     "clusters look two slabs down and two up, fans and vertices at one position one further down, rims two further "
-     "down "
-     "and three up"},
+    {"mark", 3 + kTouchSlabs, 12 + kTouchSlabs, 10 + kTouchSlabs, "samples touch cells three slabs away"},
+    {"refine", 3, 12, 10, "a corner belongs to the cells of the slab below, too"},
+    {"place", 3, 11, 10, "corners of the cells; the values of a slab are extended from those above it"},
+    {"project", 3, 11, 10, "as place; with diffusion a slab more below, for the centres of its cells"},
+    {"extend", 2, 10, 9, "signs by the values around, a slab either way"},
+    {"number", 1, 10, 9, "an edge's ends lie in its slab and on the first plane above"},
+    {"triangulate", 0, 10, 8,
+     "clusters look two slabs down and two up, fans and vertices at one position one further down, rims four further "
+     "down and five up"},
 }};
 
 constexpr const StageReach& reach_of(Stage stage) {

@@ -1,7 +1,9 @@
 // A triangulated grid as the slabs of a streamed mesh.
 #pragma once
+#include <cmath>
 #include <cstdint>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "boundary/rims.h"
@@ -37,6 +39,35 @@ inline std::vector<MeshSlab> grid_slabs(
     }
   }
   return slabs;
+}
+
+inline constexpr int kSide = 40;
+
+/// The squares of a grid that are wanted. No vertex reaches beyond its samples.
+inline std::vector<MeshSlab> squares(const WantedSquare& wanted) {
+  return grid_slabs(
+      kSide, [](int, int) { return 0.0F; }, wanted);
+}
+
+inline bool in_disc(int i, int row) {
+  return std::hypot(i + 0.5 - kSide / 2.0, row + 0.5 - kSide / 2.0) < 15;
+}
+
+/// What comes out of a pass over a streamed mesh.
+template <typename Pass>
+std::vector<MeshSlab> passed(Pass pass, std::vector<MeshSlab> slabs) {
+  std::vector<MeshSlab> out;
+  MeshSlab slab;
+  const auto take = [&] {
+    while (pass.pop(slab)) out.push_back(std::move(slab));
+  };
+  for (MeshSlab& s : slabs) {
+    pass.push(std::move(s));
+    take();
+  }
+  pass.finish();
+  take();
+  return out;
 }
 
 }  // namespace lamina::test

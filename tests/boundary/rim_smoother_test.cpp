@@ -12,36 +12,14 @@
 namespace lamina {
 namespace {
 
-constexpr int kSide = 40;
+using test::in_disc;
+using test::kSide;
+using test::squares;
+
 constexpr float kCutLevel = 0.2F;
 
-/// The squares of a grid that are wanted. No vertex reaches beyond its samples.
-std::vector<MeshSlab> squares(const test::WantedSquare& wanted) {
-  return test::grid_slabs(
-      kSide, [](int, int) { return 0.0F; }, wanted);
-}
-
-bool in_disc(int i, int row) {
-  return std::hypot(i + 0.5 - kSide / 2.0, row + 0.5 - kSide / 2.0) < 15;
-}
-
 std::vector<MeshSlab> smoothed(std::vector<MeshSlab> slabs) {
-  RimSmoother smoother(kCutLevel);
-  std::vector<MeshSlab> out;
-  MeshSlab slab;
-  const auto take = [&] {
-    while (smoother.pop(slab)) {
-      EXPECT_EQ(slab.slab, static_cast<std::int64_t>(out.size()));
-      out.push_back(std::move(slab));
-    }
-  };
-  for (MeshSlab& s : slabs) {
-    smoother.push(std::move(s));
-    take();
-  }
-  smoother.finish();
-  take();
-  return out;
+  return test::passed(RimSmoother(kCutLevel), std::move(slabs));
 }
 
 float overhang_at(const std::vector<MeshSlab>& slabs, int i, int row) {
@@ -51,6 +29,7 @@ float overhang_at(const std::vector<MeshSlab>& slabs, int i, int row) {
 TEST(RimSmoother, RaisesTheEndsOfASurfaceAndLeavesItsInside) {
   const std::vector<MeshSlab> out = smoothed(squares(in_disc));
   ASSERT_EQ(out.size(), std::size_t{kSide});
+  for (int row = 0; row < kSide; ++row) EXPECT_EQ(out[static_cast<std::size_t>(row)].slab, row);
   for (int row = 1; row + 1 < kSide; ++row) {
     for (int i = 1; i + 1 < kSide; ++i) {
       const int around = in_disc(i, row) + in_disc(i - 1, row) + in_disc(i, row - 1) + in_disc(i - 1, row - 1);
