@@ -2,25 +2,25 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <utility>
 
 namespace lamina::simplify {
 namespace {
 
 using namespace meshes;
 
-constexpr double kLeastCosine = 0.2;  ///< a triangle turns no farther at one contraction
+constexpr float kLeastCosine = 0.2F;  ///< a triangle turns no farther at one contraction
 
-/// Four times the squared area of a triangle over the square of the sum of its squared sides: 1/12 where it is
-/// equilateral, 0 where it has no area.
-struct Shape {
-  double area, sides;
-  [[nodiscard]] bool at_least(double quality) const { return 12 * area >= quality * quality * sides * sides; }
-  [[nodiscard]] bool worse_than(const Shape& o) const { return area * o.sides * o.sides < o.area * sides * sides; }
-};
+using Lanes = Moves::Lanes;
+using Triple = Moves::Triple;
 
-Shape shape_of(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& twice_area) {
-  return {dot(twice_area, twice_area), dot(b - a, b - a) + dot(c - b, c - b) + dot(a - c, a - c)};
+Triple less(const Triple& a, const Triple& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+Lanes times(const Triple& a, const Triple& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+Triple across(const Triple& a, const Triple& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
 }  // namespace
@@ -36,23 +36,28 @@ Placed place_edge(const Quadric& sum, const Vec3& a, const Vec3& b) {
   return at_a <= at_b ? Placed{a, std::max(0.0, at_a)} : Placed{b, std::max(0.0, at_b)};
 }
 
-bool keeps_shape(const Stars& stars, std::span<const Vec3> positions, std::uint32_t u, std::uint32_t v, const Vec3& to,
-                 double sliver) {
-  for (const auto& [vertex, other] : {std::pair{u, v}, std::pair{v, u}}) {
-    const Vec3& from = positions[vertex];
-    for (const std::uint32_t triangle : stars.around(vertex)) {
-      const Triangle& t = stars.triangles()[triangle];
-      if (names(t, other)) continue;
-      const std::size_t k = corner_of(t, vertex);
-      const Vec3 &p = positions[t[(k + 1) % 3]], &q = positions[t[(k + 2) % 3]];
-      const Vec3 before = cross(p - from, q - from), after = cross(p - to, q - to);
-      const double along = dot(before, after);
-      const Shape shape = shape_of(to, p, q, after);
-      if (!(along > 0 && along * along > kLeastCosine * kLeastCosine * dot(before, before) * shape.area)) return false;
-      if (!shape.at_least(sliver) && shape.worse_than(shape_of(from, p, q, before))) return false;
-    }
-  }
-  return true;
+Moves::Moves(const Vec3& to, const Vec3& a, const Vec3& b, double sliver)
+    : to_(to), scale_(1), sliver2_(static_cast<float>(sliver * sliver)) {
+  const double length = norm(b - a);
+  if (length > 0) scale_ = 1 / length;
+}
+
+/// A triangle's quality goes by four times its squared area over the square of the sum of its squared sides: 1/12 where
+/// it is equilateral, 0 where it has no area.
+bool Moves::keep() {
+  size_ = 0;
+  const auto& [from, p, q] = corners_;
+  const Triple from_p = less(p, from), from_q = less(q, from), base = less(q, p);
+  const Triple before = across(from_p, from_q), after = across(p, q);
+  const Lanes along = times(before, after), was = times(before, before), is = times(after, after);
+  const Lanes side = times(base, base);
+  const Lanes was_sides = times(from_p, from_p) + times(from_q, from_q) + side;
+  const Lanes is_sides = times(p, p) + times(q, q) + side;
+  const auto same_side = (along > 0) & (along * along > kLeastCosine * kLeastCosine * was * is);
+  const auto good = 12 * is >= sliver2_ * is_sides * is_sides;
+  const auto no_worse = is * was_sides * was_sides >= was * is_sides * is_sides;
+  const auto kept = same_side & (good | no_worse);
+  return (kept[0] & kept[1] & kept[2] & kept[3]) != 0;
 }
 
 double share_along(const Vec3& a, const Vec3& b, const Vec3& place) {

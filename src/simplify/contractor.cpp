@@ -12,7 +12,7 @@ namespace lamina::simplify {
 using namespace meshes;
 
 namespace {
-constexpr int kAttempts = 3;  ///< to go on where contractions were taken back
+constexpr int kAttempts = 20;  ///< to go on where contractions were taken back
 }  // namespace
 
 Contractor::Contractor(Piece piece)
@@ -96,6 +96,7 @@ float Contractor::next_cost() {
 std::uint64_t Contractor::run(float dearest, std::uint64_t keep) {
   const std::uint64_t before = size_;
   raise_limit(dearest);
+  const auto place_of = [&](std::uint32_t v) -> const Vec3& { return piece_.positions[v]; };
   while (size_ > keep) {
     drop_stale();
     if (heap_.empty() || heap_.front().cost > dearest || std::isinf(heap_.front().cost)) break;
@@ -104,7 +105,7 @@ std::uint64_t Contractor::run(float dearest, std::uint64_t keep) {
     heap_.pop_back();
     if (!stars_.contractible(e.u, e.v)) continue;
     const Placed to = place(e.u, e.v);
-    if (!keeps_shape(stars_, piece_.positions, e.u, e.v, to.at) || (old_ && !stays_near(e.u, e.v, to))) continue;
+    if (!keeps_shape(stars_, place_of, e.u, e.v, to.at) || (old_ && !stays_near(e.u, e.v, to))) continue;
     const double weight = piece_.quadrics[e.u].weight() + piece_.quadrics[e.v].weight();
     if (weight > 0) deviation2_ = std::max(deviation2_, to.cost / weight);
     size_ -= static_cast<std::uint64_t>(contract(e.u, e.v, to.at));

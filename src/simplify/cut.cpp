@@ -1,72 +1,47 @@
 #include "simplify/cut.h"
 
-#include <tbb/parallel_invoke.h>
-
-#include <algorithm>
-#include <span>
-
 namespace lamina::simplify {
-namespace {
 
-std::size_t lower_part(std::size_t count, double share) {
-  return std::clamp<std::size_t>(static_cast<std::size_t>(share * static_cast<double>(count)), 1, count - 1);
+BoxTree::BoxTree(std::vector<meshes::Vec3> places, std::size_t most, double share) : nodes_(1) {
+  boxes_ = 0;
+  divide(0, places, std::max<std::size_t>(most, 1), share);
 }
 
-std::size_t longest_side(std::span<const Centre> triangles) {
-  std::array<float, 3> low = triangles[0].at, high = low;
-  for (const Centre& c : triangles) {
+void BoxTree::divide(std::uint32_t node, std::span<meshes::Vec3> places, std::size_t most, double share) {
+  const auto end_here = [&] { nodes_[node].low = boxes_++; };
+  if (places.size() <= most) return end_here();
+  meshes::Vec3 low = places[0], high = low;
+  for (const meshes::Vec3& p : places) {
     for (std::size_t k = 0; k < 3; ++k) {
-      low[k] = std::min(low[k], c.at[k]);
-      high[k] = std::max(high[k], c.at[k]);
+      low[k] = std::min(low[k], p[k]);
+      high[k] = std::max(high[k], p[k]);
     }
   }
-  std::size_t longest = 0;
+  std::size_t axis = 0;
   for (std::size_t k = 1; k < 3; ++k) {
-    if (high[k] - low[k] > high[longest] - low[longest]) longest = k;
+    if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
   }
-  return longest;
-}
-
-/// In a box they are in no order.
-void part_into_boxes(std::span<Centre> triangles, std::size_t most, double share) {
-  if (triangles.size() <= most) return;
-  const std::size_t axis = longest_side(triangles), lower = lower_part(triangles.size(), share);
-  std::nth_element(triangles.begin(), triangles.begin() + static_cast<std::ptrdiff_t>(lower), triangles.end(),
-                   [axis](const Centre& a, const Centre& b) {
-                     return a.at[axis] < b.at[axis] || (a.at[axis] == b.at[axis] && a.triangle < b.triangle);
-                   });
-  tbb::parallel_invoke([&] { part_into_boxes(triangles.first(lower), most, share); },
-                       [&] { part_into_boxes(triangles.subspan(lower), most, share); });
-}
-
-void add_starts(std::size_t begin, std::size_t count, std::size_t most, double share,
-                std::vector<std::size_t>& starts) {
-  if (count <= most) {
-    starts.push_back(begin);
-    return;
+  if (!(high[axis] > low[axis])) return end_here();
+  const auto wanted =
+      std::clamp<std::ptrdiff_t>(static_cast<std::ptrdiff_t>(share * static_cast<double>(places.size())), 1,
+                                 static_cast<std::ptrdiff_t>(places.size()) - 1);
+  std::nth_element(places.begin(), places.begin() + wanted, places.end(),
+                   [axis](const meshes::Vec3& a, const meshes::Vec3& b) { return a[axis] < b[axis]; });
+  double cut = places[static_cast<std::size_t>(wanted)][axis];
+  if (!(cut > low[axis])) {  // many lie at the lower end
+    cut = high[axis];
+    for (const meshes::Vec3& p : places) {
+      if (p[axis] > low[axis]) cut = std::min(cut, p[axis]);
+    }
   }
-  const std::size_t lower = lower_part(count, share);
-  add_starts(begin, lower, most, share, starts);
-  add_starts(begin + lower, count - lower, most, share, starts);
-}
-
-}  // namespace
-
-std::vector<std::size_t> cut_into_boxes(std::vector<Centre> triangles, std::size_t most, double share,
-                                        std::vector<std::uint32_t>& order) {
-  const auto count = static_cast<std::uint32_t>(triangles.size());
-  std::vector<std::size_t> starts;
-  add_starts(0, count, most, share, starts);
-  starts.push_back(count);
-  if (count > 0) part_into_boxes(triangles, most, share);
-  std::vector<std::uint32_t> box(count);
-  for (std::uint32_t b = 0; b + 1 < starts.size(); ++b) {
-    for (std::size_t i = starts[b]; i < starts[b + 1]; ++i) box[triangles[i].triangle] = b;
-  }
-  std::vector<std::size_t> next = starts;
-  order.resize(count);
-  for (std::uint32_t t = 0; t < count; ++t) order[next[box[t]]++] = t;
-  return starts;
+  const auto above =
+      std::partition(places.begin(), places.end(), [axis, cut](const meshes::Vec3& p) { return p[axis] < cut; });
+  const auto below = static_cast<std::size_t>(above - places.begin());
+  const auto first = static_cast<std::uint32_t>(nodes_.size());
+  nodes_[node] = {cut, axis, first, first + 1};
+  nodes_.resize(nodes_.size() + 2);
+  divide(first, places.first(below), most, share);
+  divide(first + 1, places.subspan(below), most, share);
 }
 
 }  // namespace lamina::simplify

@@ -1,22 +1,68 @@
-// A mesh cut into boxes of triangles.
+// Space cut into boxes, and a mesh with it.
 #pragma once
-#include <array>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
+
+#include "meshes/vec3.h"
 
 namespace lamina::simplify {
 
-/// A triangle on its way into a box.
-struct Centre {
-  std::array<float, 3> at{};
-  std::uint32_t triangle = 0;
+/// Boxes, cut across the longest side of what lies in them.
+class BoxTree {
+ public:
+  /// A single one.
+  BoxTree() : nodes_(1) {}
+  /// Boxes of at most `most` of these places; `share` of them below a cut, above 0 and below 1: another share, other
+  /// boxes.
+  BoxTree(std::vector<meshes::Vec3> places, std::size_t most, double share);
+
+  [[nodiscard]] std::uint32_t boxes() const { return boxes_; }
+  [[nodiscard]] std::uint32_t at(const meshes::Vec3& place) const {
+    const Node* node = nodes_.data();
+    while (node->high != 0) node = &nodes_[place[node->axis] < node->cut ? node->low : node->high];
+    return node->low;
+  }
+
+ private:
+  struct Node {
+    double cut = 0;
+    std::size_t axis = 0;
+    std::uint32_t low = 0, high = 0;  ///< nodes; of a leaf the box and 0
+  };
+  void divide(std::uint32_t node, std::span<meshes::Vec3> places, std::size_t most, double share);
+
+  std::vector<Node> nodes_;
+  std::uint32_t boxes_ = 1;
 };
 
-/// Cuts triangles 0 to their number into boxes of at most `most`, across the longest side of what is there, `share` of
-/// the triangles on the lower side, above 0 and below 1: another share, other boxes. `order`: triangles box by box, in
-/// each by number. Returns where each box begins, and the end. The result does not depend on the number of threads.
-std::vector<std::size_t> cut_into_boxes(std::vector<Centre> triangles, std::size_t most, double share,
-                                        std::vector<std::uint32_t>& order);
+/// Cuts triangles 0 to their number into boxes of about `most`, `share` as above; `place(triangle)`: where it is. A
+/// sample of them says where. `order`: triangles box by box, in each by number. Returns where each box begins, and the
+/// end. The result does not depend on the number of threads.
+template <class Place>
+std::vector<std::size_t> cut_into_boxes(std::size_t triangles, const Place& place, std::size_t most, double share,
+                                        std::vector<std::uint32_t>& order) {
+  constexpr std::size_t kSample = 2'048;  // of a box
+  const std::size_t stride = std::max<std::size_t>(most / kSample, 1);
+  BoxTree tree;
+  if (triangles > most) {
+    std::vector<meshes::Vec3> sample;
+    for (std::size_t t = 0; t < triangles; t += stride) sample.push_back(place(t));
+    tree = BoxTree(std::move(sample), most / stride, share);
+  }
+  std::vector<std::uint32_t> box(triangles);
+  tbb::parallel_for(std::size_t{0}, triangles, [&](std::size_t t) { box[t] = tree.at(place(t)); });
+  std::vector<std::size_t> starts(tree.boxes() + std::size_t{1});
+  for (const std::uint32_t b : box) ++starts[b + 1];
+  for (std::size_t b = 0; b + 1 < starts.size(); ++b) starts[b + 1] += starts[b];
+  std::vector<std::size_t> next = starts;
+  order.resize(triangles);
+  for (std::uint32_t t = 0; t < triangles; ++t) order[next[box[t]]++] = t;
+  return starts;
+}
 
 }  // namespace lamina::simplify

@@ -14,65 +14,51 @@ namespace {
 
 using namespace meshes;
 
-constexpr double kMostOfPass = 0.33;    ///< of the vertices that a pass may take
-constexpr double kMoreEdges = 1.4;      ///< than chance asks for: cheap edges lie side by side
-constexpr double kIdlePass = 0.01;      ///< of the triangles: a pass over all edges that takes fewer is the last
-constexpr float kFirstBudget = 0.1F;    ///< thinning: share of the budget in the first pass, for the cheapest edges
-constexpr double kThinSliver = 0.35;    ///< thinning makes no triangles worse than this (1: equilateral)
-constexpr double kLastThinning = 0.05;  ///< of the triangles: a pass of the whole budget that takes fewer is the last
+constexpr double kMostOfPass = 0.33;       ///< of the vertices that a pass may take
+constexpr double kMoreEdges = 1.4;         ///< than chance asks for: cheap edges lie side by side
+constexpr double kIdlePass = 0.01;         ///< of the triangles: a pass over all edges that takes fewer is the last
+constexpr double kThinSliver = 0.35;       ///< thinning makes no triangles worse than this (1: equilateral)
+constexpr double kLastThinning = 0.05;     ///< of the triangles: a pass that takes fewer is the last
 constexpr std::size_t kPassBlock = 1'024;  ///< triangles whose edges are sorted together: they fit a core's cache
 constexpr std::size_t kSampleStep = 32;    ///< one of so many triangles says what edges cost
 constexpr double kEdgesOfVertex = 3;
-constexpr unsigned kCostShift = 32;  ///< in the queue
-constexpr std::size_t kAhead = 6;    ///< contractions whose stars are on their way while others are made
+/// Of a line's points over that of all, in most edges that a vertex without the budget's limit would fit.
+constexpr float kLineOverPlace = 3;
+constexpr std::size_t kAhead = 6;  ///< contractions whose stars are on their way while others are made
 
-/// The middle of the box of a mesh.
-Vec3 middle_of(const std::vector<Vec3>& positions) {
-  if (positions.empty()) return {};
-  Vec3 low = positions[0], high = low;
-  for (const Vec3& at : positions) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      low[k] = std::min(low[k], at[k]);
-      high[k] = std::max(high[k], at[k]);
-    }
-  }
-  return 0.5 * (low + high);
-}
+/// Of vertices.
+enum State : std::uint8_t {
+  kLocked = 1,
+  kHeld = 2,  ///< in this pass: locked, or contracted already
+  kNews = 4,  ///< edges there are offered: others were too dear in a pass before
+};
 
-/// Asks for an element that will be read soon: what belongs to a vertex lies where no processor foresees it, and most
-/// of the time went into waiting for it.
-template <class T>
-void ask_for(const T& element) {
-  constexpr std::size_t kLine = 64;
-  const char* const begin = reinterpret_cast<const char*>(&element);
-  __builtin_prefetch(begin);
-  if constexpr (sizeof(T) > 16) __builtin_prefetch(begin + std::min(sizeof(T) - 1, kLine));
-}
-
-/// Floats that are not negative stand in the order of their bits.
-std::uint64_t queue_key(double cost, std::size_t edge) {
-  return std::uint64_t{std::bit_cast<std::uint32_t>(static_cast<float>(cost))} << kCostShift | edge;
-}
-float cost_of(std::uint64_t key) {
-  return std::bit_cast<float>(static_cast<std::uint32_t>(key >> kCostShift));
+/// Costs, none below 0, are told apart by quarters of an octave: by the upper bits of a float.
+constexpr std::size_t kSteps = 1'024;
+std::size_t step_of(float cost) {
+  return std::bit_cast<std::uint32_t>(cost) >> 21U;
 }
 
 }  // namespace
 
 Matching::Result Matching::reduce(TriangleMesh& mesh, std::span<const std::uint8_t> locked, std::uint64_t wanted,
                                   const RunContext& run) {
-  begin(mesh, locked);
+  vertices_.assign(mesh.positions.size(), {});
+  for (std::size_t v = 0; v < vertices_.size(); ++v) vertices_[v].at = mesh.positions[v];
+  carried_.normals.swap(mesh.normals);
+  carried_.values.swap(mesh.attributes);
+  begin(std::move(mesh.triangles), locked);
   add_planes();
   survey_rings();
   double more = kMoreEdges;
   while (size_ > wanted) {
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
-    held_ = locked_;
     // Of n vertices that have d such edges each, some n d / 2 (d + 1) pairs are found one after the other.
     const auto free = static_cast<double>(std::max<std::uint64_t>(free_, 1));
     const double pairs = std::min(kMostOfPass, 0.5 * static_cast<double>(size_ - wanted) / free);
     const double share = more * (2 * pairs / (1 - 2 * pairs)) / (2 * kEdgesOfVertex);
     const std::uint64_t there = size_;
+    begin_pass();
     pass(limit(share), wanted);
     stars_.tidy();
     const auto gone = static_cast<double>(there - size_);
@@ -80,59 +66,70 @@ Matching::Result Matching::reduce(TriangleMesh& mesh, std::span<const std::uint8
     if (gone < pairs * free) more *= 2;  // half of the pairs wanted
   }
   mesh.triangles = stars_.release();
+  for (std::size_t v = 0; v < vertices_.size(); ++v) mesh.positions[v] = vertices_[v].at;
+  carried_.normals.swap(mesh.normals);
+  carried_.values.swap(mesh.attributes);
   return {size_, std::sqrt(deviation2_)};
 }
 
 Matching::Result Matching::thin(ThinPart& part, std::span<const float> tolerances, const RunContext& run) {
-  begin(part.mesh, part.locked);
+  vertices_.swap(part.vertices);
+  std::swap(carried_, part.carried);
+  begin(std::move(part.triangles), part.locked);
   sliver_ = kThinSliver;
-  for (std::size_t v = 0; v < positions_.size(); ++v) quadrics_[v] = part.quadrics[v].moved(positions_[v]);
-  survey_rings();
-  for (std::uint32_t v = 0; v < positions_.size(); ++v) locked_[v] |= static_cast<std::uint8_t>(stars_.boundary(v));
-  for (bool first = true;; first = false) {
+  std::uint64_t there = 0;
+  do {
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
-    held_ = locked_;
-    const std::uint64_t there = size_;
-    thin_pass(part, tolerances, first ? kFirstBudget : 1);
+    there = size_;
+    begin_pass();
+    thin_pass(part, tolerances);
     stars_.tidy();
-    if (!first) {  // an edge costs the same until one of its ends moves
-      for (std::size_t v = 0; v < news_.size(); ++v) news_[v] = static_cast<std::uint8_t>(held_[v] & ~locked_[v]);
-    }
-    if (!first && static_cast<double>(there - size_) <= kLastThinning * static_cast<double>(there)) break;
-  }
-  part.mesh.triangles = stars_.release();
-  part.locked = locked_;
-  for (std::size_t v = 0; v < positions_.size(); ++v) part.quadrics[v] = quadrics_[v].moved(-1 * positions_[v]);
+    end_pass();
+  } while (static_cast<double>(there - size_) > kLastThinning * static_cast<double>(there));
+  part.triangles = stars_.release();
+  vertices_.swap(part.vertices);
+  std::swap(carried_, part.carried);
   return {size_, std::sqrt(deviation2_)};
 }
 
-void Matching::begin(TriangleMesh& mesh, std::span<const std::uint8_t> locked) {
-  mesh_ = &mesh;
-  centre_ = middle_of(mesh.positions);
-  positions_.clear();
-  for (const Vec3& at : mesh.positions) positions_.push_back(at - centre_);
-  size_ = mesh.triangles.size();
+void Matching::begin(std::vector<Triangle>&& triangles, std::span<const std::uint8_t> locked) {
+  size_ = triangles.size();
   deviation2_ = 0;
   sliver_ = kSliver;
-  news_.assign(positions_.size(), 1);
-  stars_.reset(std::move(mesh.triangles), positions_.size());
-  locked_.assign(locked.begin(), locked.end());
-  quadrics_.assign(positions_.size(), {});
+  stars_.reset(std::move(triangles), vertices_.size());
+  states_.resize(vertices_.size());
+  for (std::size_t v = 0; v < states_.size(); ++v) states_[v] = locked[v] != 0 ? kLocked | kNews : kNews;
+}
+
+void Matching::begin_pass() {
+  for (std::uint8_t& state : states_) {
+    const auto held = static_cast<std::uint8_t>((state & kLocked) != 0 ? kHeld : 0);
+    state = static_cast<std::uint8_t>((state & ~kHeld) | held);
+  }
+}
+
+/// All edges have been offered: one costs the same until one of its ends moves.
+void Matching::end_pass() {
+  for (std::uint8_t& state : states_) {
+    const bool moved = (state & kHeld) != 0 && (state & kLocked) == 0;
+    state = static_cast<std::uint8_t>((state & ~kNews) | (moved ? kNews : 0));
+  }
 }
 
 void Matching::survey_rings() {
-  ways_.assign(positions_.size(), {});
-  for (std::uint32_t v = 0; v < positions_.size(); ++v) survey_ring(v);
-  free_ = static_cast<std::uint64_t>(std::count(locked_.begin(), locked_.end(), 0));
+  ways_.assign(vertices_.size(), {});
+  for (std::uint32_t v = 0; v < vertices_.size(); ++v) survey_ring(v);
+  free_ = static_cast<std::uint64_t>(
+      std::count_if(states_.begin(), states_.end(), [](std::uint8_t state) { return (state & kLocked) == 0; }));
 }
 
 void Matching::add_planes() {
   for (const Triangle& t : stars_.triangles()) {
-    const Vec3 n = cross(positions_[t[1]] - positions_[t[0]], positions_[t[2]] - positions_[t[0]]);
+    const Vec3& at = vertices_[t[0]].at;
+    const Vec3 n = cross(vertices_[t[1]].at - at, vertices_[t[2]].at - at);
     const double twice = norm(n);
     if (!(twice > 0)) continue;
-    const Quadric plane = plane_quadric(positions_[t[0]], (1 / twice) * n, 0.5 * twice, kNormalNoise);
-    for (const std::uint32_t v : t) quadrics_[v] += plane;
+    for (const std::uint32_t v : t) vertices_[v].add_plane((1 / twice) * n, 0.5 * twice);
   }
 }
 
@@ -159,16 +156,15 @@ void Matching::survey_ring(std::uint32_t vertex) {
     if (ways_[last].out != vertex) ++rims;
   });
   if (rims > 0) stars_.set_boundary(vertex);
-  if (!manifold || rims > 2) locked_[vertex] = 1;
+  if (!manifold || rims > 2) states_[vertex] |= kLocked;
 }
 
 /// A plane through the rim between two vertices, upright on its triangle.
 void Matching::add_wall(std::uint32_t from, std::uint32_t to, std::uint32_t beside) {
-  const Vec3 edge = positions_[to] - positions_[from], n = cross(edge, positions_[beside] - positions_[from]);
+  const Vec3 edge = vertices_[to].at - vertices_[from].at, n = cross(edge, vertices_[beside].at - vertices_[from].at);
   if (!(norm(n) > 0)) return;
-  const Quadric wall = plane_quadric(positions_[from], unit(cross(edge, unit(n))), dot(edge, edge), kNormalNoise);
-  quadrics_[from] += wall;
-  quadrics_[to] += wall;
+  const Vec3 across = unit(cross(edge, unit(n)));
+  for (const std::uint32_t v : {from, to}) vertices_[v].add_plane(across, dot(edge, edge));
 }
 
 /// Into edges_ those of triangles that are theirs to offer: an inner edge is its triangle's that runs along it upwards.
@@ -180,10 +176,9 @@ void Matching::gather(std::size_t begin, std::size_t end, std::size_t step) {
     const Triangle& t = stars_.triangles()[triangle];
     for (std::size_t k = 0; k < 3; ++k) {  // without branches: chance decides
       const std::uint32_t u = t[k], v = t[(k + 1) % 3];
-      ask_for(quadrics_[u]);
-      ask_for(positions_[u]);
+      __builtin_prefetch(&vertices_[u]);  // lies where no processor foresees it: most of the time went into waiting
       const unsigned rim = unsigned{stars_.boundary(u)} & unsigned{stars_.boundary(v)};
-      const auto free = static_cast<unsigned>((held_[u] | held_[v]) == 0) & unsigned{(news_[u] | news_[v]) != 0};
+      const auto free = static_cast<unsigned>(((states_[u] | states_[v]) & (kHeld | kNews)) == kNews);
       *out = {u, v};
       out += free & (static_cast<unsigned>(u < v) | rim);
     }
@@ -191,19 +186,19 @@ void Matching::gather(std::size_t begin, std::size_t end, std::size_t step) {
   edges_.resize(static_cast<std::size_t>(out - edges_.data()));
 }
 
-/// What is in edges_ into the queue, where it costs no more than dearest(u, v).
+/// Keeps of edges_ those that cost no more than dearest(u, v).
 template <class Limit>
 void Matching::price(const Limit& dearest) {
-  queue_.resize(edges_.size());
-  std::uint64_t* out = queue_.data();
-  for (std::size_t e = 0; e < edges_.size(); ++e) {
-    const auto [u, v] = edges_[e];
-    Quadric sum = quadrics_[u];
-    sum += quadrics_[v];
-    *out = queue_key(place_edge(sum, positions_[u], positions_[v]).cost, e);
-    out += static_cast<unsigned>(cost_of(*out) <= dearest(u, v));  // without a branch, as above
+  costs_.resize(edges_.size());
+  std::size_t kept = 0;
+  for (const auto [u, v] : edges_) {  // without branches, as above
+    const float cost = cost_on_line(vertices_[u], vertices_[v]);
+    edges_[kept] = {u, v};
+    costs_[kept] = cost;
+    kept += static_cast<std::size_t>(cost <= dearest(u, v));
   }
-  queue_.resize(static_cast<std::size_t>(out - queue_.data()));
+  edges_.resize(kept);
+  costs_.resize(kept);
 }
 
 /// What an edge may cost for a pass to be offered that share of them.
@@ -212,21 +207,26 @@ float Matching::limit(double share) {
   if (share >= 1) return kAny;
   gather(0, stars_.triangles().size(), kSampleStep);
   price([](std::uint32_t, std::uint32_t) { return kAny; });
-  if (queue_.empty()) return kAny;
-  const auto place = queue_.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(queue_.size()));
-  std::nth_element(queue_.begin(), place, queue_.end());
-  return cost_of(*place);
+  if (costs_.empty()) return kAny;
+  const auto place = costs_.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(costs_.size()));
+  std::nth_element(costs_.begin(), place, costs_.end());
+  return *place;
 }
 
 template <class Use>
-void Matching::take_queue(const Use& use) {
-  std::sort(queue_.begin(), queue_.end());
+void Matching::take_cheapest(const Use& use) {
+  std::array<std::uint32_t, kSteps> next{};
+  for (const float cost : costs_) ++next[step_of(cost)];
+  std::uint32_t before = 0;
+  for (std::uint32_t& at : next) before += std::exchange(at, before);
+  queue_.resize(edges_.size());
+  for (std::size_t e = 0; e < edges_.size(); ++e) queue_[next[step_of(costs_[e])]++] = edges_[e];
   for (std::size_t i = 0; i < queue_.size(); ++i) {
-    const auto [next, beside] = edges_[static_cast<std::uint32_t>(queue_[std::min(i + kAhead, queue_.size() - 1)])];
-    stars_.ask_for(next);
-    stars_.ask_for(beside);
-    const auto [u, v] = edges_[static_cast<std::uint32_t>(queue_[i])];
-    if (held_[u] == 0 && held_[v] == 0) use(std::min(u, v), std::max(u, v));
+    const auto [next_u, next_v] = queue_[std::min(i + kAhead, queue_.size() - 1)];
+    stars_.ask_for(next_u);
+    stars_.ask_for(next_v);
+    const auto [u, v] = queue_[i];
+    if (((states_[u] | states_[v]) & kHeld) == 0) use(std::min(u, v), std::max(u, v));
   }
 }
 
@@ -235,13 +235,13 @@ void Matching::pass(float dearest, std::uint64_t wanted) {
   for (std::size_t begin = 0; begin < count && size_ > wanted; begin += kPassBlock) {
     gather(begin, std::min(begin + kPassBlock, count), 1);
     price([&](std::uint32_t, std::uint32_t) { return dearest; });
-    take_queue([&](std::uint32_t u, std::uint32_t v) {
-      if (size_ > wanted) contract(u, v);
+    take_cheapest([&](std::uint32_t u, std::uint32_t v) {
+      if (size_ > wanted) contract(u, v, std::numeric_limits<float>::max());
     });
   }
 }
 
-void Matching::thin_pass(ThinPart& part, std::span<const float> tolerances, float share) {
+void Matching::thin_pass(ThinPart& part, std::span<const float> tolerances) {
   const auto alike = [&](std::uint32_t u, std::uint32_t v) {
     for (std::size_t a = 0; a < tolerances.size(); ++a) {
       const auto &low = part.low[a], &high = part.high[a];
@@ -252,9 +252,10 @@ void Matching::thin_pass(ThinPart& part, std::span<const float> tolerances, floa
   const std::size_t count = stars_.triangles().size();
   for (std::size_t begin = 0; begin < count; begin += kPassBlock) {
     gather(begin, std::min(begin + kPassBlock, count), 1);
-    price([&](std::uint32_t u, std::uint32_t v) { return share * (part.budgets[u] + part.budgets[v]); });
-    take_queue([&](std::uint32_t u, std::uint32_t v) {
-      if (!alike(u, v) || !contract(u, v)) return;
+    const auto budget = [&](std::uint32_t u, std::uint32_t v) { return part.budgets[u] + part.budgets[v]; };
+    price([&](std::uint32_t u, std::uint32_t v) { return kLineOverPlace * budget(u, v); });
+    take_cheapest([&](std::uint32_t u, std::uint32_t v) {
+      if (!alike(u, v) || !contract(u, v, budget(u, v))) return;
       part.budgets[u] += part.budgets[v];
       for (std::size_t a = 0; a < tolerances.size(); ++a) {
         part.low[a][u] = std::min(part.low[a][u], part.low[a][v]);
@@ -264,36 +265,37 @@ void Matching::thin_pass(ThinPart& part, std::span<const float> tolerances, floa
   }
 }
 
-/// False where that would change the topology, or fold the surface.
-bool Matching::contract(std::uint32_t u, std::uint32_t v) {
-  if (!mesh_->normals.empty()) {
-    ask_for(mesh_->normals[u]);
-    ask_for(mesh_->normals[v]);
-  }
-  for (const auto& values : mesh_->attributes) {
-    ask_for(values[u]);
-    ask_for(values[v]);
-  }
-  if (!stars_.contractible(u, v)) return false;
-  Quadric sum = quadrics_[u];
-  sum += quadrics_[v];
-  const Placed to = place_edge(sum, positions_[u], positions_[v]);
-  if (!keeps_shape(stars_, positions_, u, v, to.at, sliver_)) return false;
+/// False where that costs more, would change the topology, or fold the surface.
+bool Matching::contract(std::uint32_t u, std::uint32_t v, float dearest) {
+  StandIn &of_u = vertices_[u], &of_v = vertices_[v];
+  const Quadric sum = sum_of(of_u, of_v);
+  const Vec3 origin = of_u.at, edge = of_v.at - origin;
+  const Placed to = place_edge(sum, {}, edge);
+  if (!(to.cost <= static_cast<double>(dearest)) || !stars_.contractible(u, v)) return false;
+  const auto place = [&](std::uint32_t vertex) -> const Vec3& { return vertices_[vertex].at; };
+  if (!keeps_shape(stars_, place, u, v, origin + to.at, sliver_)) return false;
   const double weight = sum.weight();
   if (weight > 0) deviation2_ = std::max(deviation2_, to.cost / weight);
-  const double share = share_along(positions_[u], positions_[v], to.at);
-  if (!mesh_->normals.empty()) {
-    const Vec3 mixed = (1 - share) * to_double(mesh_->normals[u]) + share * to_double(mesh_->normals[v]);
-    if (norm(mixed) > 0) mesh_->normals[u] = to_float(unit(mixed));
-  }
-  for (auto& values : mesh_->attributes) values[u] += static_cast<float>(share) * (values[v] - values[u]);
-  positions_[u] = to.at;
-  mesh_->positions[u] = to.at + centre_;
-  quadrics_[u] = sum;
-  held_[u] = held_[v] = 1;
+  interpolate(u, v, share_along({}, edge, to.at));
+  of_u = stand_in(sum, origin, to.at);
+  for (const std::uint32_t vertex : {u, v}) states_[vertex] |= kHeld;
   --free_;
   size_ -= static_cast<std::uint64_t>(stars_.contract(u, v));
   return true;
+}
+
+void Matching::interpolate(std::uint32_t u, std::uint32_t v, double share) {
+  if (!carried_.normals.empty()) {
+    auto& normal = carried_.normals[u];
+    const auto& other = carried_.normals[v];
+    const auto part = static_cast<float>(share);
+    std::array<float, 3> mixed;
+    for (std::size_t k = 0; k < 3; ++k) mixed[k] = normal[k] + part * (other[k] - normal[k]);
+    const float length2 = mixed[0] * mixed[0] + mixed[1] * mixed[1] + mixed[2] * mixed[2];
+    const float scale = 1 / std::sqrt(length2);
+    if (length2 > 0) normal = {scale * mixed[0], scale * mixed[1], scale * mixed[2]};
+  }
+  for (auto& values : carried_.values) values[u] += static_cast<float>(share) * (values[v] - values[u]);
 }
 
 void keep_vertices(TriangleMesh& mesh, std::span<const std::uint8_t> stays) {

@@ -4,6 +4,7 @@
 #pragma once
 #include <tbb/enumerable_thread_specific.h>
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -13,17 +14,24 @@
 #include "lamina/run.h"
 #include "meshes/vec3.h"
 #include "simplify/contraction.h"
-#include "simplify/quadric.h"
+#include "simplify/stand_in.h"
 #include "simplify/stars.h"
 
 namespace lamina::simplify {
 
+/// What is interpolated where two vertices become one.
+struct Carried {
+  std::vector<std::array<float, 3>> normals;  ///< or none
+  std::vector<std::vector<float>> values;     ///< of each attribute
+};
+
 /// Triangles to be thinned out where the surface is flat, with what their vertices stand for.
 struct ThinPart {
-  TriangleMesh mesh;
-  std::vector<std::uint8_t> locked;  ///< vertices that stay as they are; behind thin() those at an open side, too
-  std::vector<Quadric> quadrics;     ///< of the vertices, each about its own place
+  std::vector<Triangle> triangles;
+  std::vector<StandIn> vertices;
   std::vector<float> budgets;        ///< what contracting the vertices may cost, summed up as their quadrics are
+  std::vector<std::uint8_t> locked;  ///< vertices that stay as they are; at open sides they have to
+  Carried carried;
   std::vector<std::vector<float>> low, high;  ///< range of each attribute over what a vertex stands for
 };
 
@@ -33,15 +41,15 @@ class Matching {
  public:
   struct Result {
     std::uint64_t triangles = 0;  ///< left
-    double deviation =
-        0;  ///< of all contractions the largest root mean square distance of a new vertex from the planes
+    /// Of all contractions the largest root mean square distance of a new vertex from the planes.
+    double deviation = 0;
   };
   /// Contracts until `wanted` triangles are left, or only few edges can go. Vertices whose `locked` is not 0 stay as
   /// they are, and so do those of edges with more than two triangles, or with two that face opposite sides. Vertices
   /// that have gone stay in the arrays. Throws Error(internal) when cancelled.
   Result reduce(TriangleMesh& mesh, std::span<const std::uint8_t> locked, std::uint64_t wanted, const RunContext& run);
-  /// Contracts what costs no more than its budget, unless an attribute's range would exceed its tolerance. Vertices at
-  /// an open side stay, too. Throws as reduce().
+  /// Contracts what costs no more than its budget, unless an attribute's range would exceed its tolerance. Throws as
+  /// reduce().
   Result thin(ThinPart& part, std::span<const float> tolerances, const RunContext& run);
 
  private:
@@ -53,38 +61,38 @@ class Matching {
     std::uint32_t out = kNone, in = kNone;
   };
 
-  void begin(TriangleMesh& mesh, std::span<const std::uint8_t> locked);
+  void begin(std::vector<Triangle>&& triangles, std::span<const std::uint8_t> locked);
   void survey_rings();
   void add_planes();
   void survey_ring(std::uint32_t vertex);
   void add_wall(std::uint32_t from, std::uint32_t to, std::uint32_t beside);
+  void begin_pass();
+  void end_pass();
   void gather(std::size_t begin, std::size_t end, std::size_t step);
   template <class Limit>
   void price(const Limit& dearest);
   [[nodiscard]] float limit(double share);
   void pass(float dearest, std::uint64_t wanted);
-  void thin_pass(ThinPart& part, std::span<const float> tolerances, float share);
-  bool contract(std::uint32_t u, std::uint32_t v);
-  /// Calls use(u, v), u < v, for edges of the queue, the cheapest first, of which no end is held.
+  void thin_pass(ThinPart& part, std::span<const float> tolerances);
+  bool contract(std::uint32_t u, std::uint32_t v, float dearest);
+  void interpolate(std::uint32_t u, std::uint32_t v, double share);
+  /// Calls use(u, v), u < v, for those of edges_ of which no end is held, the cheapest first.
   template <class Use>
-  void take_queue(const Use& use);
+  void take_cheapest(const Use& use);
 
-  TriangleMesh* mesh_ = nullptr;
-  meshes::Vec3 centre_{};                ///< far from it quadrics lose their digits
-  std::vector<meshes::Vec3> positions_;  ///< from there
-  std::vector<Quadric> quadrics_;
-  std::vector<std::uint8_t> locked_;
-  std::vector<std::uint8_t> held_;  ///< in this pass: locked, or contracted already
-  std::vector<std::uint8_t> news_;  ///< edges at these vertices are offered: others were too dear in a pass before
+  std::vector<StandIn> vertices_;
+  Carried carried_;
+  std::vector<std::uint8_t> states_;  ///< of the vertices: bits of State
   Stars stars_;
   std::uint64_t size_ = 0;  ///< triangles
   std::uint64_t free_ = 0;  ///< vertices that are there and not locked
   double deviation2_ = 0;
   double sliver_ = kSliver;
 
-  std::vector<Ways> ways_;            ///< of edges to the vertex that is looked at
-  std::vector<Edge> edges_;           ///< of a block
-  std::vector<std::uint64_t> queue_;  ///< the bits of an edge's cost above its place in edges_: sorted by cost
+  std::vector<Ways> ways_;    ///< of edges to the vertex that is looked at
+  std::vector<Edge> edges_;   ///< of a block
+  std::vector<float> costs_;  ///< theirs
+  std::vector<Edge> queue_;   ///< the cheapest first
 };
 
 /// Vertices whose `stays` is 0 leave the arrays; triangles are not looked at.

@@ -9,10 +9,11 @@ namespace {
 
 using namespace meshes;
 
-constexpr int kCutsForEach = 8;         ///< facet
-constexpr int kHalvings = 12;           ///< of a triangle near many
-constexpr std::size_t kFewFacets = 40;  ///< that are asked at once
-constexpr std::size_t kAnyAround = 24;  ///< a search goes so far in any direction
+constexpr int kCutsForEach = 8;           ///< facet
+constexpr int kHalvings = 12;             ///< of a triangle near many
+constexpr std::size_t kFewFacets = 40;    ///< that are asked at once
+constexpr std::size_t kManyFacets = 300;  ///< around: a triangle near more is not asked about, which would take long
+constexpr std::size_t kAnyAround = 24;    ///< a search goes so far in any direction
 
 /// For Overlay.
 struct OldView {
@@ -87,6 +88,7 @@ bool NearOld::prove(const Corners& triangle, std::uint32_t begin, double most) {
     error_ = 0;
   }
   search(triangle, overlay_.begin());
+  if (found_.size() > kManyFacets) return false;
   return cover(triangle, found_, old_.bound - most, kHalvings);
 }
 
@@ -96,7 +98,7 @@ void NearOld::search(const Corners& triangle, std::uint32_t begin) {
   found_.clear();
   queue_.assign(1, begin);
   search_[begin] = ++searches_;
-  for (std::size_t next = 0; next < queue_.size(); ++next) {
+  for (std::size_t next = 0; next < queue_.size() && found_.size() <= kManyFacets; ++next) {
     const std::uint32_t number = queue_[next];
     const Triangle& t = old_.triangles[number];
     const bool meets = box.meets(old_.positions[t[0]], old_.positions[t[1]], old_.positions[t[2]]);

@@ -51,7 +51,7 @@ class Visitors {
     most_ = std::max(most_, 2 * ids_.size());
   }
   /// Locks those, and what belongs to other regions. After forget_repeated().
-  void lock(std::uint32_t region, const RegionTree& tree, RegionMesh& part) const {
+  void lock(std::uint32_t region, const BoxTree& tree, RegionMesh& part) const {
     part.locked.resize(part.ids.size());
     auto from = ids_.begin();
     for (std::size_t v = 0; v < part.ids.size(); ++v) {
@@ -68,12 +68,12 @@ class Visitors {
 
 class MeshRegions final : public Regions {
  public:
-  MeshRegions(meshes::MeshBlocks& mesh, RegionTree tree, const std::string& tmp_dir, const RunContext& run)
-      : mesh_(mesh), tree_(std::move(tree)), triangles_(tree_.regions(), tmp_dir) {
+  MeshRegions(meshes::MeshBlocks& mesh, BoxTree tree, const std::string& tmp_dir, const RunContext& run)
+      : mesh_(mesh), tree_(std::move(tree)), triangles_(tree_.boxes(), tmp_dir) {
     sort_triangles(run);
   }
 
-  [[nodiscard]] std::uint32_t count() const override { return tree_.regions(); }
+  [[nodiscard]] std::uint32_t count() const override { return tree_.boxes(); }
 
   [[nodiscard]] RegionMesh load(std::uint32_t region) override {
     RegionMesh part;
@@ -128,7 +128,7 @@ class MeshRegions final : public Regions {
   }
 
   meshes::MeshBlocks& mesh_;
-  RegionTree tree_;
+  BoxTree tree_;
   meshes::TriangleBins triangles_;  ///< by region
   Visitors visitors_;
 };
@@ -178,9 +178,9 @@ class Extract {
 
 class PartRegions final : public Regions {
  public:
-  PartRegions(const RegionFile& from, const std::vector<RegionFile::Place>& parts, RegionTree tree,
+  PartRegions(const RegionFile& from, const std::vector<RegionFile::Place>& parts, BoxTree tree,
               std::unique_ptr<RegionFile> to, const RunContext& run)
-      : tree_(std::move(tree)), file_(std::move(to)), regions_(tree_.regions()) {
+      : tree_(std::move(tree)), file_(std::move(to)), regions_(tree_.boxes()) {
     for (const RegionFile::Place& place : parts) {
       require_running(run);
       share_out(from.read(place));
@@ -189,7 +189,7 @@ class PartRegions final : public Regions {
     visitors_.forget_repeated();
   }
 
-  [[nodiscard]] std::uint32_t count() const override { return tree_.regions(); }
+  [[nodiscard]] std::uint32_t count() const override { return tree_.boxes(); }
 
   [[nodiscard]] RegionMesh load(std::uint32_t region) override {
     RegionMesh part;
@@ -203,7 +203,7 @@ class PartRegions final : public Regions {
   void share_out(const RegionMesh& part) {
     std::vector<std::uint32_t> home(part.ids.size());
     for (std::size_t v = 0; v < home.size(); ++v) home[v] = tree_.at(part.mesh.positions[v]);
-    std::vector<std::vector<std::uint32_t>> triangles(tree_.regions());
+    std::vector<std::vector<std::uint32_t>> triangles(tree_.boxes());
     for (std::uint32_t i = 0; i < part.mesh.triangles.size(); ++i) {
       const Triangle& t = part.mesh.triangles[i];
       const Triangle at{home[t[0]], home[t[1]], home[t[2]]};
@@ -268,55 +268,13 @@ class PartRegions final : public Regions {
     part = std::move(sorted);
   }
 
-  RegionTree tree_;
+  BoxTree tree_;
   std::unique_ptr<RegionFile> file_;
   std::vector<std::vector<RegionFile::Place>> regions_;
   Visitors visitors_;
 };
 
 }  // namespace
-
-RegionTree::RegionTree(std::vector<meshes::Vec3> places, std::size_t most, double share) : nodes_(1) {
-  regions_ = 0;
-  divide(0, places, std::max<std::size_t>(most, 1), share);
-}
-
-void RegionTree::divide(std::uint32_t node, std::span<meshes::Vec3> places, std::size_t most, double share) {
-  const auto end_here = [&] { nodes_[node].low = regions_++; };
-  if (places.size() <= most) return end_here();
-  meshes::Vec3 low = places[0], high = low;
-  for (const meshes::Vec3& p : places) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      low[k] = std::min(low[k], p[k]);
-      high[k] = std::max(high[k], p[k]);
-    }
-  }
-  std::size_t axis = 0;
-  for (std::size_t k = 1; k < 3; ++k) {
-    if (high[k] - low[k] > high[axis] - low[axis]) axis = k;
-  }
-  if (!(high[axis] > low[axis])) return end_here();
-  const auto wanted =
-      std::clamp<std::ptrdiff_t>(static_cast<std::ptrdiff_t>(share * static_cast<double>(places.size())), 1,
-                                 static_cast<std::ptrdiff_t>(places.size()) - 1);
-  std::nth_element(places.begin(), places.begin() + wanted, places.end(),
-                   [axis](const meshes::Vec3& a, const meshes::Vec3& b) { return a[axis] < b[axis]; });
-  double cut = places[static_cast<std::size_t>(wanted)][axis];
-  if (!(cut > low[axis])) {  // many lie at the lower end
-    cut = high[axis];
-    for (const meshes::Vec3& p : places) {
-      if (p[axis] > low[axis]) cut = std::min(cut, p[axis]);
-    }
-  }
-  const auto above =
-      std::partition(places.begin(), places.end(), [axis, cut](const meshes::Vec3& p) { return p[axis] < cut; });
-  const auto below = static_cast<std::size_t>(above - places.begin());
-  const auto first = static_cast<std::uint32_t>(nodes_.size());
-  nodes_[node] = {cut, axis, first, first + 1};
-  nodes_.resize(nodes_.size() + 2);
-  divide(first, places.first(below), most, share);
-  divide(first + 1, places.subspan(below), most, share);
-}
 
 RegionFile::RegionFile(const std::string& tmp_dir, const TriangleMesh& layout, bool bound)
     : file_(tmp_dir), attributes_(layout.layout), normals_(!layout.normals.empty()), bound_(bound) {}
@@ -353,13 +311,13 @@ RegionMesh RegionFile::read(const Place& place) const {
   return part;
 }
 
-std::unique_ptr<Regions> regions_of_mesh(meshes::MeshBlocks& mesh, RegionTree tree, const std::string& tmp_dir,
+std::unique_ptr<Regions> regions_of_mesh(meshes::MeshBlocks& mesh, BoxTree tree, const std::string& tmp_dir,
                                          const RunContext& run) {
   return std::make_unique<MeshRegions>(mesh, std::move(tree), tmp_dir, run);
 }
 
 std::unique_ptr<Regions> regions_of_parts(const RegionFile& from, const std::vector<RegionFile::Place>& parts,
-                                          RegionTree tree, std::unique_ptr<RegionFile> to, const RunContext& run) {
+                                          BoxTree tree, std::unique_ptr<RegionFile> to, const RunContext& run) {
   return std::make_unique<PartRegions>(from, parts, std::move(tree), std::move(to), run);
 }
 

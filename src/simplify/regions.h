@@ -13,38 +13,11 @@
 #include "lamina/run.h"
 #include "meshes/formats.h"
 #include "meshes/vec3.h"
+#include "simplify/cut.h"
 #include "simplify/old_mesh.h"
 #include "simplify/quadric.h"
 
 namespace lamina::simplify {
-
-/// Boxes, cut across the longest side of what lies in them.
-class RegionTree {
- public:
-  /// A single one.
-  RegionTree() : nodes_(1) {}
-  /// Boxes of at most `most` of these places; `share` of them below a cut, above 0 and below 1: another share, other
-  /// boxes.
-  RegionTree(std::vector<meshes::Vec3> places, std::size_t most, double share);
-
-  [[nodiscard]] std::uint32_t regions() const { return regions_; }
-  [[nodiscard]] std::uint32_t at(const meshes::Vec3& place) const {
-    const Node* node = nodes_.data();
-    while (node->high != 0) node = &nodes_[place[node->axis] < node->cut ? node->low : node->high];
-    return node->low;
-  }
-
- private:
-  struct Node {
-    double cut = 0;
-    std::size_t axis = 0;
-    std::uint32_t low = 0, high = 0;  ///< nodes; of a leaf the region and 0
-  };
-  void divide(std::uint32_t node, std::span<meshes::Vec3> places, std::size_t most, double share);
-
-  std::vector<Node> nodes_;
-  std::uint32_t regions_ = 1;
-};
 
 /// Triangles of a mesh with their vertices, which other parts may have as well.
 struct RegionMesh {
@@ -95,12 +68,12 @@ class Regions {
 /// for each, and reads vertices where they lie: triangles had better name vertices near those of the ones before, as
 /// they do in streamed meshes. Throws Error(unreadable) for triangles that name vertices that are not there, or one
 /// twice, Error(budget) for a full disk, Error(internal) when cancelled. Refers to all that it is given.
-std::unique_ptr<Regions> regions_of_mesh(meshes::MeshBlocks& mesh, RegionTree tree, const std::string& tmp_dir,
+std::unique_ptr<Regions> regions_of_mesh(meshes::MeshBlocks& mesh, BoxTree tree, const std::string& tmp_dir,
                                          const RunContext& run);
 
 /// Parts that a round has left, put together anew by `tree`. `to`: an empty file like `from`, which is not needed any
 /// more afterwards.
 std::unique_ptr<Regions> regions_of_parts(const RegionFile& from, const std::vector<RegionFile::Place>& parts,
-                                          RegionTree tree, std::unique_ptr<RegionFile> to, const RunContext& run);
+                                          BoxTree tree, std::unique_ptr<RegionFile> to, const RunContext& run);
 
 }  // namespace lamina::simplify

@@ -45,13 +45,11 @@ double share_of_round(int round) {
 class Round {
  public:
   Round(WorkMesh& work, double share) : work_(work), size_(work.mesh.triangles.size()) {
-    std::vector<Centre> centres(size_);
-    tbb::parallel_for(std::size_t{0}, size_, [&](std::size_t t) {
-      const Triangle& c = work.mesh.triangles[t];
-      const Vec3 sum = at(c[0]) + at(c[1]) + at(c[2]) - 3 * work.centre;
-      centres[t] = {to_float(sum), static_cast<std::uint32_t>(t)};
-    });
-    starts_ = cut_into_boxes(std::move(centres), kPieceTriangles, share, order_);
+    const auto place = [&](std::size_t triangle) {
+      const auto& [a, b, c] = work.mesh.triangles[triangle];
+      return at(a) + at(b) + at(c);
+    };
+    starts_ = cut_into_boxes(size_, place, kPieceTriangles, share, order_);
     pieces_.resize(starts_.size() - 1);
     vertices_.resize(pieces_.size());
     find_owners();

@@ -58,7 +58,26 @@ void Stars::neighbours(std::uint32_t vertex, std::vector<std::uint32_t>& out) {
   }
 }
 
+/// Around an inner vertex each neighbour follows it once.
+bool Stars::inner_contractible(std::uint32_t u, std::uint32_t v) {
+  ++question_;
+  std::size_t shared = 0, common = 0;
+  for (const std::uint32_t triangle : around(u)) {
+    const Triangle& t = triangles_[triangle];
+    const std::size_t k = corner_of(t, u);
+    const std::uint32_t p = t[(k + 1) % 3], q = t[(k + 2) % 3];
+    mark_[p] = question_;
+    shared += static_cast<std::size_t>(p == v) + static_cast<std::size_t>(q == v);
+  }
+  for (const std::uint32_t triangle : around(v)) {
+    const Triangle& t = triangles_[triangle];
+    common += static_cast<std::size_t>(mark_[t[(corner_of(t, v) + 1) % 3]] == question_);
+  }
+  return shared == 2 && common == 2 && (around(u).size() != 3 || around(v).size() != 3);
+}
+
 bool Stars::contractible(std::uint32_t u, std::uint32_t v) {
+  if (!boundary(u) && !boundary(v)) return inner_contractible(u, v);
   std::array<std::uint32_t, 2> beside{};  // the third vertices of the triangles that go
   std::size_t shared = 0;
   ++question_;

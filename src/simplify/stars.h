@@ -83,6 +83,7 @@ class Stars {
   };
   void list_triangles();
   void find_boundary();
+  [[nodiscard]] bool inner_contractible(std::uint32_t u, std::uint32_t v);
   void drop(std::uint32_t vertex, std::uint32_t triangle);
 
   std::vector<Triangle> triangles_;  ///< of dead ones the first vertex is kNone

@@ -110,7 +110,7 @@ class Places {
     if (static_cast<std::uint64_t>(cell_hash(id, 0, 0)) % each_ == 0) places_.push_back(at);
   }
   /// Of regions for a mesh of so many triangles.
-  RegionTree cut(std::uint64_t triangles, std::uint64_t region, double share) && {
+  BoxTree cut(std::uint64_t triangles, std::uint64_t region, double share) && {
     if (triangles <= region || places_.empty()) return {};
     const double each = static_cast<double>(triangles) / static_cast<double>(places_.size());
     const double most = kRoomForErrors * static_cast<double>(region) / each;
@@ -162,7 +162,7 @@ class StreamedSimplifier {
   }
 
  private:
-  RegionTree cut_mesh() {
+  BoxTree cut_mesh() {
     Places places(mesh_.vertices());
     std::uint32_t id = 0;
     for_vertices(mesh_, [&](const TriangleMesh& block, std::size_t v) {

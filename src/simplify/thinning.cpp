@@ -1,29 +1,31 @@
 #include "simplify/thinning.h"
 
+#include <tbb/concurrent_queue.h>
 #include <tbb/enumerable_thread_specific.h>
-#include <tbb/parallel_for.h>
+#include <tbb/parallel_pipeline.h>
+#include <tbb/task_arena.h>
 
 #include <algorithm>
-#include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <span>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "lamina/error.h"
 #include "meshes/mesh_blocks.h"
-#include "simplify/cut.h"
 #include "simplify/matching.h"
-#include "simplify/thin_window.h"
+#include "simplify/thin_block.h"
+#include "simplify/thin_seams.h"
 
 namespace lamina::simplify {
 namespace {
 
 using namespace meshes;
 
-constexpr std::size_t kBoxTriangles = 1U << 15;  ///< that one thread works on at a time
+constexpr std::size_t kInFlight = 8;  ///< blocks at most: they take memory
 /// How far the values of an attribute may differ that one vertex stands for, in standard deviations of it.
 constexpr double kSameValue = 0.25;
 
@@ -51,79 +53,97 @@ std::vector<float> find_tolerances(MeshBlocks& mesh) {
   return tolerances;
 }
 
+/// Blocks read one after the other, thinned out side by side, and joined one after the other.
 class Thinner {
  public:
-  Thinner(MeshBlocks& mesh, double deviation, const RunContext& run)
-      : mesh_(mesh), run_(run), tolerances_(find_tolerances(mesh)), window_(mesh, deviation) {}
+  Thinner(MeshBlocks& mesh, double deviation, std::size_t rows, const RunContext& run)
+      : mesh_(mesh),
+        run_(run),
+        budget_(deviation),
+        rows_(rows),
+        tolerances_(find_tolerances(mesh)),
+        seams_(mesh, tolerances_) {}
 
-  SimplifyStats thin(std::size_t block, const std::function<void(TriangleMesh)>& take) {
-    SimplifyStats stats;
-    stats.triangles_before = mesh_.triangles();
-    const auto all = static_cast<std::int64_t>((mesh_.triangles() + block - 1) / block);
-    std::int64_t blocks = 0;
-    std::vector<Triangle> triangles;
-    for (std::uint64_t done = 0; done < mesh_.triangles();) {
+  SimplifyStats thin(const std::function<void(TriangleMesh)>& take) {
+    using Piece = std::shared_ptr<Block>;
+    const auto begin = [&](tbb::flow_control& flow) -> Piece {
       if (run_.cancelled()) throw Error(ExitCode::internal, "cancelled");
-      mesh_.read_triangles(done, std::min<std::uint64_t>(block, mesh_.triangles() - done), triangles);
-      done += triangles.size();
-      window_.add(triangles);
-      work();
-      TriangleMesh piece = window_.give(done == mesh_.triangles());
+      Piece block;
+      if (read_ == mesh_.triangles()) {
+        flow.stop();
+        return block;
+      }
+      if (!spare_.try_pop(block)) block = std::make_shared<Block>();
+      const std::size_t count = std::min<std::uint64_t>(rows_, mesh_.triangles() - read_);
+      block->thin.read(mesh_, read_, count);
+      read_ += count;
+      block->last = read_ == mesh_.triangles();
+      return block;
+    };
+    const auto thin = [&](const Piece& block) {
+      block->thin.survey(budget_);
+      const std::size_t before = block->thin.part.triangles.size();
+      block->result = matchings_.local().thin(block->thin.part, tolerances_, run_);
+      block->contractions = (before - block->result.triangles) / 2;
+      return block;
+    };
+    const auto all = static_cast<std::int64_t>((mesh_.triangles() + rows_ - 1) / rows_);
+    std::int64_t blocks = 0;
+    SimplifyStats stats;
+    const auto end = [&](const Piece& block) {
+      stats.contractions += block->contractions;
+      stats.deviation = std::max(stats.deviation, block->result.deviation);
+      TriangleMesh piece = seams_.join(block->thin, block->last, run_);
+      spare_.push(block);
       stats.triangles_after += piece.triangles.size();
       take(std::move(piece));
       ++blocks;
       if (run_.progress) run_.progress({"simplify", 0, 0, blocks, all});
-    }
-    stats.vertices_after = window_.vertices_given();
-    stats.contractions = contractions_;
+    };
+    const auto threads = static_cast<std::size_t>(tbb::this_task_arena::max_concurrency());
+    tbb::parallel_pipeline(std::min(threads + 1, kInFlight),
+                           tbb::make_filter<void, Piece>(tbb::filter_mode::serial_in_order, begin) &
+                               tbb::make_filter<Piece, Piece>(tbb::filter_mode::parallel, thin) &
+                               tbb::make_filter<Piece, void>(tbb::filter_mode::serial_in_order, end));
+    stats.triangles_before = mesh_.triangles();
+    stats.vertices_after = seams_.vertices_given();
+    stats.contractions += seams_.contractions();
+    stats.deviation = std::max(stats.deviation, seams_.deviation());
     stats.reached = true;
-    stats.deviation = deviation_;
     return stats;
   }
 
  private:
-  /// Boxes side by side, then what lies along their borders.
-  void work() {
-    std::vector<Centre> centres(window_.triangles());
-    for (std::uint32_t t = 0; t < centres.size(); ++t) centres[t] = {window_.centre(t), t};
-    std::vector<std::uint32_t> order;
-    const std::vector<std::size_t> starts = cut_into_boxes(std::move(centres), kBoxTriangles, 0.5, order);
-    const std::vector<std::uint32_t> border = work_on(order, starts);
-    if (starts.size() > 2 && !border.empty()) work_on(border, std::array<std::size_t, 2>{0, border.size()});
-  }
-
-  /// `order`: of the window's triangles those of one box after the other, which begin at `starts`.
-  std::vector<std::uint32_t> work_on(std::span<const std::uint32_t> order, std::span<const std::size_t> starts) {
-    const std::size_t boxes = starts.size() - 1;
-    std::vector<ThinWindow::Part> parts(boxes);
-    std::vector<Matching::Result> results(boxes);
-    tbb::parallel_for(std::size_t{0}, boxes, [&](std::size_t b) {
-      parts[b] = window_.part(order.subspan(starts[b], starts[b + 1] - starts[b]), numbers_.local());
-      results[b] = matchings_.local().thin(parts[b].thin, tolerances_, run_);
-    });
-    for (std::size_t b = 0; b < boxes; ++b) {
-      window_.put_back(parts[b]);
-      contractions_ += (parts[b].triangles.size() - results[b].triangles) / 2;
-      deviation_ = std::max(deviation_, results[b].deviation);
-    }
-    return window_.settle(parts);
-  }
+  struct Block {
+    ThinBlock thin;
+    bool last = false;
+    Matching::Result result;
+    std::uint64_t contractions = 0;
+  };
 
   MeshBlocks& mesh_;
   const RunContext& run_;
+  double budget_;
+  std::size_t rows_;
   std::vector<float> tolerances_;
-  ThinWindow window_;
+  ThinSeams seams_;
   tbb::enumerable_thread_specific<Matching> matchings_;
-  tbb::enumerable_thread_specific<std::vector<std::uint32_t>> numbers_;  ///< ThinWindow::part()
-  std::uint64_t contractions_ = 0;
-  double deviation_ = 0;
+  tbb::concurrent_queue<std::shared_ptr<Block>> spare_;  ///< blocks that are done: their memory
+  std::uint64_t read_ = 0;                               ///< triangles
 };
 
 }  // namespace
 
+std::size_t thin_block_of(std::uint64_t triangles) {
+  constexpr double kSlabs = 16;  // square roots of the triangles: some slabs of a mesh that was streamed
+  constexpr std::size_t kLeast = 1U << 15;
+  const auto wanted = static_cast<std::size_t>(kSlabs * std::sqrt(static_cast<double>(triangles)));
+  return std::bit_ceil(std::clamp(wanted, kLeast, kThinBlock));
+}
+
 SimplifyStats thin_blocks(MeshBlocks& mesh, double deviation, const std::function<void(TriangleMesh)>& take,
                           const RunContext& run, std::size_t block) {
-  return Thinner(mesh, deviation, run).thin(block, take);
+  return Thinner(mesh, deviation, block > 0 ? block : thin_block_of(mesh.triangles()), run).thin(take);
 }
 
 }  // namespace lamina::simplify

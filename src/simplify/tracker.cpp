@@ -126,6 +126,7 @@ void Tracker::undo(std::uint32_t u, std::uint32_t v) {
 
 void Tracker::tighten(std::uint32_t triangle) {
   room_[triangle] *= kTightened;
+  spare_[triangle] = 0;
 }
 
 }  // namespace lamina::simplify

@@ -31,7 +31,7 @@ class Tracker {
   void accept(std::uint32_t u, std::uint32_t v);
   /// It has been taken back.
   void undo(std::uint32_t u, std::uint32_t v);
-  /// A present triangle is as it was before, or has to be nearer from now on.
+  /// A present triangle is as it was before, or has to be nearer from now on and is taken for nothing on trust.
   void forget(std::uint32_t triangle) { back_[triangle] = -1; }
   void tighten(std::uint32_t triangle);
 

@@ -134,6 +134,22 @@ TEST(SimplifyBound, IsUsedUp) {
   EXPECT_EQ(again.triangles, within.triangles);
 }
 
+// Where a contraction that was taken on trust turns out to go too far, it is not made again.
+TEST(SimplifyBound, ALargerOneLeavesFewerTriangles) {
+  TriangleMesh mesh = sphere(1, 48, 96);
+  for (Vec3& p : mesh.positions) {
+    const double turn = std::atan2(p[1], p[0]), lobes = 1 + 0.6 * std::sin(7 * turn) * std::cos(5 * p[2]);
+    p = {lobes * p[0], lobes * p[1], 1.5 * p[2]};
+  }
+  std::size_t before = mesh.triangles.size();
+  for (const double bound : {0.01, 0.03, 0.1, 0.3}) {
+    TriangleMesh fewer = mesh;
+    simplify_mesh(fewer, {0, bound});
+    EXPECT_LT(fewer.triangles.size(), before) << bound;
+    before = fewer.triangles.size();
+  }
+}
+
 TEST(SimplifyBound, APlaneGoesAtAnyBound) {
   std::mt19937 random(1);
   TriangleMesh mesh = rough_field(random, 12);
