@@ -103,7 +103,7 @@ double refit_memory(const ReconstructionPlan& plan, double per_step) {
 
 /// Behind the sweep: the mesh as it was waits, and regions of it, with quadrics.
 void add_simplification(const ReconstructionPlan& plan, const SlabStore& store, ExpectedCost& cost) {
-  constexpr double kProgram = 60e6, kRegions = 84, kPlain = 2.2e-6, kWithin = 20e-6, kFlat = 0.9e-6;
+  constexpr double kProgram = 60e6, kRegions = 84, kPlain = 2.2e-6, kWithin = 20e-6, kFlat = 0.55e-6;
   const double triangles = expected_triangles(plan);
   const auto count = static_cast<std::uint64_t>(triangles);
   cost.memory =

@@ -343,8 +343,9 @@ class StreamedSimplifier {
 }  // namespace
 
 std::uint64_t memory_for(const SimplifySettings& settings, std::uint64_t triangles) {
-  constexpr std::uint64_t kBuffers = 200U << 20, kThinBytes = 250;
-  if (settings.deviation > 0) return kThinBytes * std::min<std::uint64_t>(triangles, 2 * kThinBlock);
+  constexpr std::uint64_t kBuffers = 200U << 20, kThinBytes = 250, kThinBlocks = 4;
+  if (settings.deviation > 0)
+    return kThinBytes * std::min<std::uint64_t>(triangles, kThinBlocks * thin_block_of(triangles));
   const std::uint64_t each = settings.error > 0 ? 650 : 450;
   return each * std::min(triangles, kRegionTriangles) + (triangles > kRegionTriangles ? kBuffers : 0);
 }
