@@ -125,8 +125,7 @@ void Matching::survey_rings() {
 
 void Matching::add_planes() {
   for (const Triangle& t : stars_.triangles()) {
-    const Vec3& at = vertices_[t[0]].at;
-    const Vec3 n = cross(vertices_[t[1]].at - at, vertices_[t[2]].at - at);
+    const Vec3 n = area_normal(vertices_[t[0]].at, vertices_[t[1]].at, vertices_[t[2]].at);
     const double twice = norm(n);
     if (!(twice > 0)) continue;
     for (const std::uint32_t v : t) vertices_[v].add_plane((1 / twice) * n, 0.5 * twice);

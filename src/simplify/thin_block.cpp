@@ -64,13 +64,12 @@ void ThinBlock::survey(double deviation) {
     float area = 0, corners = 0;
   };
   std::vector<Sums> sums(ids.size());
-  for (std::size_t v = 0; v < ids.size(); ++v) sums[v].hash = CounterRng(ids[v], 0).bits();
+  for (std::size_t v = 0; v < ids.size(); ++v) sums[v].hash = scrambled(ids[v]);
   turns.assign(ids.size(), 0);
   std::vector<float> areas;
   areas.reserve(part.triangles.size());
   for (const Triangle& t : part.triangles) {
-    const Vec3& at = part.vertices[t[0]].at;
-    const Vec3 n = cross(part.vertices[t[1]].at - at, part.vertices[t[2]].at - at);
+    const Vec3 n = area_normal(part.vertices[t[0]].at, part.vertices[t[1]].at, part.vertices[t[2]].at);
     const double twice = norm(n);
     areas.push_back(static_cast<float>(0.5 * twice));
     for (std::size_t k = 0; k < 3; ++k) {
