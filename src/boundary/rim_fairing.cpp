@@ -6,6 +6,8 @@
 #include <cmath>
 #include <utility>
 
+#include "base/hashing.h"
+
 namespace lamina {
 namespace {
 
@@ -20,7 +22,7 @@ struct FanSums {
     const auto b = static_cast<std::uint64_t>(before);
     difference += n - b;
     squares += n * n - b * b;
-    hash += mixed(n) - mixed(b);
+    hash += scrambled(n) - scrambled(b);
   }
   [[nodiscard]] bool open() const { return hash != 0; }
   /// False where it is no single fan.
@@ -32,13 +34,7 @@ struct FanSums {
     if ((plus + minus) % 2 != 0) return false;
     a = (plus + minus) / 2;
     b = (plus - minus) / 2;
-    return mixed(static_cast<std::uint64_t>(a)) - mixed(static_cast<std::uint64_t>(b)) == hash;
-  }
-
- private:
-  static std::uint64_t mixed(std::uint64_t v) {
-    const std::uint64_t m = v * std::uint64_t{0x9E3779B97F4A7C15};
-    return m ^ m >> 29;
+    return scrambled(static_cast<std::uint64_t>(a)) - scrambled(static_cast<std::uint64_t>(b)) == hash;
   }
 };
 

@@ -6,6 +6,8 @@
 #include <numeric>
 #include <utility>
 
+#include "base/hashing.h"
+
 namespace lamina {
 namespace {
 
@@ -227,11 +229,6 @@ namespace {
 /// Sums of whole numbers do not depend on their order.
 constexpr float kUnits = 1 << 20;
 
-std::uint64_t mixed(std::uint32_t v) {
-  const std::uint64_t m = v * std::uint64_t{0x9E3779B97F4A7C15};
-  return m ^ m >> 29;
-}
-
 }  // namespace
 
 void RimSmoother::push(MeshSlab slab) {
@@ -267,7 +264,7 @@ bool RimSmoother::pop(MeshSlab& out) {
 void RimSmoother::find_boundary(Held& here, const Held* above) {
   sums_.assign(here.overhang.size(), 0);
   const auto add = [&](std::uint32_t v, std::uint32_t next, std::uint32_t before) {
-    sums_[v] += mixed(next) - mixed(before);
+    sums_[v] += scrambled(next) - scrambled(before);
   };
   for_corners(here.mesh.triangles, here.first, here.end(), add);
   if (above != nullptr) for_corners(above->mesh.triangles, here.first, here.end(), add);
