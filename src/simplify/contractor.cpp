@@ -53,7 +53,9 @@ Placed Contractor::place(std::uint32_t u, std::uint32_t v) const {
 void Contractor::offer(std::uint32_t u, std::uint32_t v) {
   if ((piece_.fixed[u] | piece_.fixed[v]) != 0) return;
   if (u > v) std::swap(u, v);
-  const Entry edge{static_cast<float>(place(u, v).cost), u, v, version_[u] + version_[v]};
+  const double cost = place(u, v).cost;
+  if (old_ && surely_far(u, v, cost)) return;
+  const Entry edge{static_cast<float>(cost), u, v, version_[u] + version_[v]};
   if (edge.cost > limit_) {
     later_.push_back(edge);
     least_later_ = std::min(least_later_, edge.cost);
@@ -114,13 +116,17 @@ std::uint64_t Contractor::run(float dearest, std::uint64_t keep) {
   return before - size_;
 }
 
-/// Within the bound, as it seems? Where the root mean square of the planes' distances is far beyond it, nothing is
-/// asked any more.
-bool Contractor::stays_near(std::uint32_t u, std::uint32_t v, const Placed& to) {
+/// Is the root mean square of the planes' distances beyond the bound? Such edges are not even offered.
+bool Contractor::surely_far(std::uint32_t u, std::uint32_t v, double cost) const {
   const Vec3 edge = piece_.positions[v] - piece_.positions[u];
   const double of_noise = 16 * kNormalNoise * kNormalNoise * dot(edge, edge);  // counted in the cost, too
   const double weight = piece_.quadrics[u].weight() + piece_.quadrics[v].weight();
-  if (to.cost > weight * (piece_.bound * piece_.bound + of_noise)) return false;
+  return cost > weight * (piece_.bound * piece_.bound + of_noise);
+}
+
+/// Within the bound, as it seems?
+bool Contractor::stays_near(std::uint32_t u, std::uint32_t v, const Placed& to) {
+  const double weight = piece_.quadrics[u].weight() + piece_.quadrics[v].weight();
   return tracker_->takes_on_trust(stars_, u, v, weight > 0 ? to.cost / weight : 0) ||
          tracker_->allows(stars_, piece_.positions, u, v, to.at);
 }

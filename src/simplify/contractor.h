@@ -88,6 +88,7 @@ class Contractor {
   void drop_stale();
   [[nodiscard]] Placed place(std::uint32_t u, std::uint32_t v) const;
   void offer(std::uint32_t u, std::uint32_t v);
+  [[nodiscard]] bool surely_far(std::uint32_t u, std::uint32_t v, double cost) const;
   [[nodiscard]] bool stays_near(std::uint32_t u, std::uint32_t v, const Placed& to);
   int contract(std::uint32_t u, std::uint32_t v, const meshes::Vec3& to);
   void note(std::uint32_t u, std::uint32_t v);
