@@ -14,7 +14,7 @@
 #include "meshes/formats.h"
 #include "meshes/mesh_sink.h"
 #include "reconstruct/constants.h"
-#include "simplify/goal.h"
+#include "simplify/streamed.h"
 
 namespace lamina {
 namespace {

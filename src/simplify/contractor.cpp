@@ -4,9 +4,6 @@
 #include <cmath>
 #include <utility>
 
-#include "simplify/contraction.h"
-#include "simplify/proof.h"
-
 namespace lamina::simplify {
 
 using namespace meshes;

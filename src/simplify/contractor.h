@@ -8,11 +8,10 @@
 #include <vector>
 
 #include "meshes/vec3.h"
-#include "simplify/contraction.h"
+#include "simplify/bound.h"
 #include "simplify/old_mesh.h"
 #include "simplify/quadric.h"
 #include "simplify/stars.h"
-#include "simplify/tracker.h"
 
 namespace lamina::simplify {
 

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "lamina/error.h"
-#include "simplify/contraction.h"
 
 namespace lamina::simplify {
 namespace {

@@ -13,8 +13,7 @@
 #include "lamina/mesh.h"
 #include "lamina/run.h"
 #include "meshes/vec3.h"
-#include "simplify/contraction.h"
-#include "simplify/stand_in.h"
+#include "simplify/quadric.h"
 #include "simplify/stars.h"
 
 namespace lamina::simplify {

@@ -4,6 +4,26 @@
 #include <utility>
 
 namespace lamina::simplify {
+namespace {
+
+using namespace meshes;
+
+constexpr float kLeastCosine = 0.2F;  ///< a triangle turns no farther at one contraction
+
+using Lanes = Moves::Lanes;
+using Triple = Moves::Triple;
+
+Triple less(const Triple& a, const Triple& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+Lanes times(const Triple& a, const Triple& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+Triple across(const Triple& a, const Triple& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+}  // namespace
 
 void Stars::reset(std::vector<Triangle> triangles, std::size_t vertices) {
   triangles_ = std::move(triangles);
@@ -173,6 +193,30 @@ int Stars::revert(std::uint32_t u, std::uint32_t v, const Before& before) {
   star_[v] = before.v;
   boundary_[u] = before.boundary;
   return before.dead;
+}
+
+Moves::Moves(const Vec3& to, const Vec3& a, const Vec3& b, double sliver)
+    : to_(to), scale_(1), sliver2_(static_cast<float>(sliver * sliver)) {
+  const double length = norm(b - a);
+  if (length > 0) scale_ = 1 / length;
+}
+
+/// A triangle's quality goes by four times its squared area over the square of the sum of its squared sides: 1/12 where
+/// it is equilateral, 0 where it has no area.
+bool Moves::keep() {
+  size_ = 0;
+  const auto& [from, p, q] = corners_;
+  const Triple from_p = less(p, from), from_q = less(q, from), base = less(q, p);
+  const Triple before = across(from_p, from_q), after = across(p, q);
+  const Lanes along = times(before, after), was = times(before, before), is = times(after, after);
+  const Lanes side = times(base, base);
+  const Lanes was_sides = times(from_p, from_p) + times(from_q, from_q) + side;
+  const Lanes is_sides = times(p, p) + times(q, q) + side;
+  const auto same_side = (along > 0) & (along * along > kLeastCosine * kLeastCosine * was * is);
+  const auto good = 12 * is >= sliver2_ * is_sides * is_sides;
+  const auto no_worse = is * was_sides * was_sides >= was * is_sides * is_sides;
+  const auto kept = same_side & (good | no_worse);
+  return (kept[0] & kept[1] & kept[2] & kept[3]) != 0;
 }
 
 }  // namespace lamina::simplify

@@ -1,4 +1,4 @@
-// Meshes of any size simplified, region by region from and to the disk.
+// Meshes of any size simplified, region by region from and to the disk; how far that is to go.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -9,9 +9,17 @@
 #include "lamina/simplify.h"
 #include "meshes/formats.h"
 #include "meshes/mesh_sink.h"
-#include "simplify/goal.h"
 
 namespace lamina::simplify {
+
+/// Throws Error(usage) where not one of the three is given, or out of range.
+void require_goal(const SimplifySettings& settings);
+
+/// How many triangles are wanted of so many; 0 where a bound says it. Throws Error(usage) for more than there are.
+std::uint64_t wanted_triangles(const SimplifySettings& settings, std::uint64_t there);
+
+/// What is left to do for a mesh that a run has made: for more triangles than there are nothing, which is said.
+SimplifySettings goal_for(const SimplifySettings& settings, std::uint64_t there, const RunContext& run);
 
 /// A mesh of no more triangles is held in memory; larger ones are cut into regions of no more. Part of what the result
 /// is, on any machine.

@@ -1,4 +1,4 @@
-#include "simplify/thin_seams.h"
+#include "simplify/thinning.h"
 
 #include <algorithm>
 #include <utility>

@@ -15,7 +15,6 @@
 #include "meshes/vec3.h"
 #include "simplify/cover.h"
 #include "simplify/height_field.h"
-#include "simplify/near_old.h"
 #include "simplify/old_mesh.h"
 
 namespace lamina {

@@ -1,4 +1,4 @@
-#include "simplify/near_old.h"
+#include "simplify/old_mesh.h"
 
 #include <algorithm>
 #include <cmath>
