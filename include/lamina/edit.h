@@ -38,9 +38,6 @@ struct EditReport {
 EditReport edit_points(PointSource& source, PointsWriter& writer, const EditBatch& edit, BadSamples bad,
                        const RunContext& run = {});
 
-/// Keeps the rows i with keep[i] != 0, in order. `keep` has one entry for each row.
-void keep_rows(SampleBatch& batch, const std::vector<std::uint8_t>& keep);
-
 /// True when row i can be written: its position and radius are finite.
 bool is_finite_row(const SampleBatch& batch, std::size_t i);
 

@@ -57,6 +57,9 @@ std::string crs_name(const std::string& crs);
 /// Throws Error(unreadable), naming what to do, where x and y are degrees.
 void require_no_degrees(const PointSourceInfo& info);
 
+/// Keeps the rows i with keep[i] != 0, in order. `keep` has one entry for each row.
+void keep_rows(SampleBatch& batch, const std::vector<std::uint8_t>& keep);
+
 /// Rows of points. One thread at a time, unless info().random_access.
 class PointSource {
  public:

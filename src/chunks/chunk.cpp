@@ -1,4 +1,4 @@
-#include "chunks/cuts.h"
+#include "chunks/part_file.h"
 
 #include <fmt/format.h>
 
@@ -7,7 +7,6 @@
 #include <filesystem>
 
 #include "base/output_file.h"
-#include "chunks/part_file.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"
 #include "lamina/run.h"

@@ -15,7 +15,6 @@
 
 #include "base/descriptor.h"
 #include "base/output_file.h"
-#include "chunks/cuts.h"
 #include "chunks/part_file.h"
 #include "lamina/chunk.h"
 #include "lamina/error.h"

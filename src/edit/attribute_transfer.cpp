@@ -11,8 +11,8 @@
 #include <optional>
 
 #include "base/run.h"
-#include "edit/batch_pipe.h"
 #include "edit/point_tree.h"
+#include "edit/rows.h"
 #include "lamina/error.h"
 
 namespace lamina {

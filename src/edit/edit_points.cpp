@@ -1,60 +1,18 @@
-#include "edit/batch_pipe.h"
+#include "lamina/edit.h"
 
 #include <fmt/format.h>
-#include <tbb/parallel_pipeline.h>
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <mutex>
+#include <optional>
 
+#include "base/number.h"
 #include "base/run.h"
-#include "lamina/edit.h"
+#include "edit/rows.h"
 #include "lamina/error.h"
-
-namespace lamina::edit {
-namespace {
-
-constexpr std::size_t kRows = 1u << 15;
-constexpr std::size_t kInFlight = 8;
-
-}  // namespace
-
-void for_each_batch(PointSource& source, std::string_view stage, const RunContext& run,
-                    const std::function<void(SampleBatch&)>& work, const std::function<void(SampleBatch&)>& take) {
-  const PointSourceInfo& info = source.info();
-  using Piece = std::shared_ptr<SampleBatch>;
-  std::uint64_t next = 0;
-  const auto begin = [&](tbb::flow_control& flow) -> Piece {
-    if (next >= info.count || run.cancelled()) {
-      flow.stop();
-      return nullptr;
-    }
-    auto piece = std::make_shared<SampleBatch>();
-    piece->first = next;
-    if (!info.random_access) source.read(next, kRows, *piece);
-    next += kRows;
-    return piece;
-  };
-  const auto middle = [&](const Piece& piece) {
-    if (info.random_access) source.read(piece->first, kRows, *piece);
-    work(*piece);
-    return piece;
-  };
-  const auto end = [&](const Piece& piece) {
-    const std::uint64_t done = std::min(piece->first + kRows, info.count);
-    take(*piece);
-    if (run.progress) run.progress({stage, done, info.count, 0, 0});
-  };
-  with_threads(run.threads, [&] {
-    tbb::parallel_pipeline(kInFlight, tbb::make_filter<void, Piece>(tbb::filter_mode::serial_in_order, begin) &
-                                          tbb::make_filter<Piece, Piece>(tbb::filter_mode::parallel, middle) &
-                                          tbb::make_filter<Piece, void>(tbb::filter_mode::serial_in_order, end));
-  });
-  if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
-}
-
-}  // namespace lamina::edit
 
 namespace lamina {
 namespace {
@@ -79,16 +37,6 @@ std::uint64_t replace_normals(SampleBatch& b) {
     ++replaced;
   }
   return replaced;
-}
-
-template <class T>
-void keep_values(std::vector<T>& values, const std::vector<std::uint8_t>& keep) {
-  if (values.empty()) return;
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < keep.size(); ++i) {
-    if (keep[i] != 0) values[kept++] = values[i];
-  }
-  values.resize(kept);
 }
 
 }  // namespace
@@ -136,13 +84,6 @@ void refuse_bad_row(const EditReport& report, const std::string& path) {
                                                 path, report.first_bad_row.value_or(0)));
 }
 
-void keep_rows(SampleBatch& batch, const std::vector<std::uint8_t>& keep) {
-  for (auto* axis : {&batch.x, &batch.y, &batch.z}) keep_values(*axis, keep);
-  for (auto* column : {&batch.nx, &batch.ny, &batch.nz, &batch.radius, &batch.quality}) keep_values(*column, keep);
-  for (auto& values : batch.attributes) keep_values(values, keep);
-  for (auto& values : batch.exact) keep_values(values, keep);
-}
-
 EditReport edit_points(PointSource& source, PointsWriter& writer, const EditBatch& edit, BadSamples bad,
                        const RunContext& run) {
   EditReport total;
@@ -171,6 +112,202 @@ void warn_of_bad_rows(const EditReport& report, const std::string& path, const R
   if (report.replaced_values > 0) {
     run.warn(fmt::format("{}: {} attribute values are not finite; they become 0", path, report.replaced_values));
   }
+}
+
+namespace {
+
+/// A column of one of several inputs, by name.
+struct Named {
+  std::string name;
+  ScalarType type;
+  std::size_t inputs = 0;  ///< that have it
+  std::size_t first = 0;   ///< input it was first seen in
+};
+
+bool is_integer(ScalarType t) {
+  return t != ScalarType::float32 && t != ScalarType::float64;
+}
+
+bool is_signed(ScalarType t) {
+  return t == ScalarType::int8 || t == ScalarType::int16 || t == ScalarType::int32;
+}
+
+/// The smallest type that holds every value of both.
+ScalarType common_type(ScalarType a, ScalarType b) {
+  if (a == b) return a;
+  if (!is_integer(a) || !is_integer(b))
+    return fits_float(a) && fits_float(b) ? ScalarType::float32 : ScalarType::float64;
+  if (is_signed(a) == is_signed(b)) return byte_size(a) > byte_size(b) ? a : b;
+  const int bytes =
+      std::max(is_signed(a) ? byte_size(a) : 2 * byte_size(a), is_signed(b) ? byte_size(b) : 2 * byte_size(b));
+  return bytes == 2 ? ScalarType::int16 : bytes == 4 ? ScalarType::int32 : ScalarType::float64;
+}
+
+class Union {
+ public:
+  Union(std::vector<std::string> files, MixedAttributes mixed) : files_(std::move(files)), mixed_(mixed) {}
+
+  void add(std::size_t input, const AttributeSpec& spec) {
+    const auto at = std::find_if(columns_.begin(), columns_.end(), [&](const Named& c) { return c.name == spec.name; });
+    if (at == columns_.end()) {
+      columns_.push_back({spec.name, spec.type, 1, input});
+      return;
+    }
+    ++at->inputs;
+    if (at->type == spec.type) return;
+    if (mixed_ == MixedAttributes::refuse || is_colour(spec.name)) {
+      throw Error(ExitCode::unreadable,
+                  fmt::format("{}: '{}' is {}, in {} it is {}; {}", files_[input], spec.name, ply_name(spec.type),
+                              files_[at->first], ply_name(at->type),
+                              is_colour(spec.name) ? "bring the colours to one type first"
+                                                   : "--mixed fill takes a type that holds both"));
+    }
+    at->type = common_type(at->type, spec.type);
+  }
+
+  /// For what an input has or has not as a whole: normals, radius, quality.
+  [[nodiscard]] bool keep(const char* what, const std::vector<bool>& has, bool can_fill) const {
+    const auto with = std::find(has.begin(), has.end(), true), without = std::find(has.begin(), has.end(), false);
+    if (without == has.end()) return true;
+    if (with == has.end()) return false;
+    require_mixed(what, static_cast<std::size_t>(without - has.begin()), static_cast<std::size_t>(with - has.begin()));
+    return mixed_ == MixedAttributes::fill && can_fill;
+  }
+
+  [[nodiscard]] AttributeLayout layout(const std::vector<std::vector<std::string>>& names) const {
+    AttributeLayout out;
+    for (const Named& column : columns_) {
+      if (column.inputs < files_.size()) {
+        const auto lacks = std::find_if(names.begin(), names.end(), [&](const auto& list) {
+          return std::find(list.begin(), list.end(), column.name) == list.end();
+        });
+        require_mixed(column.name.c_str(), static_cast<std::size_t>(lacks - names.begin()), column.first);
+        if (mixed_ == MixedAttributes::intersect) continue;
+      }
+      out.push_back({column.name, column.type});
+    }
+    return out;
+  }
+
+ private:
+  void require_mixed(const char* what, std::size_t without, std::size_t with) const {
+    if (mixed_ != MixedAttributes::refuse) return;
+    throw Error(ExitCode::unreadable,
+                fmt::format("{}: has no {}, {} has; --mixed fill puts 0 there, --mixed intersect leaves it out",
+                            files_[without], what, files_[with]));
+  }
+
+  std::vector<std::string> files_;
+  MixedAttributes mixed_;
+  std::vector<Named> columns_;
+};
+
+/// Where each column of the merged layout stands in an input's.
+std::vector<std::optional<std::size_t>> places(const AttributeLayout& merged, const AttributeLayout& own) {
+  std::vector<std::optional<std::size_t>> out;
+  for (const AttributeSpec& spec : merged) {
+    const auto at = std::find_if(own.begin(), own.end(), [&](const AttributeSpec& o) { return o.name == spec.name; });
+    out.push_back(at == own.end() ? std::nullopt : std::optional(static_cast<std::size_t>(at - own.begin())));
+  }
+  return out;
+}
+
+std::vector<std::string> names_of(const AttributeLayout& layout) {
+  std::vector<std::string> names;
+  names.reserve(layout.size());
+  for (const AttributeSpec& spec : layout) names.push_back(spec.name);
+  return names;
+}
+
+}  // namespace
+
+PointColumns merged_columns(const std::vector<const PointSourceInfo*>& inputs, MixedAttributes mixed) {
+  if (inputs.empty()) throw Error(ExitCode::usage, "merge: nothing to merge");
+  std::vector<std::string> files;
+  std::vector<std::vector<std::string>> names;
+  std::vector<bool> normals, radius, quality;
+  PointColumns out;
+  for (const PointSourceInfo* info : inputs) {
+    files.push_back(info->path);
+    names.push_back(names_of(info->attributes));
+    normals.push_back(info->has_normals);
+    radius.push_back(info->has_radius);
+    quality.push_back(info->has_quality);
+    out.double_positions = out.double_positions || info->double_precision;
+    if (out.radius.empty()) out.radius = info->radius_name;
+    if (out.quality.empty()) out.quality = info->quality_name;
+  }
+  Union columns(files, mixed);
+  for (std::size_t i = 0; i < inputs.size(); ++i)
+    for (const AttributeSpec& spec : inputs[i]->attributes) columns.add(i, spec);
+  out.normals = columns.keep("normals (nx ny nz)", normals, false);
+  if (!columns.keep("radius", radius, false)) out.radius.clear();
+  if (!columns.keep("quality", quality, true)) out.quality.clear();
+  out.attributes = columns.layout(names);
+  return out;
+}
+
+EditReport append_points(PointSource& source, PointsWriter& writer, BadSamples bad, const RunContext& run) {
+  const PointColumns& columns = writer.columns();
+  const auto from = places(columns.attributes, source.info().attributes);
+  const std::uint64_t before = writer.rows();
+  const auto arrange = [&](SampleBatch& batch) {
+    std::vector<std::vector<float>> attributes(from.size());
+    std::vector<std::vector<double>> exact(from.size());
+    for (std::size_t a = 0; a < from.size(); ++a) {
+      if (!from[a]) {
+        attributes[a].assign(batch.size(), 0);
+        continue;
+      }
+      attributes[a] = std::move(batch.attributes[*from[a]]);
+      if (*from[a] < batch.exact.size()) exact[a] = std::move(batch.exact[*from[a]]);
+    }
+    batch.attributes = std::move(attributes);
+    batch.exact = std::move(exact);
+    if (!columns.quality.empty() && batch.quality.empty()) batch.quality.assign(batch.size(), 1);
+  };
+  EditReport report = edit_points(source, writer, arrange, bad, run);
+  report.written = writer.rows() - before;
+  return report;
+}
+
+TriangleMesh merge_meshes(std::vector<TriangleMesh> meshes, const std::vector<std::string>& names,
+                          MixedAttributes mixed) {
+  if (meshes.empty()) throw Error(ExitCode::usage, "merge: nothing to merge");
+  Union columns(names, mixed);
+  std::vector<bool> normals;
+  std::vector<std::vector<std::string>> attribute_names;
+  std::uint64_t vertices = 0;
+  for (std::size_t i = 0; i < meshes.size(); ++i) {
+    for (const AttributeSpec& spec : meshes[i].layout) columns.add(i, spec);
+    normals.push_back(!meshes[i].normals.empty());
+    attribute_names.push_back(names_of(meshes[i].layout));
+    vertices += meshes[i].positions.size();
+  }
+  if (vertices > std::numeric_limits<std::uint32_t>::max())
+    throw Error(ExitCode::budget,
+                "merge: together the meshes have more than 4294967295 vertices, the most that 32-bit "
+                "indices can name");
+  const bool with_normals = columns.keep("normals", normals, false);
+  TriangleMesh out;
+  out.layout = columns.layout(attribute_names);
+  out.attributes.resize(out.layout.size());
+  for (TriangleMesh& mesh : meshes) {
+    const auto first = static_cast<std::uint32_t>(out.positions.size());
+    out.positions.insert(out.positions.end(), mesh.positions.begin(), mesh.positions.end());
+    if (with_normals) out.normals.insert(out.normals.end(), mesh.normals.begin(), mesh.normals.end());
+    const auto from = places(out.layout, mesh.layout);
+    for (std::size_t a = 0; a < from.size(); ++a) {
+      if (from[a]) {
+        const auto& values = mesh.attributes[*from[a]];
+        out.attributes[a].insert(out.attributes[a].end(), values.begin(), values.end());
+      }
+      out.attributes[a].resize(out.positions.size());
+    }
+    for (const auto& t : mesh.triangles) out.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+    mesh = {};  // its memory is needed no longer
+  }
+  return out;
 }
 
 }  // namespace lamina

@@ -16,8 +16,7 @@
 
 #include "base/descriptor.h"
 #include "base/run.h"
-#include "edit/batch_pipe.h"
-#include "edit/record_sorter.h"
+#include "edit/rows.h"
 #include "lamina/error.h"
 #include "points/point_columns.h"
 

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "base/descriptor.h"
-#include "edit/batch_pipe.h"
+#include "edit/rows.h"
 #include "lamina/edit.h"
 #include "lamina/error.h"
 #include "lamina/file_ending.h"

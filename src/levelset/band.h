@@ -19,7 +19,7 @@
 #include "octree/corner_block.h"
 #include "octree/window.h"
 #include "vdb/grids.h"
-#include "vdb/packed_leaf.h"
+#include "vdb/streamed_vdb.h"
 
 namespace lamina::volume {
 

@@ -15,7 +15,7 @@
 #include "lamina/error.h"
 #include "measure/edge_table.h"
 #include "measure/triangle_bvh.h"
-#include "meshes/triangle_geometry.h"
+#include "meshes/vec3.h"
 
 namespace lamina {
 namespace {

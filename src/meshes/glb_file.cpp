@@ -1,4 +1,4 @@
-#include "meshes/glb_file.h"
+#include "meshes/glb.h"
 
 #include <fmt/format.h>
 
@@ -13,7 +13,6 @@
 
 #include "base/number.h"
 #include "lamina/error.h"
-#include "meshes/glb.h"
 
 namespace lamina::meshes {
 namespace {

@@ -18,9 +18,8 @@
 #include "base/number.h"
 #include "lamina/error.h"
 #include "lamina/mesh.h"
-#include "meshes/colours.h"
 #include "meshes/formats.h"
-#include "meshes/glb_file.h"
+#include "meshes/glb.h"
 
 namespace lamina::meshes {
 namespace {

@@ -19,7 +19,6 @@
 #include "base/number.h"
 #include "base/output_file.h"
 #include "lamina/error.h"
-#include "meshes/colours.h"
 #include "meshes/formats.h"
 #include "meshes/mesh_blocks.h"
 

@@ -21,7 +21,6 @@
 #include "lamina/error.h"
 #include "lamina/file_ending.h"
 #include "lamina/mesh.h"
-#include "meshes/colours.h"
 #include "meshes/formats.h"
 #include "meshes/mesh_blocks.h"
 #include "meshes/mesh_sink.h"

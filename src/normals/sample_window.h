@@ -8,8 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "normals/patch_graph.h"
-#include "normals/sight.h"
+#include "normals/sides.h"
 #include "samples/sample_tree.h"
 #include "store/slab_store.h"
 

@@ -1,4 +1,4 @@
-#include "normals/sight.h"
+#include "normals/sides.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>

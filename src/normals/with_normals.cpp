@@ -9,17 +9,15 @@
 
 #include "base/descriptor.h"
 #include "base/run.h"
-#include "edit/record_sorter.h"
+#include "edit/rows.h"
 #include "lamina/error.h"
 #include "lamina/normals.h"
 #include "normals/directions.h"
-#include "normals/grid_normals.h"
 #include "normals/row_normals.h"
 #include "normals/sample_window.h"
-#include "normals/sight.h"
+#include "normals/sides.h"
 #include "samples/sampling_survey.h"
 #include "store/ingest.h"
-#include "store/input_survey.h"
 
 namespace lamina {
 namespace {

@@ -13,7 +13,6 @@
 #include <utility>
 #include <vector>
 
-#include "points/filters.h"
 #include "points/formats.h"
 #include "points/las.h"
 #include "points/point_columns.h"

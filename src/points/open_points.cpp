@@ -16,7 +16,6 @@
 #include "lamina/error.h"
 #include "lamina/file_ending.h"
 #include "lamina/points.h"
-#include "points/filters.h"
 #include "points/input_file.h"
 #include "points/point_columns.h"
 #include "points/text_rows.h"

@@ -10,7 +10,7 @@
 
 #include "base/number.h"
 #include "lamina/error.h"
-#include "points/filters.h"
+#include "points/formats.h"
 #include "points/input_file.h"
 #include "points/text_rows.h"
 

@@ -234,6 +234,17 @@ std::vector<ColumnTarget> prepare_batch(const PointSourceInfo& info, const std::
   return targets;
 }
 
+void keep_rows(SampleBatch& batch, const std::vector<std::uint8_t>& keep) {
+  for_columns(batch, batch, [&](auto& values, auto&) {
+    if (values.empty()) return;
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < keep.size(); ++i) {
+      if (keep[i] != 0) values[kept++] = values[i];
+    }
+    values.resize(kept);
+  });
+}
+
 void round_exact_attributes(SampleBatch& batch) {
   for (std::size_t a = 0; a < batch.exact.size(); ++a) {
     std::transform(batch.exact[a].begin(), batch.exact[a].end(), batch.attributes[a].begin(),

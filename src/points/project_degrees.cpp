@@ -1,5 +1,5 @@
 // Longitude and latitude to metres in a plane.
-#include "points/filters.h"
+#include "points/formats.h"
 
 #include <fmt/format.h>
 
@@ -13,6 +13,7 @@
 
 #include "lamina/error.h"
 #include "lamina/points.h"
+#include "points/transverse_mercator.h"
 
 namespace lamina {
 namespace {
@@ -24,18 +25,11 @@ struct Ellipsoid {
   double inverse_flattening = 298.257223563;
 };
 
-/// Conformal, true to scale along its middle meridian: the series of Krueger (1912) in the third flattening, whose four
-/// terms are exact to less than a millimetre as far as kWidest.
+/// Conformal, true to scale along its middle meridian.
 class TransverseMercator {
  public:
-  TransverseMercator(const Ellipsoid& ellipsoid, double longitude, double latitude) : longitude_(longitude) {
-    const double f = ellipsoid.inverse_flattening > 0 ? 1 / ellipsoid.inverse_flattening : 0;
-    const double n = f / (2 - f);
-    const double n2 = n * n, n3 = n2 * n, n4 = n2 * n2;
-    eccentricity_ = std::sqrt(f * (2 - f));
-    scale_ = ellipsoid.half_axis / (1 + n) * (1 + n2 / 4 + n4 / 64);
-    series_ = {n / 2 - n2 * 2 / 3 + n3 * 5 / 16 + n4 * 41 / 180, n2 * 13 / 48 - n3 * 3 / 5 + n4 * 557 / 1440,
-               n3 * 61 / 240 - n4 * 103 / 140, n4 * 49561 / 161280};
+  TransverseMercator(const Ellipsoid& ellipsoid, double longitude, double latitude)
+      : longitude_(longitude), krueger_(ellipsoid.half_axis, ellipsoid.inverse_flattening) {
     double east = longitude, north = latitude;
     apply(east, north);
     north_ = north;
@@ -46,35 +40,24 @@ class TransverseMercator {
     const double latitude = y * kRadians;
     const double away = std::remainder(x - longitude_, 360.0) * kRadians;
     const double s = std::sin(latitude);
-    const double t = std::sinh(std::atanh(s) - eccentricity_ * std::atanh(eccentricity_ * s));
+    const double t = std::sinh(std::atanh(s) - krueger_.eccentricity * std::atanh(krueger_.eccentricity * s));
     const double xi = std::atan2(t, std::cos(away));
     const double eta = std::asinh(std::sin(away) / std::hypot(t, std::cos(away)));
     double east = eta, north = xi;
-    for (std::size_t j = 0; j < series_.size(); ++j) {
+    for (std::size_t j = 0; j < krueger_.to.size(); ++j) {
       const double turns = 2 * (static_cast<double>(j) + 1);
-      east += series_[j] * std::cos(turns * xi) * std::sinh(turns * eta);
-      north += series_[j] * std::sin(turns * xi) * std::cosh(turns * eta);
+      east += krueger_.to[j] * std::cos(turns * xi) * std::sinh(turns * eta);
+      north += krueger_.to[j] * std::sin(turns * xi) * std::cosh(turns * eta);
     }
-    x = scale_ * east;
-    y = scale_ * north - north_;
+    x = krueger_.radius * east;
+    y = krueger_.radius * north - north_;
   }
 
  private:
   double longitude_;
+  Krueger krueger_;
   double north_ = 0;  ///< of the origin
-  double eccentricity_ = 0, scale_ = 1;
-  std::array<double, 4> series_{};
 };
-
-/// What stands between `begin` and the bracket that closes it, both included; empty where there is none.
-std::string bracketed(const std::string& text, std::size_t begin) {
-  int depth = 0;
-  for (std::size_t at = begin; at < text.size(); ++at) {
-    if (text[at] == '[') ++depth;
-    if (text[at] == ']' && --depth == 0) return text.substr(begin, at + 1 - begin);
-  }
-  return {};
-}
 
 /// The ellipsoid that well-known text names, of either generation; else that of WGS 84.
 Ellipsoid ellipsoid_of(const std::string& crs) {

@@ -1,4 +1,4 @@
-#include "points/filters.h"
+#include "points/formats.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -171,23 +171,6 @@ class RowTest {
   std::optional<std::size_t> class_, return_, returns_;  ///< places among the hidden values
 };
 
-/// The rows of a batch that stay, in order.
-void keep_rows(const Mask& stays, SampleBatch& batch) {
-  const auto thin = [&](auto& values) {
-    if (values.empty()) return;
-    std::size_t n = 0;
-    for (std::size_t i = 0; i < stays.size(); ++i) {
-      if (stays[i] != 0) values[n++] = values[i];
-    }
-    values.resize(n);
-  };
-  thin(batch.nx), thin(batch.ny), thin(batch.nz);
-  thin(batch.radius), thin(batch.quality);
-  for (auto& values : batch.attributes) thin(values);
-  for (auto& values : batch.exact) thin(values);
-  thin(batch.x), thin(batch.y), thin(batch.z);
-}
-
 /// Moves `count` rows from the first-th on to `to`, whose other rows go; all before them go from `from`, too.
 void cut_rows(std::size_t first, std::size_t count, SampleBatch& from, SampleBatch& to) {
   for_columns(from, to, [&](auto& values, auto& out) {
@@ -277,7 +260,7 @@ class SelectedPoints final : public PointSource {
 
   void read_kept(std::uint64_t first, std::size_t count, SampleBatch& out) const {
     source_->read(first, count, out);
-    keep_rows(test_.judge({first, out.size()}, out), out);
+    keep_rows(out, test_.judge({first, out.size()}, out));
   }
 
   /// What was read of the source and is not yet wanted waits.

@@ -17,7 +17,7 @@
 #include "lamina/frame.h"
 #include "lamina/points.h"
 #include "lamina/run.h"
-#include "store/input_survey.h"
+#include "store/ingest.h"
 
 namespace lamina::ranks {
 

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "base/output_file.h"
-#include "chunks/cuts.h"
+#include "chunks/part_file.h"
 #include "lamina/error.h"
 #include "lamina/ranks.h"
 #include "ranks/together.h"

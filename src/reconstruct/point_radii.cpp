@@ -11,11 +11,10 @@
 
 #include "base/descriptor.h"
 #include "base/run.h"
-#include "edit/record_sorter.h"
+#include "edit/rows.h"
 #include "lamina/error.h"
 #include "reconstruct/plan.h"
 #include "store/ingest.h"
-#include "store/input_survey.h"
 
 namespace lamina {
 namespace {

@@ -15,10 +15,10 @@
 #include "lamina/attributes.h"
 #include "lamina/error.h"
 #include "lamina/normals.h"
-#include "points/filters.h"
+#include "points/formats.h"
 #include "reconstruct/job.h"
 #include "samples/cleaning.h"
-#include "store/input_survey.h"
+#include "store/ingest.h"
 
 namespace lamina {
 namespace {

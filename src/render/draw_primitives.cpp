@@ -11,7 +11,7 @@
 #include <optional>
 #include <vector>
 
-#include "meshes/triangle_geometry.h"
+#include "meshes/vec3.h"
 #include "render/canvas.h"
 
 namespace lamina::render_detail {

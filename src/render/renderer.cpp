@@ -8,7 +8,7 @@
 #include "lamina/error.h"
 #include "lamina/render.h"
 #include "measure/edge_table.h"
-#include "meshes/triangle_geometry.h"
+#include "meshes/vec3.h"
 #include "render/canvas.h"
 
 namespace lamina {

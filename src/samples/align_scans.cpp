@@ -9,7 +9,7 @@
 
 #include "lamina/error.h"
 #include "samples/scan_agreement.h"
-#include "store/input_survey.h"
+#include "store/ingest.h"
 
 namespace lamina {
 namespace {

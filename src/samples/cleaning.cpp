@@ -12,12 +12,11 @@
 #include "base/descriptor.h"
 #include "base/hashing.h"
 #include "base/run.h"
-#include "edit/batch_pipe.h"
+#include "edit/rows.h"
 #include "lamina/clean.h"
 #include "lamina/error.h"
 #include "samples/strays.h"
 #include "store/ingest.h"
-#include "store/input_survey.h"
 
 namespace lamina {
 namespace {

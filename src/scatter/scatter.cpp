@@ -14,7 +14,7 @@
 #include "base/run.h"
 #include "lamina/error.h"
 #include "measure/triangle_bvh.h"
-#include "meshes/triangle_geometry.h"
+#include "meshes/vec3.h"
 #include "scatter/point_rows.h"
 #include "scatter/shapes.h"
 

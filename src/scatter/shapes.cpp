@@ -18,7 +18,6 @@
 #include "lamina/error.h"
 #include "lamina/scatter.h"
 #include "measure/triangle_bvh.h"
-#include "meshes/triangle_geometry.h"
 #include "meshes/vec3.h"
 
 namespace lamina::scatter_detail {

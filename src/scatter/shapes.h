@@ -10,8 +10,8 @@
 
 #include "lamina/mesh.h"
 #include "lamina/scatter.h"
-#include "meshes/colours.h"
-#include "meshes/triangle_geometry.h"
+#include "meshes/formats.h"
+#include "meshes/vec3.h"
 
 namespace lamina::scatter_detail {
 

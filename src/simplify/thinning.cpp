@@ -20,7 +20,6 @@
 #include "lamina/error.h"
 #include "measure/edge_table.h"
 #include "meshes/mesh_blocks.h"
-#include "meshes/mesh_pieces.h"
 #include "meshes/vec3.h"
 #include "simplify/matching.h"
 

@@ -14,7 +14,6 @@
 #include <vector>
 
 #include "lamina/error.h"
-#include "store/input_survey.h"
 
 namespace lamina {
 namespace {

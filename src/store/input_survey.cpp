@@ -1,4 +1,4 @@
-#include "store/input_survey.h"
+#include "store/ingest.h"
 
 #include <fmt/format.h>
 #include <tbb/enumerable_thread_specific.h>

@@ -9,6 +9,8 @@
 #include <numbers>
 #include <string_view>
 
+#include "points/transverse_mercator.h"
+
 namespace lamina::tiles {
 namespace {
 
@@ -18,47 +20,21 @@ using meshes::operator*;
 
 constexpr double kRadian = std::numbers::pi / 180;
 
-/// What the series have in common.
-struct Krueger {
-  double eccentricity, radius;     ///< of the ellipsoid; of the sphere whose meridians are as long
-  std::array<double, 4> to, back;  ///< coefficients from the sphere to the plane and back
-
-  explicit Krueger(const MapPlane& plane) {
-    const double f = 1 / plane.inverse_flattening, n = f / (2 - f);
-    const double n2 = n * n, n3 = n2 * n, n4 = n2 * n2;
-    eccentricity = std::sqrt(f * (2 - f));
-    radius = plane.half_axis / (1 + n) * (1 + n2 / 4 + n4 / 64);
-    to = {n / 2 - n2 * 2 / 3 + n3 * 5 / 16 + n4 * 41 / 180, n2 * 13 / 48 - n3 * 3 / 5 + n4 * 557 / 1440,
-          n3 * 61 / 240 - n4 * 103 / 140, n4 * 49561 / 161280};
-    back = {n / 2 - n2 * 2 / 3 + n3 * 37 / 96 - n4 / 360, n2 / 48 + n3 / 15 - n4 * 437 / 1440,
-            n3 * 17 / 480 - n4 * 37 / 840, n4 * 4397 / 161280};
-  }
-
-  /// Along the middle meridian from the equator, in radii.
-  [[nodiscard]] double meridian(double latitude) const {
-    const double s = std::sin(latitude * kRadian);
-    const double xi = std::atan(std::sinh(std::atanh(s) - eccentricity * std::atanh(eccentricity * s)));
-    double sum = xi;
-    for (std::size_t j = 0; j < to.size(); ++j) sum += to[j] * std::sin(2 * (static_cast<double>(j) + 1) * xi);
-    return sum;
-  }
-};
+/// Along the middle meridian from the equator, in radii.
+double meridian(const Krueger& series, double latitude) {
+  const double s = std::sin(latitude * kRadian);
+  const double xi = std::atan(std::sinh(std::atanh(s) - series.eccentricity * std::atanh(series.eccentricity * s)));
+  double sum = xi;
+  for (std::size_t j = 0; j < series.to.size(); ++j)
+    sum += series.to[j] * std::sin(2 * (static_cast<double>(j) + 1) * xi);
+  return sum;
+}
 
 std::string lower_case(std::string_view text) {
   std::string out(text);
   std::transform(out.begin(), out.end(), out.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
   return out;
-}
-
-/// From `begin` to the bracket that closes what opens there.
-std::string_view bracketed_text(std::string_view text, std::size_t begin) {
-  int depth = 0;
-  for (std::size_t at = begin; at < text.size(); ++at) {
-    if (text[at] == '[') ++depth;
-    if (text[at] == ']' && --depth == 0) return text.substr(begin, at + 1 - begin);
-  }
-  return {};
 }
 
 /// The number behind the name in quotes that begins at `begin`: NAME",number.
@@ -166,15 +142,15 @@ std::optional<MapPlane> map_plane(const std::string& crs) {
   const std::string text = lower_case(crs);
   if (text.starts_with(kEpsg)) return plane_of_number(std::string_view(text).substr(kEpsg.size()));
   for (const char* word : {"projcs[", "projcrs[", "projectedcrs["}) {
-    if (const std::size_t at = text.find(word); at != std::string::npos) return plane_of_text(bracketed_text(text, at));
+    if (const std::size_t at = text.find(word); at != std::string::npos) return plane_of_text(bracketed(text, at));
   }
   return std::nullopt;
 }
 
 std::array<double, 2> to_degrees(const MapPlane& plane, double x, double y) {
-  const Krueger series(plane);
+  const Krueger series(plane.half_axis, plane.inverse_flattening);
   const double length = series.radius * plane.scale;
-  const double xi = (y * plane.unit - plane.north) / length + series.meridian(plane.latitude);
+  const double xi = (y * plane.unit - plane.north) / length + meridian(series, plane.latitude);
   const double eta = (x * plane.unit - plane.east) / length;
   double up = xi, right = eta;
   for (std::size_t j = 0; j < series.back.size(); ++j) {

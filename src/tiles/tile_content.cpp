@@ -19,7 +19,7 @@
 #include "base/number.h"
 #include "lamina/attributes.h"
 #include "lamina/error.h"
-#include "meshes/colours.h"
+#include "meshes/formats.h"
 #include "meshes/glb.h"
 
 namespace lamina::tiles {

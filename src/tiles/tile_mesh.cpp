@@ -10,7 +10,6 @@
 #include "lamina/error.h"
 #include "measure/edge_table.h"
 #include "meshes/mesh_blocks.h"
-#include "meshes/mesh_pieces.h"
 #include "simplify/stars.h"
 
 namespace lamina::tiles {

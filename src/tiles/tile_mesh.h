@@ -12,7 +12,7 @@
 #include "lamina/mesh.h"
 #include "lamina/run.h"
 #include "meshes/formats.h"
-#include "meshes/mesh_pieces.h"
+#include "meshes/mesh_blocks.h"
 #include "meshes/vec3.h"
 #include "simplify/matching.h"
 #include "tiles/tile_octree.h"

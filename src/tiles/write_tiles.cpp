@@ -254,19 +254,6 @@ class TileBuilder {
   std::atomic<bool> failed_ = false;
 };
 
-/// Normals of vertices by the areas of the triangles around them.
-void add_vertex_normals(TriangleMesh& mesh) {
-  using namespace meshes;
-  std::vector<Vec3> sums(mesh.positions.size(), Vec3{});
-  for (const auto& t : mesh.triangles) {
-    const Vec3 &a = mesh.positions[t[0]], &b = mesh.positions[t[1]], &c = mesh.positions[t[2]];
-    const Vec3 n = cross(b - a, c - a);
-    for (const std::uint32_t v : t) sums[v] = sums[v] + n;
-  }
-  mesh.normals.clear();
-  for (const Vec3& sum : sums) mesh.normals.push_back(to_float(unit(sum)));
-}
-
 std::string temporary_folder_of(const TileSettings& settings, const RunContext& run) {
   if (!run.tmp_dir.empty()) return run.tmp_dir;
   const auto parent = std::filesystem::path(settings.folder).lexically_normal().parent_path();
@@ -315,7 +302,7 @@ TileStats write_tiles(const TriangleMesh& mesh, const TileSettings& settings, co
       return;
     }
     TriangleMesh with_normals = mesh;
-    tiles::add_vertex_normals(with_normals);
+    with_normals.normals = meshes::vertex_normals(mesh);
     meshes::HeldMesh blocks(with_normals);
     stats = tiles::write_blocks_as_tiles(blocks, settings, run);
   });

@@ -1,4 +1,4 @@
-#include "vdb/packed_leaf.h"
+#include "vdb/streamed_vdb.h"
 
 #include <blosc.h>
 #include <openvdb/io/Compression.h>

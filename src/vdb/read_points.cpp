@@ -1,4 +1,4 @@
-#include "vdb/vdb_check.h"
+#include "vdb/vdb_file.h"
 
 #include <fmt/format.h>
 #include <openvdb/points/AttributeArray.h>
@@ -15,7 +15,6 @@
 #include "base/number.h"
 #include "lamina/error.h"
 #include "vdb/points_grid.h"
-#include "vdb/vdb_file.h"
 
 // Compressed pieces are unpacked here already: OpenVDB loses memory when it finds out in the middle of a grid.
 

@@ -1,4 +1,4 @@
-#include "vdb/vdb_check.h"
+#include "vdb/vdb_file.h"
 
 #include <blosc.h>
 #include <fmt/format.h>

@@ -17,7 +17,6 @@
 #include "lamina/error.h"
 #include "lamina/run.h"
 #include "vdb/points_grid.h"
-#include "vdb/vdb_check.h"
 
 namespace lamina::volume {
 

@@ -16,8 +16,8 @@
 #include "lamina/error.h"
 #include "lamina/volume_points.h"
 #include "lamina/volume_tools.h"
-#include "vdb/packed_leaf.h"
 #include "vdb/points_grid.h"
+#include "vdb/streamed_vdb.h"
 #include "vdb/vdb_file.h"
 
 namespace lamina {

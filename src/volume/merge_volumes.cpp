@@ -10,8 +10,8 @@
 #include "base/run.h"
 #include "lamina/error.h"
 #include "lamina/volume_points.h"
-#include "vdb/packed_leaf.h"
 #include "vdb/points_grid.h"
+#include "vdb/streamed_vdb.h"
 #include "vdb/vdb_file.h"
 
 namespace lamina {

@@ -9,7 +9,7 @@
 #include "base/run.h"
 #include "lamina/error.h"
 #include "measure/edge_table.h"
-#include "meshes/triangle_geometry.h"
+#include "meshes/vec3.h"
 #include "vdb/vdb_file.h"
 #include "volume/volume_data.h"
 

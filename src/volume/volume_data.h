@@ -31,7 +31,7 @@ namespace lamina::volume {
 
 /// Gives the voxels and tiles beyond the band that count as inside, and are connected there with the outside, the
 /// outside's value. Leaves of the band bring their sign to all of their voxels, and to a tile or two behind them
-/// (packed_leaf.h); where the surface is open that is an inside of eight voxels' steps. What the band encloses stays.
+/// (TileSigns); where the surface is open that is an inside of eight voxels' steps. What the band encloses stays.
 void empty_open_inside(openvdb::FloatGrid& grid);
 
 // The band of distances around a mesh, and the colours in it.

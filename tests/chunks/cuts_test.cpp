@@ -1,4 +1,4 @@
-#include "chunks/cuts.h"
+#include "chunks/part_file.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck.h>

@@ -1,4 +1,4 @@
-#include "edit/record_sorter.h"
+#include "edit/rows.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

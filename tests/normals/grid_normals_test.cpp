@@ -1,5 +1,5 @@
 // Normals by the faces of an organised scan's grid, against what was scanned.
-#include "normals/grid_normals.h"
+#include "normals/row_normals.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>

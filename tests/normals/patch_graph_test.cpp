@@ -2,7 +2,7 @@
 #include <rapidcheck/gtest.h>
 
 #include "base/union_find.h"
-#include "normals/patch_graph.h"
+#include "normals/sides.h"
 
 namespace lamina::normals {
 namespace {

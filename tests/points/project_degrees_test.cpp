@@ -1,5 +1,5 @@
 // Longitude and latitude to metres: published values, arcs integrated by brute force, and what is no degrees.
-#include "points/filters.h"
+#include "points/formats.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

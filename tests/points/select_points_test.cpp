@@ -1,5 +1,5 @@
 // Points by class, return and value, against all rows of the same file and the condition asked one by one.
-#include "points/filters.h"
+#include "points/formats.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>

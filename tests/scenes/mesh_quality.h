@@ -15,7 +15,6 @@
 #include "base/hashing.h"
 #include "lamina/mesh.h"
 #include "measure/triangle_bvh.h"
-#include "meshes/triangle_geometry.h"
 #include "meshes/vec3.h"
 #include "scenes/scanner.h"
 #include "support/mesh_check.h"

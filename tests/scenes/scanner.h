@@ -11,7 +11,6 @@
 
 #include "lamina/mesh.h"
 #include "measure/triangle_bvh.h"
-#include "meshes/triangle_geometry.h"
 #include "meshes/vec3.h"
 #include "reconstruct/clouds.h"
 

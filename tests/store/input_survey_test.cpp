@@ -1,4 +1,4 @@
-#include "store/input_survey.h"
+#include "store/ingest.h"
 
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>

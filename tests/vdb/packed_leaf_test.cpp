@@ -1,5 +1,5 @@
 // Leaves packed from masks, against OpenVDB's own reader and its leaves.
-#include "vdb/packed_leaf.h"
+#include "vdb/streamed_vdb.h"
 
 #include <gtest/gtest.h>
 #include <openvdb/io/Compression.h>

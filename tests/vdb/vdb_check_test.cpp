@@ -1,4 +1,4 @@
-#include "vdb/vdb_check.h"
+#include "vdb/vdb_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -14,7 +14,6 @@
 #include "lamina/error.h"
 #include "lamina/volume_points.h"
 #include "support/program.h"
-#include "vdb/vdb_file.h"
 
 namespace lamina::volume {
 namespace {

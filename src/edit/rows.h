@@ -1,4 +1,5 @@
-// Sorting more records than fit into memory: sorted runs in an unnamed file, merged when they are read.
+// Rows of more than fits into memory: through several threads and back in order; records sorted by way of the disk, in
+// runs that are merged when they are read.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -6,11 +7,19 @@
 #include <memory>
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "base/spill_file.h"
+#include "lamina/points.h"
+#include "lamina/run.h"
 
 namespace lamina::edit {
+
+/// Calls work(batch) for every batch, several at once, then take(batch) in the order of the rows, one at a time.
+/// Throws Error(internal, "cancelled") when the run is.
+void for_each_batch(PointSource& source, std::string_view stage, const RunContext& run,
+                    const std::function<void(SampleBatch&)>& work, const std::function<void(SampleBatch&)>& take);
 
 /// Records of fixed size with a key each. Equal keys keep the order in which they came. Memory is bounded by
 /// `memory_bytes`, whatever the number of records and however their keys are spread; the file takes 8 bytes and the

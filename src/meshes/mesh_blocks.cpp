@@ -1,4 +1,4 @@
-#include "meshes/mesh_pieces.h"
+#include "meshes/mesh_blocks.h"
 
 #include <algorithm>
 #include <span>
