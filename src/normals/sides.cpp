@@ -298,12 +298,12 @@ void read_forest(SignedUnionFind& forest, std::vector<std::uint32_t>& root, Patc
 }  // namespace
 
 PatchSigns find_signs(const PatchGraph& graph, const InputAxes& axes) {
-  constexpr float kClear = 0.2F;  // share of evidence between clusters that do not contradict each other
+  constexpr float kAgreed = 0.2F;  // share of evidence between clusters that do not contradict each other
   const std::size_t n = graph.nodes.size();
   PatchSigns signs{std::vector<std::int8_t>(n, 1), std::vector<SignSource>(n, SignSource::fixed), 0};
   SignedUnionFind forest(n);
   std::vector<Evidence> evidence = evidence_of(graph);
-  grow_forest(evidence, kClear, forest, n);
+  grow_forest(evidence, kAgreed, forest, n);
   std::vector<std::uint32_t> root(n);
   read_forest(forest, root, signs);
   std::vector<std::uint8_t> open(n, 0);
