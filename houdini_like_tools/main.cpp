@@ -24,9 +24,9 @@ void return_large_arrays() {
 /// taking them again, would be a tenth of a run's processor time. Comes before return_large_arrays().
 void keep_small_arrays() {
 #ifdef __GLIBC__
-  constexpr int kHeap = 192 << 20;  // most runs' need
-  constexpr int kStep = 16 << 20;   // beyond it
-  mallopt(M_TRIM_THRESHOLD, kHeap + kStep);
+  constexpr int kHeap = 192 << 20;               // most runs' need
+  constexpr int kStep = 16 << 20;                // beyond it
+  mallopt(M_TRIM_THRESHOLD, kHeap + 2 * kStep);  // freed below, it must not go back with its padding
   mallopt(M_TOP_PAD, kStep);
   mallopt(M_MMAP_THRESHOLD, 2 * kHeap);
   void* const heap = std::malloc(kHeap);
