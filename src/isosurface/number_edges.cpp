@@ -15,13 +15,17 @@
 namespace lamina {
 namespace {
 
-/// Runs body(tile, cache) over all tiles, several threads at once; every tile writes its own places.
-template <typename Body>
+/// Runs body(tile, cache) over all tiles, several threads at once; every tile writes its own places. `Parts`: what the
+/// body looks at of each tile's block.
+template <typename Parts, typename Body>
 void for_views(const Window& window, const std::vector<TileView>& views, const Body& body) {
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, views.size(), 16),
                     [&](const tbb::blocked_range<std::size_t>& range) {
                       BlockCache cache(window);
-                      for (std::size_t i = range.begin(); i < range.end(); ++i) body(views[i], cache);
+                      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+                        ask_ahead<Parts>(views, i);
+                        body(views[i], cache);
+                      }
                     });
 }
 
@@ -40,7 +44,9 @@ void for_levels(const std::vector<TileView>& views, const Body& body) {
 /// The tiles in which accepted edges begin or end.
 std::vector<TileView> at_surface(const std::vector<TileView>& views) {
   std::vector<TileView> out;
-  for (const TileView& tile : views) {
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    ask_ahead<BlockParts<&CornerBlock::surface_layers>>(views, i);
+    const TileView& tile = views[i];
     const unsigned layers = (1U << tile.end) - (1U << tile.begin);
     if ((tile.leaf().surface_layers & layers) != 0) out.push_back(tile);
   }
@@ -243,7 +249,8 @@ void number_edges(Window& window, std::int32_t slab, const CornerRule& rule, Iso
   out.slab = slab;
   out.triangles.clear();
   const std::vector<TileView> views = slab_tiles(window, slab);
-  for_views(window, views, [](const TileView& tile, BlockCache&) { find_crossing(tile); });
+  for_views<BlockParts<&CornerBlock::around, &CornerBlock::corners, &CornerBlock::outside, &CornerBlock::busy_layers>>(
+      window, views, [](const TileView& tile, BlockCache&) { find_crossing(tile); });
   for_levels(views, [&](const TileView& tile) {
     if (tile.level > 0) add_finer_busy(tile, window);
   });
@@ -251,8 +258,12 @@ void number_edges(Window& window, std::int32_t slab, const CornerRule& rule, Iso
   // Again: a corner that a finer level holds may have been marked in a tile without edges.
   const std::vector<TileView> surface = at_surface(views);
   assign_numbers(window, surface, out);
-  for_views(window, surface, [&](const TileView& tile, BlockCache&) { fill_corners(window, tile, rule, out); });
-  for_views(window, surface, [&](const TileView& tile, BlockCache& cache) {
+  for_views<BlockParts<&CornerBlock::around, &CornerBlock::values, &CornerBlock::active, &CornerBlock::trusted,
+                       &CornerBlock::seen, &CornerBlock::surface, &CornerBlock::numbers, &CornerBlock::creased,
+                       &CornerBlock::shared>>(
+      window, surface, [&](const TileView& tile, BlockCache&) { fill_corners(window, tile, rule, out); });
+  for_views<BlockParts<&CornerBlock::around, &CornerBlock::accepted, &CornerBlock::numbers, &CornerBlock::cells,
+                       &CornerBlock::surface>>(window, surface, [&](const TileView& tile, BlockCache& cache) {
     Numbering numbering(out, cache);
     const std::int32_t first = window.lattice().first_layer(tile.level, slab);
     numbering.fill_vertices(tile, first + window.lattice().layers(tile.level) - 1);

@@ -4,6 +4,7 @@
 #include <array>
 #include <bit>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "lattice/block_mask.h"
@@ -38,6 +39,12 @@ inline std::vector<TileView> slab_tiles(const Window& window, std::int32_t slab)
     }
   }
   return views;
+}
+
+/// At the i-th tile, for a later one; `Parts`: those of its block that the pass looks at.
+template <typename Parts>
+[[gnu::always_inline]] inline void ask_ahead(std::span<const TileView> views, std::size_t i) {
+  if (i + kAskedAhead < views.size()) Parts::ask_for(views[i + kAskedAhead].leaf());
 }
 
 /// Layer z in [-1, 8] of a mask over the tile and its eight neighbours across the sweep axis.

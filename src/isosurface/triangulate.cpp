@@ -291,13 +291,18 @@ void join(const std::vector<TriangleRun>& runs, IsoSlab& out, ExtractCounts& cou
 
 void triangulate(const Window& window, std::int32_t slab, IsoSlab& out, IsoSlab& next, ExtractCounts& counts) {
   const std::vector<TileView> views = slab_tiles(window, slab);
+  using Parts = BlockParts<&CornerBlock::around, &CornerBlock::busy_layers, &CornerBlock::cells, &CornerBlock::outside,
+                           &CornerBlock::accepted, &CornerBlock::numbers>;
   const std::array<PlainCase, 256> cases = plain_cases();
   std::vector<TriangleRun> runs((views.size() + kRunTiles - 1) / kRunTiles);
   tbb::parallel_for(std::size_t{0}, runs.size(), [&](std::size_t r) {
     BlockCache cache(window);
     TilePass pass(cache, slab, out, next, cases);
     const std::size_t end = std::min(views.size(), (r + 1) * kRunTiles);
-    for (std::size_t i = r * kRunTiles; i < end; ++i) pass.run(views[i], runs[r]);
+    for (std::size_t i = r * kRunTiles; i < end; ++i) {
+      ask_ahead<Parts>(views, i);
+      pass.run(views[i], runs[r]);
+    }
   });
   join(runs, out, counts);
 }

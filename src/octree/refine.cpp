@@ -29,10 +29,13 @@ bits::Neighbourhood gather(const CornerBlock& leaf, BlockMask CornerBlock::*mask
   return n;
 }
 
-template <typename Body>
+/// Calls body(tile, begin, end) for the slab's layers [begin, end) of all tiles, which looks at `Parts` of their
+/// blocks.
+template <typename Parts, typename Body>
 void for_tiles(Window& window, int level, std::int32_t slab, const Body& body) {
   const Tiles tiles = window.tiles(level, slab);
   tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
+    ask_ahead<Parts>(tiles, i);
     const LeafLayers layers = leaf_layers(window, level, slab, tiles[i].block);
     body(tiles[i], layers.begin, layers.end);
   });
@@ -68,7 +71,8 @@ void list_missing(const Tile& t, const BlockMask& m, std::pair<std::int32_t, std
 }
 
 /// Makes the blocks that the slab's part of the marked cells, moved by up to [lo, hi]^3, can fall into.
-void touch_around(Window& window, int level, std::int32_t slab, BlockMask CornerBlock::*mask, int lo, int hi) {
+template <auto kMask>
+void touch_around(Window& window, int level, std::int32_t slab, int lo, int hi) {
   const Lattice& lattice = window.lattice();
   const std::int32_t first = lattice.first_layer(level, slab);
   const std::int32_t end = first + lattice.layers(level);
@@ -79,9 +83,10 @@ void touch_around(Window& window, int level, std::int32_t slab, BlockMask Corner
   for (std::int32_t s = slab_lo; s <= slab_hi; ++s) {
     const Tiles tiles = window.tiles(level, s);
     tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
+      ask_ahead<BlockParts<&CornerBlock::around, kMask>>(tiles, i);
       const Tile& t = tiles[i];
       // Slabs share leaves at coarse levels.
-      if (t.block.z > done) list_missing(t, t.leaf->*mask, {first, end}, lo, hi, missing.local());
+      if (t.block.z > done) list_missing(t, t.leaf->*kMask, {first, end}, lo, hi, missing.local());
     });
     done = (lattice.first_layer(level, s) + lattice.layers(level) - 1) >> 3;
   }
@@ -103,7 +108,10 @@ std::uint64_t from_parent(const BlockMask& parent, const Block& child, int z) {
 void split_parents(Window& window, int level, std::int32_t slab) {
   Block last{};
   bool known = false;  // that `last` is there: neighbours mostly have the same parent
-  for (const Tile& t : window.tiles(level, slab)) {
+  const Tiles tiles = window.tiles(level, slab);
+  for (std::size_t i = 0; i < tiles.size(); ++i) {
+    ask_ahead<BlockParts<&CornerBlock::touched, &CornerBlock::split>>(tiles, i);
+    const Tile& t = tiles[i];
     const LeafLayers layers = leaf_layers(window, level, slab, t.block);
     const Block parent = parent_block(t.block);
     if (known && parent == last) continue;
@@ -114,7 +122,7 @@ void split_parents(Window& window, int level, std::int32_t slab) {
     last = parent;
     known = true;
   }
-  for_tiles(window, level + 1, slab, [&](const Tile& t, int begin, int end) {
+  for_tiles<BlockParts<&CornerBlock::split>>(window, level + 1, slab, [&](const Tile& t, int begin, int end) {
     for (int octant = 0; octant < 8; ++octant) {
       const int ox = octant & 1;
       const int oy = (octant >> 1) & 1;
@@ -149,12 +157,14 @@ void inherit(Window& window, int level, std::int32_t slab) {
                    {t.block.x * 2 + (octant & 1), t.block.y * 2 + ((octant >> 1) & 1), t.block.z * 2 + (octant >> 2)});
     }
   }
-  for_tiles(window, parent_level, slab, [&](const Tile& t, int begin, int end) {
-    std::uint64_t split = 0;
-    for (int z = begin; z < end; ++z) split |= t.leaf->split.words[z];
-    if (split != 0) close_cells(*t.leaf, begin, end, &t.leaf->close.words[begin]);
-  });
-  for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
+  for_tiles<BlockParts<&CornerBlock::split, &CornerBlock::home, &CornerBlock::around, &CornerBlock::close>>(
+      window, parent_level, slab, [&](const Tile& t, int begin, int end) {
+        std::uint64_t split = 0;
+        for (int z = begin; z < end; ++z) split |= t.leaf->split.words[z];
+        if (split != 0) close_cells(*t.leaf, begin, end, &t.leaf->close.words[begin]);
+      });
+  for_tiles<BlockParts<&CornerBlock::touched, &CornerBlock::reached, &CornerBlock::split, &CornerBlock::cells,
+                       &CornerBlock::above>>(window, level, slab, [&](const Tile& t, int begin, int end) {
     const CornerBlock* parent = std::as_const(window).probe(parent_level, parent_block(t.block));
     std::uint64_t any_above = 0;
     for (int z = begin; z < end; ++z) {
@@ -209,26 +219,29 @@ void close_cells(const CornerBlock& leaf, int begin, int end, std::uint64_t* out
 void refine_slab(Window& window, std::int32_t slab) {
   const int levels = window.levels();
   for (int level = 0; level < levels; ++level) {
-    touch_around(window, level, slab, &CornerBlock::home, -kRefinedCells, kRefinedCells);
-    for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
-      const bits::Neighbourhood home = gather(*t.leaf, &CornerBlock::home, 1);
-      bits::dilate_layers<-kRefinedCells, kRefinedCells>(home, begin, end, &t.leaf->touched.words[begin]);
-    });
+    touch_around<&CornerBlock::home>(window, level, slab, -kRefinedCells, kRefinedCells);
+    for_tiles<BlockParts<&CornerBlock::around, &CornerBlock::home, &CornerBlock::touched>>(
+        window, level, slab, [&](const Tile& t, int begin, int end) {
+          const bits::Neighbourhood home = gather(*t.leaf, &CornerBlock::home, 1);
+          bits::dilate_layers<-kRefinedCells, kRefinedCells>(home, begin, end, &t.leaf->touched.words[begin]);
+        });
   }
   for (int level = 0; level + 1 < levels; ++level) split_parents(window, level, slab);
-  for_tiles(window, levels - 1, slab, [&](const Tile& t, int begin, int end) {
-    for (int z = begin; z < end; ++z) {
-      t.leaf->reached.words[z] = t.leaf->touched.words[z];
-      t.leaf->cells.words[z] = t.leaf->touched.words[z] & ~t.leaf->split.words[z];
-    }
-  });
+  for_tiles<BlockParts<&CornerBlock::touched, &CornerBlock::reached, &CornerBlock::split, &CornerBlock::cells>>(
+      window, levels - 1, slab, [&](const Tile& t, int begin, int end) {
+        for (int z = begin; z < end; ++z) {
+          t.leaf->reached.words[z] = t.leaf->touched.words[z];
+          t.leaf->cells.words[z] = t.leaf->touched.words[z] & ~t.leaf->split.words[z];
+        }
+      });
   for (int level = levels - 2; level >= 0; --level) inherit(window, level, slab);
 }
 
 void place_corners(Window& window, std::int32_t slab) {
   for (int level = 0; level < window.levels(); ++level) {
-    touch_around(window, level, slab, &CornerBlock::cells, 0, 1);
-    for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
+    touch_around<&CornerBlock::cells>(window, level, slab, 0, 1);
+    for_tiles<BlockParts<&CornerBlock::around, &CornerBlock::cells, &CornerBlock::corners, &CornerBlock::acted_on,
+                         &CornerBlock::active>>(window, level, slab, [&](const Tile& t, int begin, int end) {
       const bits::Neighbourhood cells = gather(*t.leaf, &CornerBlock::cells, 0);
       bits::dilate_layers<0, 1>(cells, begin, end, &t.leaf->corners.words[begin]);
       std::copy_n(&t.leaf->acted_on.words[begin], end - begin, &t.leaf->active.words[begin]);
@@ -241,25 +254,26 @@ void place_corners(Window& window, std::int32_t slab) {
     });
     if (level == 0) continue;
     // A corner that a finer level holds too is projected there; what it is there it is here.
-    for_tiles(window, level, slab, [&](const Tile& t, int begin, int end) {
-      for (int octant = 0; octant < 8; ++octant) {
-        const int oz = (octant >> 2) * 4;
-        if (oz >= end || oz + 4 <= begin) continue;
-        const CornerBlock* child = std::as_const(window).probe(
-            level - 1,
-            {t.block.x * 2 + (octant & 1), t.block.y * 2 + ((octant >> 1) & 1), t.block.z * 2 + (octant >> 2)});
-        if (child == nullptr) continue;
-        for (int z = std::max(begin, oz); z < std::min(end, oz + 4); ++z) {
-          const int cz = (z - oz) * 2;
-          const std::uint64_t shared =
-              bits::even_quarter(child->corners.words[cz], octant & 1, (octant >> 1) & 1) & t.leaf->corners.words[z];
-          const std::uint64_t active = bits::even_quarter(child->active.words[cz], octant & 1, (octant >> 1) & 1);
-          t.leaf->shared.words[z] |= shared;
-          t.leaf->active.words[z] = (t.leaf->active.words[z] & ~shared) | (active & shared);
-        }
-      }
-      if (level > 1) share_across_levels(window, level, t, begin, end);
-    });
+    for_tiles<BlockParts<&CornerBlock::corners, &CornerBlock::shared, &CornerBlock::active>>(
+        window, level, slab, [&](const Tile& t, int begin, int end) {
+          for (int octant = 0; octant < 8; ++octant) {
+            const int oz = (octant >> 2) * 4;
+            if (oz >= end || oz + 4 <= begin) continue;
+            const CornerBlock* child = std::as_const(window).probe(
+                level - 1,
+                {t.block.x * 2 + (octant & 1), t.block.y * 2 + ((octant >> 1) & 1), t.block.z * 2 + (octant >> 2)});
+            if (child == nullptr) continue;
+            for (int z = std::max(begin, oz); z < std::min(end, oz + 4); ++z) {
+              const int cz = (z - oz) * 2;
+              const std::uint64_t shared = bits::even_quarter(child->corners.words[cz], octant & 1, (octant >> 1) & 1) &
+                                           t.leaf->corners.words[z];
+              const std::uint64_t active = bits::even_quarter(child->active.words[cz], octant & 1, (octant >> 1) & 1);
+              t.leaf->shared.words[z] |= shared;
+              t.leaf->active.words[z] = (t.leaf->active.words[z] & ~shared) | (active & shared);
+            }
+          }
+          if (level > 1) share_across_levels(window, level, t, begin, end);
+        });
   }
 }
 

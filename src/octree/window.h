@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "lattice/lattice.h"
+#include "octree/ask_ahead.h"
 #include "octree/corner_block.h"
 
 namespace lamina {
@@ -46,6 +47,12 @@ class Tiles : public std::span<const Tile> {
  private:
   std::vector<Tile> joined_;
 };
+
+/// At the i-th tile, for a later one; `Parts`: those of its block that the stage looks at.
+template <typename Parts>
+[[gnu::always_inline]] inline void ask_ahead(std::span<const Tile> tiles, std::size_t i) {
+  if (i + kAskedAhead < tiles.size()) Parts::ask_for(*tiles[i + kAskedAhead].leaf);
+}
 
 class Window {
  public:
