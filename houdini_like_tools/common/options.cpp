@@ -218,7 +218,7 @@ void add_fit_options(CLI::App& tool, SurfaceSettings& s) {
   add_number_or_auto(
       tool, "--blend", "auto",
       "The influence radius R is H times a sample's radius r, H up to 64; noise wants 2 to 3. auto: H, and --cell and "
-      "--refit where these are not given, by the cloud's noise and the evenness of its sampling",
+      "--refit where these are not given, by the cloud's noise, from place to place, and the evenness of its sampling",
       [&s](const std::optional<double>& number) { s.blend = number; })
       ->option_text("H|auto [auto]")
       ->group(fit);

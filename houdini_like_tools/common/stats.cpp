@@ -109,6 +109,7 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
   j["scans"] = {{"count", s.plan.scans},       {"overlap", s.plan.overlap},    {"places", s.alignment.places},
                 {"apart", s.alignment.before}, {"aligned", s.alignment.after}, {"moved", s.alignment.farthest}};
   j["blend"] = s.plan.blend;
+  j["blend_range"] = {s.plan.least_blend, s.plan.most_blend};
   j["refit"] = s.plan.refit;
   j["cell"] = to_string(s.plan.cell);
   j["sheet_refinement"] = s.plan.refine_sheets;

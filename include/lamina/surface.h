@@ -60,8 +60,9 @@ struct SurfaceSettings {
   std::uint32_t density = 16;  ///< samples a counting cell must hold to give a radius (Cuccuru et al. 2009, 3.1), >= 2
   CleanSettings clean;         ///< what is left out before radii are estimated
   Length max_radius;           ///< samples with a larger radius are discarded as undersampled; 0: none
-  /// H > 0: the influence radius R = H r (section 3.2). Unset: chosen by the noise of the cloud and the evenness of its
-  /// sampling, together with `cell` and `refit` where these are unset (SurfacePlan holds the choice).
+  /// H > 0: the influence radius R = H r (section 3.2). Unset: chosen by the noise of the cloud, from place to place,
+  /// and the evenness of its sampling, together with `cell` and `refit` where these are unset (SurfacePlan holds the
+  /// choice).
   std::optional<double> blend = 1.2;
   /// 0..8, radii: before anything is projected each normal is replaced by that of the sphere fitted to the samples
   /// within this distance that face the same way; 0: normals stay. Unset: chosen where `blend` is, else 0.
@@ -139,7 +140,8 @@ struct SurfacePlan {
   std::array<double, 3> noisiest{};  ///< the middle of that stretch
   double normal_noise = 0;           ///< median angle of their normals to that surface's, degrees
   double blurred_normals = 0;        ///< share of normals that are interpolated over sharp edges
-  double blend = 0, refit = 0;       ///< as given or chosen
+  double blend = 0, refit = 0;       ///< as given or chosen, about that where they follow places
+  double least_blend = 0, most_blend = 0;  ///< of all places
   Length cell;
   bool refine_sheets = false;  ///< half of it where things are thin
   bool watertight = false;     ///< as given or chosen

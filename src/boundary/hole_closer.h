@@ -22,7 +22,7 @@ inline constexpr double kLeadsIn = 0.1;
 /// A gap is bridged where Closure::leads_in is at least this much, and so much more for each influence radius of its
 /// rim: at rims of 10 radii 70 degrees on the average, of 25 60, of 50 41. What a wide gap hides may look otherwise.
 inline constexpr double kBridgeLeadsIn = 0.25;
-inline constexpr double kBridgePerRadius = 0.01;
+inline constexpr double kBridgePerRadius = 0.012;
 /// Loops of more edges are not looked at, whatever their length, but where all are to be closed.
 inline constexpr std::uint64_t kMostEdges = 4096;
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <span>
 #include <tuple>
 
@@ -195,9 +196,7 @@ RefitNormals::RefitNormals(const RefitSettings& settings, const Lattice& lattice
 RefitNormals::~RefitNormals() = default;
 
 double RefitNormals::halo() const {
-  return std::ceil(static_cast<double>(static_cast<float>(settings_.support)) *
-                   static_cast<double>(settings_.max_radius)) +
-         1;
+  return std::ceil(static_cast<double>(settings_.widest()) * static_cast<double>(settings_.max_radius)) + 1;
 }
 
 void RefitNormals::add(std::size_t bucket, const LocalSamples& samples, const std::vector<float>& radii) {
@@ -214,9 +213,13 @@ void RefitNormals::add(std::size_t bucket, const LocalSamples& samples, const st
   added->bucket.weight.resize(n);
   added->bucket.level.assign(n, static_cast<std::uint8_t>(settings_.level));
   const auto unit = static_cast<float>(lattice_.cell);
+  std::optional<SupportField::Cursor> local;
+  if (settings_.by_place) local.emplace(*settings_.by_place);
   for (std::size_t i = 0; i < n; ++i) {
     const float q = radii[i] > 0 ? unit / radii[i] : 0.0F;
-    added->bucket.support[i] = static_cast<float>(settings_.support) * std::min(radii[i], settings_.max_radius);
+    const float support =
+        local ? settings_.per_blend * local->at(s.x[i], s.y[i], s.z[i]) : static_cast<float>(settings_.support);
+    added->bucket.support[i] = support * std::min(radii[i], settings_.max_radius);
     added->bucket.weight[i] = q * q * (samples.quality.empty() ? 1.0F : samples.quality[i]);
   }
   const auto [low, high] = std::minmax_element(s.z.begin(), s.z.end());

@@ -8,6 +8,7 @@
 #include "mls/kernel.h"
 #include "mls/tile_samples.h"
 #include "samples/sample_feed.h"
+#include "samples/support_field.h"
 
 namespace lamina {
 
@@ -25,13 +26,19 @@ inline constexpr float kNoiseVariance = 0.1F;
 inline constexpr float kShapeRatio = 3;
 
 struct RefitSettings {
-  double support = 0;    ///< radii within which a sample acts; 0: normals stay
+  double support = 0;    ///< radii within which a sample acts, about that where it follows places; 0: normals stay
   float max_radius = 0;  ///< a longer radius acts as this, steps, > 0: how far is known before streaming
   int level = 0;         ///< whose cells are about a radius long: only time depends on it
   float noise = 0;       ///< of the normals, median angle, radians
   /// Instead of all normals, noisy ones, only those are replaced that were interpolated over a sharp edge, by those of
   /// the planes that the samples' neighbours lie on (samples/consensus_plane.h).
   bool only_blurred = false;
+  /// Null: the same everywhere; else the radii are so many times H.
+  std::shared_ptr<const SupportField> by_place{};
+  float per_blend = 0;
+
+  /// The largest support of a sample, radii.
+  [[nodiscard]] float widest() const { return by_place ? per_blend * by_place->most() : static_cast<float>(support); }
 };
 
 /// The fit is the projection's (kernel.h) at the sample's own place, with the weights of projection, without the

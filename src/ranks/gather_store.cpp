@@ -120,9 +120,8 @@ class Outgoing {
 
 }  // namespace
 
-RadiusSurvey survey_together(Ranks& ranks, const SlabStore& store, std::uint64_t sample_limit,
-                             std::uint32_t min_samples) {
-  RadiusSurvey survey;
+CloudSurvey survey_together(Ranks& ranks, const SurfaceSettings& settings, const SlabStore& store) {
+  CloudSurvey survey;
   std::exception_ptr failure;
   if (!ranks.first()) {
     serve(ranks, store);
@@ -131,7 +130,7 @@ RadiusSurvey survey_together(Ranks& ranks, const SlabStore& store, std::uint64_t
       const ReadBucket read = [&](std::size_t bucket, LocalSamples& out) {
         read_everywhere(ranks, store, bucket, out);
       };
-      survey = survey_radii(store, read, sample_limit, min_samples);
+      survey = survey_cloud(settings, store, read);
     } catch (...) {
       failure = std::current_exception();
     }
@@ -144,10 +143,14 @@ RadiusSurvey survey_together(Ranks& ranks, const SlabStore& store, std::uint64_t
     if (failure) std::rethrow_exception(failure);
   });
   Packer found;
-  found.put(survey);
+  found.put(survey.radii);
+  found.put(survey.support);
   Bytes bytes = found.take();
   ranks.broadcast(bytes);
-  return Unpacker(bytes).get<RadiusSurvey>();
+  Unpacker in(bytes);
+  survey.radii = in.get<RadiusSurvey>();
+  survey.support = in.get_list<SupportPlace>();
+  return survey;
 }
 
 SlabStore gather_buckets(Ranks& ranks, const SlabStore& store, const std::vector<BucketSpan>& wanted,

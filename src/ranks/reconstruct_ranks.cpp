@@ -191,9 +191,8 @@ class RanksJob {
     }
     SharedInput shared = read_together(ranks_, settings_, directory_, job_);
     own_.rows_read = shared.rows;
-    job_.watch.time("plan", [&] {
-      shared.cloud.radii = survey_together(ranks_, shared.cloud.ingested.store, kSurveySamples, settings_.density);
-    });
+    job_.watch.time("plan",
+                    [&] { shared.cloud.survey = survey_together(ranks_, settings_, shared.cloud.ingested.store); });
     return std::move(shared.cloud);
   }
 

@@ -52,9 +52,8 @@ SharedInput read_together(Ranks& ranks, const SurfaceSettings& settings, const s
 
 // Samples go where they are worked on: each rank's store holds a part of every bucket, and then whole buckets.
 
-/// survey_radii() of all ranks' samples, on all ranks: rank 0 looks, the others send what it asks for.
-RadiusSurvey survey_together(Ranks& ranks, const SlabStore& store, std::uint64_t sample_limit,
-                             std::uint32_t min_samples);
+/// survey_cloud() of all ranks' samples, on all ranks: rank 0 looks, the others send what it asks for.
+CloudSurvey survey_together(Ranks& ranks, const SurfaceSettings& settings, const SlabStore& store);
 
 /// A store in `directory` with the buckets that wanted[rank()] names, out of all ranks' stores, compressed blocks as
 /// they are. Memory: some 16 MB, whatever the cloud.

@@ -13,16 +13,20 @@ namespace {
 /// Where corners themselves say how many projections they need.
 constexpr int kMostProjections = 16;
 
-/// What noise asks for: a wider support, the wider the more of it, on the same cells, and normals that agree.
-void choose_for_noise(const RadiusSurvey& survey, bool cell_given, ReconstructionPlan& plan) {
-  const bool rough = static_cast<double>(survey.normal_noise) * 180 / std::numbers::pi > kRoughNormals;
-  const double most = static_cast<double>((rough ? kVeryNoisyRough : kVeryNoisy) - kNoisy);
-  const double share = std::min(1.0, static_cast<double>(survey.noise - kNoisy) / most);
-  plan.feed.blend = kNoisyBlend + (kVeryNoisyBlend - kNoisyBlend) * share;
-  plan.feed.cell = {kChosenCell, Length::Unit::sample_radius};
-  plan.refit.support = rough ? kRoughRefit : kNoisyRefit;
+/// What noise asks for: supports as wide as it is at each place, and normals that agree.
+void choose_for_noise(const CloudSurvey& survey, const SurfaceSettings& s, double cell, ReconstructionPlan& plan) {
+  plan.feed.blend = kNoisyBlend;
+  if (!survey.support.empty()) {
+    plan.feed.support = std::make_shared<const SupportField>(survey.support);
+    plan.feed.blend = static_cast<double>(plan.feed.support->median());
+  }
+  const bool rough = static_cast<double>(survey.radii.normal_noise) * 180 / std::numbers::pi > kRoughNormals;
+  plan.refit.by_place = plan.feed.support;
+  plan.refit.per_blend = rough ? kRoughRefitPerBlend : kRefitPerBlend;
+  plan.refit.support = static_cast<double>(plan.refit.per_blend) * plan.feed.blend;
+  plan.feed.cell = {cell, Length::Unit::sample_radius};
   plan.trim = kRimOverhang;
-  if (!cell_given) plan.projection.band = kNoisyBand;
+  if (!s.cell) plan.projection.band = static_cast<float>(kNoisyReach / cell);
 }
 
 /// What an even, clean sampling allows: the narrowest support, and finer cells between sheets.
@@ -44,15 +48,16 @@ double choose_deviation(const RadiusSurvey& survey) {
   return kStep * std::round(std::min(wanted, kMostDeviation) / kStep);
 }
 
-void choose_support(const SurfaceSettings& s, const RadiusSurvey& survey, const PointSourceInfo& info,
+void choose_support(const SurfaceSettings& s, const CloudSurvey& cloud, const PointSourceInfo& info,
                     ReconstructionPlan& plan) {
+  const RadiusSurvey& survey = cloud.radii;
+  const bool thins = !s.simplify.wanted() && s.deviation.value_or(kCleanDeviation) > 0;
   plan.feed.blend = kDefaultBlend;
   if (s.blend) {
     plan.feed.blend = *s.blend;
   } else if (survey.noise > kNoisy) {
-    choose_for_noise(survey, s.cell.has_value(), plan);
+    choose_for_noise(cloud, s, thins ? kNoisyCell : kChosenCell, plan);
   } else if (survey.high < kEven * survey.low) {
-    const bool thins = !s.simplify.wanted() && s.deviation.value_or(kCleanDeviation) > 0;
     choose_for_even(s.cell.has_value(), thins && survey.noise <= kSharp ? kThinnedCell : kChosenCell, plan);
     // A closed mesh. Normals come with samples of a surface, which ends where they do; positions alone say nothing of
     // wide gaps among them.
@@ -63,7 +68,10 @@ void choose_support(const SurfaceSettings& s, const RadiusSurvey& survey, const 
   // Rims that are cut where the samples end may run on before.
   if (plan.trim > 0 && survey.noise > kNoisy) plan.doubtful = DoubtfulPoints::as_extended;
   if (s.cell) plan.feed.cell = *s.cell;
-  if (s.refit) plan.refit.support = *s.refit;
+  if (s.refit) {
+    plan.refit.support = *s.refit;
+    plan.refit.by_place = nullptr;
+  }
   plan.projection.creases = s.features.value_or(!s.blend && survey.noise <= kSharp) && !s.diffuse;
   if (plan.projection.creases && !s.refit && survey.noise <= kExact && survey.blurred > kBlurred) {
     plan.refit.support = double{kConsensusReach};

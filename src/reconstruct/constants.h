@@ -10,21 +10,16 @@ inline constexpr double kDefaultBlend = 1.2;
 /// Samples this far (radii) from the surface that their neighbours suggest are noisy. Detail that the sampling hardly
 /// resolves looks the same up to 0.05; noise of half a spacing either way has 0.12, of a spacing 0.3.
 inline constexpr float kNoisy = 0.05F;
-inline constexpr float kVeryNoisy = 0.25F;
 
-/// H for noisy and for very noisy samples; between them it grows with the noise.
+/// H of a noisy cloud in which no sample has enough neighbours to tell how wide supports should be.
 inline constexpr double kNoisyBlend = 1.75;
-inline constexpr double kVeryNoisyBlend = 2.5;
 
-/// Support (radii) within which noisy normals are fitted again.
-inline constexpr double kNoisyRefit = 3;
-
-/// Normals found over a handful of neighbours scatter by 13 degrees on noisy samples, those of scanners and of
-/// neighbourhoods that know the noise by two to eight. The former want the wide support with less noise, and more
-/// company.
+/// Support (H) within which noisy normals are fitted again. Normals found over a handful of neighbours scatter by 13
+/// degrees on noisy samples, those of scanners and of neighbourhoods that know the noise by two to eight; the former
+/// want more company.
+inline constexpr float kRefitPerBlend = 1.2F;
+inline constexpr float kRoughRefitPerBlend = 1.6F;
 inline constexpr double kRoughNormals = 10;
-inline constexpr float kVeryNoisyRough = 0.1F;
-inline constexpr double kRoughRefit = 4;
 
 /// Radii of an evenly sampled surface: the 99 % quantile is some 2.5 times the 1 % one (cells that the surface clips
 /// give long ones), six to eight where density varies 64 times. Where density varies, the support must bridge wider
@@ -38,9 +33,14 @@ inline constexpr double kChosenCell = 0.892;
 /// it is flat: it has no more of them then, and is nearer to the truth.
 inline constexpr double kThinnedCell = 0.84;
 
-/// How far (cells) from its nearest sample a corner keeps a value: less on noise, whose outermost samples would make
-/// sheets of their own; more where cells between two sheets are half as large, so that values reach as far as before.
-inline constexpr float kNoisyBand = 1.25F;
+/// The same of a noisy cloud whose mesh loses triangles where it is flat: edges and rims are cut more finely, and
+/// normals follow.
+inline constexpr double kNoisyCell = 0.7;
+
+/// How far from its nearest sample a corner keeps a value: less on noise (radii), whose outermost samples would make
+/// sheets of their own; more where cells between two sheets are half as large (cells), so that values reach as far as
+/// before.
+inline constexpr double kNoisyReach = 1.05;
 inline constexpr float kSheetBand = 4;
 
 /// How far (support radii) a corner's projection may lie from its samples' mean, and how many must act, to be trusted.
@@ -50,7 +50,7 @@ inline constexpr int kEvenTrustedSamples = 4;
 /// Overhang (support radii) along which rims are cut. The straight edge of evenly spread samples has 0.235; a wide
 /// support averages chance out, so noisy clouds can be cut a little inside of it, which takes most of the flakes of
 /// strays along.
-inline constexpr double kRimOverhang = 0.18;
+inline constexpr double kRimOverhang = 0.19;
 inline constexpr double kCleanRimOverhang = 0.35;
 
 /// Rims up to this long (R) are closed where nobody says otherwise and the surface around tells how: gaps some hundred
@@ -69,7 +69,7 @@ inline constexpr double kSpeckSamples = 0.2;
 /// How far the mesh may be off its planes where triangles go (SimplifySettings::deviation): of clean samples, what each
 /// radius of median residual adds, and the most.
 inline constexpr double kCleanDeviation = 0.01;
-inline constexpr double kNoiseDeviation = 0.1;
+inline constexpr double kNoiseDeviation = 0.15;
 inline constexpr double kMostDeviation = 0.05;
 
 /// The size of most cells in units of the largest the median radius allows: with 0.64 the radii of an evenly sampled

@@ -285,10 +285,13 @@ std::string chosen(const SurfaceSettings& s, const SurfacePlan& plan) {
   const auto add = [&](bool open, const std::string& option) {
     if (open) text += " " + option;
   };
-  add(!s.blend, fmt::format("--blend {:g}", plan.blend));
+  const bool by_place = plan.least_blend < plan.most_blend;
+  add(!s.blend, by_place ? fmt::format("--blend auto ({:.2g} to {:.2g}, by place)", plan.least_blend, plan.most_blend)
+                         : fmt::format("--blend {:g}", plan.blend));
   add(!s.blend && !s.cell, fmt::format("--cell {}{}", to_string(plan.cell),
                                        plan.refine_sheets ? " (half of it where things are thin)" : ""));
-  add(!s.refit && !s.blend, fmt::format("--refit {:g}", plan.refit));
+  add(!s.refit && !s.blend, by_place ? fmt::format("--refit auto ({:.2g} in the middle, by place)", plan.refit)
+                                     : fmt::format("--refit {:g}", plan.refit));
   add(!s.trim && !s.blend, fmt::format("--trim {:g}", plan.trim));
   add(!s.features && !s.blend, fmt::format("--features {}{}", plan.features ? "yes" : "no",
                                            plan.sharpen ? " (and normals found again at edges)" : ""));
@@ -305,8 +308,8 @@ std::string describe(const SurfacePlan& p) {
   const auto mb = [](std::uint64_t bytes) { return static_cast<double>(bytes) / 1e6; };
   std::string out;
   out += fmt::format("samples {}, extent {:.4g} x {:.4g} x {:.4g}\n", p.samples, p.extent[0], p.extent[1], p.extent[2]);
-  out += fmt::format("radius r {:.4g} (1 % {:.4g}, 99 % {:.4g}), influence R = {:g} r\n", p.radius_median, p.radius_low,
-                     p.radius_high, p.blend);
+  out += fmt::format("radius r {:.4g} (1 % {:.4g}, 99 % {:.4g}), influence R = {:.3g} r{}\n", p.radius_median,
+                     p.radius_low, p.radius_high, p.blend, p.least_blend < p.most_blend ? " in the middle" : "");
   out += fmt::format("levels {}, cells {:.4g} to {:.4g}, slabs {} of {:.4g}\n", p.levels, p.finest_cell,
                      std::ldexp(p.finest_cell, p.levels - 1), p.slabs, p.slab_height);
   out += fmt::format("expected memory {:.0f} MB, temporary disk {:.0f} MB", mb(p.memory_bytes), mb(p.disk_bytes));

@@ -94,7 +94,7 @@ std::vector<std::pair<std::string, SurfaceSettings>> smaller_runs(const SurfaceS
   return runs;
 }
 
-[[noreturn]] void refuse_memory(const SurfaceSettings& settings, const StoredCloud& cloud, const RadiusSurvey& survey,
+[[noreturn]] void refuse_memory(const SurfaceSettings& settings, const StoredCloud& cloud, const CloudSurvey& survey,
                                 const SurfacePlan& plan, std::uint64_t allowed) {
   const auto mb = [](std::uint64_t bytes) { return static_cast<double>(bytes) / 1e6; };
   std::string remedy;
@@ -173,10 +173,12 @@ void run_in_arena(const RunContext& run, const std::function<void()>& work) {
 }
 
 ReconstructionPlan plan_surface(const SurfaceSettings& settings, const StoredCloud& cloud, Job& job) {
-  RadiusSurvey survey;
+  CloudSurvey survey;
   std::optional<ReconstructionPlan> made;
   job.watch.time("plan", [&] {
-    survey = cloud.radii ? *cloud.radii : survey_radii(cloud.ingested.store, kSurveySamples, settings.density);
+    const SlabStore& store = cloud.ingested.store;
+    const ReadBucket read = [&store](std::size_t bucket, LocalSamples& out) { store.read(bucket, out); };
+    survey = cloud.survey ? *cloud.survey : survey_cloud(settings, store, read);
     made.emplace(make_plan(settings, cloud, survey));
   });
   const ReconstructionPlan& plan = *made;

@@ -36,8 +36,14 @@ void require(bool ok, const char* option, const char* range) {
 }
 
 /// Parts of fewer triangles, of which there are about as many as samples, are taken for specks.
-std::uint64_t specks(std::uint64_t samples) {
+std::uint64_t largest_speck(std::uint64_t samples) {
   return std::min(kMostSpeck, samples / kSpeckShare);
+}
+/// As many triangles cover what one would in cells of the usual size, where those are finer: a speck is as large
+/// either way.
+double triangles_per_usual(const FeedSettings& feed) {
+  if (feed.cell.unit != Length::Unit::sample_radius || feed.cell.value >= kChosenCell) return 1;
+  return (kChosenCell / feed.cell.value) * (kChosenCell / feed.cell.value);
 }
 
 /// The largest leaf cell for a sample of radius 1 where cells follow the samples.
@@ -181,9 +187,10 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
   // between sheets tell nothing.
   plan.vertex_radii = {influence / static_cast<double>(plan.lattice.cell_size(plan.main_level)),
                        plan.feed.refine_sheets ? influence : 0};
-  const std::uint64_t chosen = s.prune_triangles ? 0 : specks(plan.samples);
-  const auto least_samples = static_cast<std::uint64_t>(kSpeckSamples * static_cast<double>(chosen));
-  plan.pruning = {s.prune_triangles.value_or(chosen), least_samples, resolve(s.prune_size, median, plan.feed.blend)};
+  const std::uint64_t specks = s.prune_triangles ? 0 : largest_speck(plan.samples);
+  const auto least_samples = static_cast<std::uint64_t>(kSpeckSamples * static_cast<double>(specks));
+  const auto triangles = static_cast<std::uint64_t>(static_cast<double>(specks) * triangles_per_usual(plan.feed));
+  plan.pruning = {s.prune_triangles.value_or(triangles), least_samples, resolve(s.prune_size, median, plan.feed.blend)};
   plan.mesh_attributes = plan.attributes;
   if (s.vertex_levels) plan.mesh_attributes.push_back({"level", ScalarType::uint8});
   if (s.vertex_curvature) plan.mesh_attributes.push_back({"curvature", ScalarType::float32});
@@ -246,7 +253,14 @@ void check_settings(const SurfaceSettings& s) {
   require(s.dry_run || s.receiver || !s.output.empty(), "--output", "given");
 }
 
-ReconstructionPlan make_plan(const SurfaceSettings& s, const StoredCloud& cloud, const RadiusSurvey& survey) {
+CloudSurvey survey_cloud(const SurfaceSettings& s, const SlabStore& store, const ReadBucket& read) {
+  CloudSurvey out;
+  out.radii = survey_radii(store, read, kSurveySamples, s.density);
+  if (!s.blend && out.radii.noise > kNoisy) out.support = survey_support(store, read, out.radii);
+  return out;
+}
+
+ReconstructionPlan make_plan(const SurfaceSettings& s, const StoredCloud& cloud, const CloudSurvey& survey) {
   const SlabStore& store = cloud.ingested.store;
   ReconstructionPlan plan;
   plan.input = input_name(s);
@@ -261,9 +275,9 @@ ReconstructionPlan make_plan(const SurfaceSettings& s, const StoredCloud& cloud,
 
   choose_support(s, survey, cloud.info, plan);
   // Normals that were found from the positions tell nothing that a fit over more of them does not.
-  plan.refit.noise = cloud.info.found_normals ? static_cast<float>(std::numbers::pi) : survey.normal_noise;
+  plan.refit.noise = cloud.info.found_normals ? static_cast<float>(std::numbers::pi) : survey.radii.normal_noise;
   double max_radius = 0;
-  plan.radius = scaled_radii(s, survey, plan, plan.feed.blend, max_radius);
+  plan.radius = scaled_radii(s, survey.radii, plan, plan.feed.blend, max_radius);
   plan.feed.max_radius = static_cast<float>(max_radius);
   plan_lattice(s, s.levels, plan);
   if (wants_lower_slabs(s, plan, store)) plan_lattice(s, kDefaultLevels - 1, plan);
@@ -319,6 +333,8 @@ SurfacePlan summary_of(const ReconstructionPlan& p) {
   Eigen::Map<Eigen::Vector3d>(out.noisiest.data()) = p.frame.to_world(Eigen::Vector3f(x, y, z).cast<double>());
   out.normal_noise = static_cast<double>(p.radius.normal_noise) * 180 / std::numbers::pi;
   out.blend = p.feed.blend;
+  out.least_blend = p.feed.support ? static_cast<double>(p.feed.support->least()) : p.feed.blend;
+  out.most_blend = p.feed.widest();
   out.refit = p.refit.only_blurred ? 0 : p.refit.support;
   out.blurred_normals = static_cast<double>(p.radius.blurred);
   out.features = p.projection.creases;

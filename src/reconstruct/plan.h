@@ -89,12 +89,16 @@ void check_settings(const SurfaceSettings& settings);
 /// A function of settings, cloud and survey alone, so that all parts of a job plan the same. Throws Error(usage) when
 /// the cell asked for cannot be represented for this cloud, or vertices would have two attributes of one name;
 /// Error(empty) where no sampling density can be estimated.
-ReconstructionPlan make_plan(const SurfaceSettings& settings, const StoredCloud& cloud, const RadiusSurvey& survey);
+ReconstructionPlan make_plan(const SurfaceSettings& settings, const StoredCloud& cloud, const CloudSurvey& survey);
+
+/// What make_plan() wants to know of a cloud: radii and noise, and where H is to be chosen and the cloud is noisy, H by
+/// place. `read`: as for survey_radii().
+CloudSurvey survey_cloud(const SurfaceSettings& settings, const SlabStore& store, const ReadBucket& read);
 
 /// The part of make_plan() that says how far samples act and how fine the cells are, what is trusted and what closed:
 /// as the user says, else by what the survey saw of the cloud. Lengths that need the lattice are left for the rest of
 /// it.
-void choose_support(const SurfaceSettings& settings, const RadiusSurvey& survey, const PointSourceInfo& info,
+void choose_support(const SurfaceSettings& settings, const CloudSurvey& survey, const PointSourceInfo& info,
                     ReconstructionPlan& plan);
 
 /// SimplifySettings::deviation of a mesh of such samples: noise says how much of what is not flat is none of the

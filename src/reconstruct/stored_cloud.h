@@ -12,7 +12,7 @@
 #include "lamina/run.h"
 #include "lamina/surface.h"
 #include "samples/outliers.h"
-#include "samples/sampling_survey.h"
+#include "samples/support_field.h"
 #include "store/ingest.h"
 
 namespace lamina {
@@ -24,7 +24,7 @@ struct StoredCloud {
   PointSourceInfo info;
   Frame frame;
   Ingested ingested;
-  std::optional<RadiusSurvey> radii{};           ///< where they have been surveyed already
+  std::optional<CloudSurvey> survey{};           ///< where it has been made already
   std::optional<std::array<double, 3>> shift{};  ///< what comes out is less this: SurfaceSettings::local
 };
 

@@ -40,14 +40,14 @@ std::size_t first_bucket(const SlabStore& store, std::int64_t z, const FeedHalo&
 }
 
 /// H as the samples' arithmetic has it.
-float blend_of(const FeedSettings& settings) {
-  return static_cast<float>(settings.blend);
+float widest_of(const FeedSettings& settings) {
+  return static_cast<float>(settings.widest());
 }
 
 /// A radius that asks for cells larger than the coarsest level has gives no more than that level can use.
 float radius_limit(const FeedSettings& settings, const Lattice& lattice) {
   const double coarsest = 2.0 * lattice.cell_size(lattice.levels - 1) / settings.cell_ratio();
-  return static_cast<float>(settings.cell_follows_support() ? coarsest / blend_of(settings) : coarsest);
+  return static_cast<float>(settings.cell_follows_support() ? coarsest / widest_of(settings) : coarsest);
 }
 
 /// Coarsest level whose cell is at most `size`.
@@ -60,7 +60,7 @@ std::uint8_t level_for(double size, const Lattice& lattice) {
 }  // namespace
 
 float support_limit(const FeedSettings& settings, const Lattice& lattice) {
-  return radius_limit(settings, lattice) * blend_of(settings);
+  return radius_limit(settings, lattice) * widest_of(settings);
 }
 
 FeedHalo feed_halo(const FeedSettings& settings, const Lattice& lattice, const RadiiSettings& radii, bool given_radii,
@@ -177,7 +177,7 @@ void SampleFeed::learn_radii(std::vector<float> radii) {
       ++counts_.clamped;
       r = radius_limit_;
     }
-    known.max_support = std::max(known.max_support, r * blend_of(settings_));
+    known.max_support = std::max(known.max_support, r * widest_of(settings_));
   }
   if (filter_ != nullptr && !radii.empty()) filter_->add(measured_, cache_.get(measured_)->samples, radii);
   known.radius = std::move(radii);
@@ -229,8 +229,8 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
   resize_anew(out.level, n);
   out.max_support = known.max_support;
   const auto finest = static_cast<float>(lattice_.cell);
-  const float blend = blend_of(settings_);
-  const double ratio = settings_.cell_ratio() * (settings_.cell_follows_support() ? blend : 1.0F);
+  const auto same = static_cast<float>(settings_.blend);
+  const double ratio = settings_.cell_ratio() * (settings_.cell_follows_support() ? same : 1.0F);
   const bool has_quality = !out.samples.quality.empty(), fixed = settings_.fixed_cell();
   if (!known.normals.x.empty()) {
     out.samples.nx = known.normals.x;
@@ -238,9 +238,11 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
     out.samples.nz = known.normals.z;
   }
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 8192), [&](const auto& range) {
+    std::optional<SupportField::Cursor> local;
+    if (settings_.support) local.emplace(*settings_.support);
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       const float r = known.radius[i];
-      out.support[i] = r * blend;
+      out.support[i] = r * (local ? local->at(out.samples.x[i], out.samples.y[i], out.samples.z[i]) : same);
       // q_i is proportional to the sampling density 1 / r^2 (Cuccuru et al. 2009, section 3.1), scaled by the finest
       // cell to stay near one.
       const float q = r > 0 ? finest / r : 0.0F;

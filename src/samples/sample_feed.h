@@ -15,6 +15,7 @@
 #include "samples/bucket_cache.h"
 #include "samples/radius_estimator.h"
 #include "samples/sheet_refinement.h"
+#include "samples/support_field.h"
 #include "store/slab_store.h"
 
 namespace lamina {
@@ -45,7 +46,8 @@ using Batch = std::vector<std::shared_ptr<const ActiveBucket>>;
 
 struct FeedSettings {
   float radius_scale = 1;  ///< multiplies estimated radii; given ones are scaled when read in
-  double blend = 1;        ///< H: a sample's support radius R_i is H r_i
+  double blend = 1;        ///< H: a sample's support radius R_i is H r_i, about that where it follows places
+  std::shared_ptr<const SupportField> support;  ///< H by place; null: the same everywhere
   /// Largest leaf cell that a sample allows: a length, the same for all, or a multiple of its r_i or R_i.
   Length cell{0.9, Length::Unit::influence_radius};
   bool refine_sheets = false;           ///< a level less where sheets lie close together (SheetRefinement)
@@ -57,8 +59,11 @@ struct FeedSettings {
   /// Every sample asks for the finest level.
   [[nodiscard]] bool fixed_cell() const { return cell.unit == Length::Unit::world; }
   [[nodiscard]] bool refines_sheets() const { return refine_sheets && !fixed_cell(); }
-  /// The largest leaf cell in units of R_i (or, in units of r_i, where cells do not follow the support).
+  /// The largest leaf cell in units of R_i (or, in units of r_i, where cells do not follow the support, as they do
+  /// not where H follows places).
   [[nodiscard]] double cell_ratio() const { return fixed_cell() ? 1.0 : cell.value; }
+  /// The largest H of a sample.
+  [[nodiscard]] double widest() const { return support ? static_cast<double>(support->most()) : blend; }
   [[nodiscard]] bool cell_follows_support() const { return cell.unit != Length::Unit::sample_radius; }
 };
 

@@ -5,11 +5,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
-#include "base/hashing.h"
 #include "base/vectors.h"
 #include "samples/consensus_plane.h"
 #include "samples/density_octree.h"
@@ -20,47 +18,11 @@ namespace {
 /// Runs of buckets are this many radii tall, so that most cells, and neighbourhoods, are seen whole.
 constexpr double kRunHeight = 16;
 
-/// Buckets [begin, end) looked at together.
-struct BucketRun {
-  std::size_t begin = 0, end = 0;
-};
-
 /// The bucket of the sample with this rank.
 std::size_t bucket_of_rank(const SlabStore& store, std::uint64_t rank) {
   std::size_t b = 0;
   while (b + 1 < store.buckets() && rank >= store.count(b)) rank -= store.count(b++);
   return b;
-}
-
-std::uint64_t samples_in(const SlabStore& store, BucketRun run) {
-  std::uint64_t n = 0;
-  for (std::size_t b = run.begin; b < run.end; ++b) n += store.count(b);
-  return n;
-}
-
-double height_of(const SlabStore& store, BucketRun run) {
-  std::int32_t low = std::numeric_limits<std::int32_t>::max();
-  std::int32_t high = std::numeric_limits<std::int32_t>::min();
-  for (std::size_t b = run.begin; b < run.end; ++b) {
-    low = std::min(low, store.z_lower(b));
-    high = std::max(high, store.z_upper(b));
-  }
-  return static_cast<double>(high) - low;
-}
-
-LocalSamples read_oriented(const SlabStore& store, const ReadBucket& read, BucketRun run) {
-  LocalSamples all, bucket;
-  for (std::size_t b = run.begin; b < run.end; ++b) {
-    if (store.count(b) == 0) continue;
-    read(b, bucket);
-    all.x.insert(all.x.end(), bucket.x.begin(), bucket.x.end());
-    all.y.insert(all.y.end(), bucket.y.begin(), bucket.y.end());
-    all.z.insert(all.z.end(), bucket.z.begin(), bucket.z.end());
-    all.nx.insert(all.nx.end(), bucket.nx.begin(), bucket.nx.end());
-    all.ny.insert(all.ny.end(), bucket.ny.begin(), bucket.ny.end());
-    all.nz.insert(all.nz.end(), bucket.nz.begin(), bucket.nz.end());
-  }
-  return all;
 }
 
 // Density.
@@ -136,15 +98,6 @@ constexpr double kFlat = 4;
 /// Half of a normal distribution lies within so many of its deviations.
 constexpr double kMedianDeviation = 0.67;
 
-struct NoiseCell {
-  std::int64_t x, y, z;
-  bool operator==(const NoiseCell&) const = default;
-};
-
-struct CellHash {
-  std::size_t operator()(const NoiseCell& c) const { return cell_hash(c.x, c.y, c.z); }
-};
-
 /// Buckets about the sample with this rank, until they are tall enough for whole neighbourhoods or many enough.
 BucketRun noise_run(const SlabStore& store, std::uint64_t rank, double height) {
   const std::size_t middle = bucket_of_rank(store, rank);
@@ -194,69 +147,28 @@ Deviation deviation(const std::vector<Eigen::Vector3d>& points, const Eigen::Vec
   return {std::abs(height(0)), angle};
 }
 
-/// Samples of a run in cells as wide as neighbours are looked for, those around the seeds only.
-class SeedNeighbourhoods {
- public:
-  SeedNeighbourhoods(const LocalSamples& samples, double radius)
-      : samples_(samples), reach_(kNeighbourhood * radius), inverse_(1 / reach_) {
-    choose_seeds();
-    for (const std::size_t seed : seeds_) {
-      for (int k = 0; k < 27; ++k) cells_[beside(cell_of(seed), k)];
-    }
-    if (cells_.empty()) return;
-    for (std::size_t i = 0; i < samples.size(); ++i) {
-      const auto at = cells_.find(cell_of(i));
-      if (at != cells_.end()) at->second.push_back(static_cast<std::uint32_t>(i));
-    }
+/// Samples of a run whose neighbours, within so many steps, are not cut off at its ends.
+std::vector<std::size_t> choose_seeds(const LocalSamples& samples, double reach) {
+  std::vector<std::size_t> seeds;
+  const auto [low, high] = std::minmax_element(samples.z.begin(), samples.z.end());
+  const std::size_t stride = samples.size() / kSeeds + 1;
+  for (std::size_t i = 0; i < samples.size(); i += stride) {
+    const double above = samples.z[i] - static_cast<double>(*low);
+    const double below = static_cast<double>(*high) - samples.z[i];
+    if (std::min(above, below) >= reach || static_cast<double>(*high) - *low < 3 * reach) seeds.push_back(i);
   }
+  return seeds;
+}
 
-  [[nodiscard]] const std::vector<std::size_t>& seeds() const { return seeds_; }
-  /// Zero where there is none.
-  [[nodiscard]] Eigen::Vector3d normal(std::size_t seed) const {
-    if (samples_.nx.size() != samples_.size()) return Eigen::Vector3d::Zero();
-    return Eigen::Vector3f(samples_.nx[seed], samples_.ny[seed], samples_.nz[seed]).cast<double>();
-  }
-  /// The places about the seed, in units of the neighbourhood, of neighbours that do not face the other way: the
-  /// two sides of a thin wall or a spine are no noise of each other.
-  void gather(std::size_t seed, std::vector<Eigen::Vector3d>& out) const {
-    out.clear();
-    const NoiseCell c = cell_of(seed);
-    const Eigen::Vector3d facing = normal(seed);
-    for (int k = 0; k < 27; ++k) {
-      for (const std::uint32_t i : cells_.at(beside(c, k))) {
-        if (i == seed || out.size() >= kMost || normal(i).dot(facing) < 0) continue;
-        const Eigen::Vector3d p = Eigen::Vector3d(static_cast<double>(samples_.x[i]) - samples_.x[seed],
-                                                  static_cast<double>(samples_.y[i]) - samples_.y[seed],
-                                                  static_cast<double>(samples_.z[i]) - samples_.z[seed]) *
-                                  inverse_;
-        if (p.squaredNorm() < 1) out.push_back(p);
-      }
-    }
-  }
-
- private:
-  static NoiseCell beside(const NoiseCell& c, int k) { return {c.x + k % 3 - 1, c.y + k / 3 % 3 - 1, c.z + k / 9 - 1}; }
-  [[nodiscard]] NoiseCell cell_of(std::size_t i) const {
-    return {static_cast<std::int64_t>(std::floor(samples_.x[i] * inverse_)),
-            static_cast<std::int64_t>(std::floor(samples_.y[i] * inverse_)),
-            static_cast<std::int64_t>(std::floor(samples_.z[i] * inverse_))};
-  }
-  void choose_seeds() {
-    const auto [low, high] = std::minmax_element(samples_.z.begin(), samples_.z.end());
-    const std::size_t stride = samples_.size() / kSeeds + 1;
-    for (std::size_t i = 0; i < samples_.size(); i += stride) {
-      // Neighbours beyond the run's ends are not seen.
-      const double above = samples_.z[i] - static_cast<double>(*low);
-      const double below = static_cast<double>(*high) - samples_.z[i];
-      if (std::min(above, below) >= reach_ || static_cast<double>(*high) - *low < 3 * reach_) seeds_.push_back(i);
-    }
-  }
-
-  const LocalSamples& samples_;
-  double reach_, inverse_;
-  std::vector<std::size_t> seeds_;
-  std::unordered_map<NoiseCell, std::vector<std::uint32_t>, CellHash> cells_;
-};
+/// The places about the seed of neighbours that do not face the other way: the two sides of a thin wall or a spine are
+/// no noise of each other.
+void gather(const SeedNeighbourhoods& of, std::size_t seed, std::vector<Eigen::Vector3d>& out) {
+  out.clear();
+  const Eigen::Vector3d facing = of.normal(seed);
+  of.around(seed, [&](std::uint32_t i, const Eigen::Vector3d& place) {
+    if (out.size() < kMost && of.normal(i).dot(facing) >= 0) out.push_back(place);
+  });
+}
 
 /// A normal that lies so far from the surface, 15 degrees, was interpolated over an edge and not over facets.
 constexpr float kBlurredCosine = 0.966F;
@@ -312,10 +224,11 @@ Noise survey_noise(const SlabStore& store, const ReadBucket& read, float radius)
               : store.total() / kRuns * static_cast<std::uint64_t>(run) + store.total() / (2 * kRuns);
     const double height = small ? std::numeric_limits<double>::infinity() : kRunHeight * static_cast<double>(radius);
     const LocalSamples samples = read_oriented(store, read, noise_run(store, rank, height));
-    const SeedNeighbourhoods around(samples, static_cast<double>(radius));
+    const double reach = kNeighbourhood * static_cast<double>(radius);
+    const SeedNeighbourhoods around(samples, reach, choose_seeds(samples, reach));
     std::vector<float> here;
     for (const std::size_t seed : around.seeds()) {
-      around.gather(seed, neighbours);
+      gather(around, seed, neighbours);
       if (neighbours.size() < kLeast) continue;
       ++looked_at;
       blurred += is_blurred(neighbours, around.normal(seed), plane) ? 1 : 0;

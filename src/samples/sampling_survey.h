@@ -3,8 +3,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 
+#include "samples/bucket_runs.h"
 #include "store/slab_store.h"
 
 namespace lamina {
@@ -36,8 +36,7 @@ RadiusSurvey survey_density(const SlabStore& store, std::uint64_t sample_limit, 
 
 inline constexpr std::uint64_t kSurveySamples = 1u << 18;  ///< whose radii are looked at before streaming
 
-/// The same where a bucket's samples come from elsewhere: `read` fills them in as SlabStore::read() does.
-using ReadBucket = std::function<void(std::size_t bucket, LocalSamples& out)>;
+/// The same where a bucket's samples come from elsewhere.
 RadiusSurvey survey_radii(const SlabStore& store, const ReadBucket& read, std::uint64_t sample_limit,
                           std::uint32_t min_samples = 16);
 

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <vector>
+
 namespace lamina {
 namespace {
 
@@ -11,9 +13,10 @@ RadiusSurvey survey(float noise, float high) {
 }
 
 /// For samples that come with their normals, or have none.
-ReconstructionPlan choice_of(const SurfaceSettings& settings, const RadiusSurvey& survey, const PointSourceInfo& info) {
+ReconstructionPlan choice_of(const SurfaceSettings& settings, const RadiusSurvey& survey, const PointSourceInfo& info,
+                             const std::vector<SupportPlace>& support = {}) {
   ReconstructionPlan plan;
-  choose_support(settings, survey, info, plan);
+  choose_support(settings, {survey, support}, info, plan);
   return plan;
 }
 ReconstructionPlan choice_of(const SurfaceSettings& settings, const RadiusSurvey& survey, bool found_normals = false) {
@@ -25,6 +28,7 @@ ReconstructionPlan choice_of(const SurfaceSettings& settings, const RadiusSurvey
 SurfaceSettings by_noise() {
   SurfaceSettings settings;
   settings.blend.reset();
+  settings.deviation.reset();
   return settings;
 }
 
@@ -82,27 +86,42 @@ TEST(ChooseSupport, ClosedMeshesAreMadeWhereAskedFor) {
   EXPECT_EQ(choice_of(settings, survey(0.01F, 2)).holes.watertight, Watertight::no);
 }
 
-TEST(ChooseSupport, NoiseWidensTheSupportAndRefitsNormals) {
-  double before = 1.2;
-  for (const float noise : {0.06F, 0.1F, kVeryNoisy}) {
-    const ReconstructionPlan choice = choice_of(by_noise(), survey(noise, 2));
-    EXPECT_GT(choice.feed.blend, before);
-    EXPECT_GT(choice.refit.support, 0);
-    EXPECT_EQ(choice.feed.cell.unit, Length::Unit::sample_radius);
-    before = choice.feed.blend;
-  }
-  EXPECT_EQ(choice_of(by_noise(), survey(1, 2)).feed.blend, before);
+TEST(ChooseSupport, NoisySupportsFollowPlaces) {
+  const std::vector<SupportPlace> places{{{0, 0, 0}, 1.5F}, {{900, 0, 0}, 2}, {{0, 900, 0}, 2.75F}};
+  const ReconstructionPlan choice = choice_of(by_noise(), survey(0.1F, 2), PointSourceInfo{}, places);
+  ASSERT_TRUE(choice.feed.support);
+  EXPECT_EQ(choice.feed.blend, 2) << "the one in the middle";
+  EXPECT_EQ(choice.feed.widest(), 2.75);
+  EXPECT_EQ(choice.refit.by_place, choice.feed.support);
+  EXPECT_FLOAT_EQ(choice.refit.widest(), kRefitPerBlend * 2.75F);
+  EXPECT_EQ(choice.feed.cell, (Length{kNoisyCell, Length::Unit::sample_radius}));
 }
 
-TEST(ChooseSupport, RoughNormalsWantTheWideSupportSooner) {
-  RadiusSurvey cloud = survey(kVeryNoisyRough, 2);
+TEST(ChooseSupport, NoisyCloudsThatTellNothingGetOneSupport) {
+  const ReconstructionPlan choice = choice_of(by_noise(), survey(0.1F, 2));
+  EXPECT_FALSE(choice.feed.support);
+  EXPECT_EQ(choice.feed.blend, kNoisyBlend);
+  EXPECT_GT(choice.refit.support, 0);
+}
+
+TEST(ChooseSupport, RoughNormalsWantMoreCompany) {
+  RadiusSurvey cloud = survey(0.1F, 2);
   const ReconstructionPlan even = choice_of(by_noise(), cloud);
   cloud.normal_noise = 0.25F;  // 14 degrees
   const ReconstructionPlan rough = choice_of(by_noise(), cloud);
-  EXPECT_EQ(rough.feed.blend, kVeryNoisyBlend);
-  EXPECT_LT(even.feed.blend, rough.feed.blend);
-  EXPECT_EQ(rough.refit.support, kRoughRefit);
-  EXPECT_EQ(even.refit.support, kNoisyRefit);
+  EXPECT_EQ(even.feed.blend, rough.feed.blend);
+  EXPECT_LT(even.refit.support, rough.refit.support);
+}
+
+TEST(ChooseSupport, CellsAreFineOnlyWhereFlatPartsAreThinnedOut) {
+  SurfaceSettings all = by_noise();
+  all.deviation = 0;
+  const ReconstructionPlan fine = choice_of(by_noise(), survey(0.1F, 2));
+  const ReconstructionPlan coarse = choice_of(all, survey(0.1F, 2));
+  EXPECT_LT(fine.feed.cell.value, coarse.feed.cell.value);
+  EXPECT_NEAR(static_cast<double>(fine.projection.band) * fine.feed.cell.value,
+              static_cast<double>(coarse.projection.band) * coarse.feed.cell.value, 1e-6)
+      << "as far from the samples";
 }
 
 TEST(ChooseSupport, GivenNumbersStand) {
@@ -116,7 +135,7 @@ TEST(ChooseSupport, GivenNumbersStand) {
   settings.cell = Length{0.5, Length::Unit::world};
   EXPECT_EQ(choice_of(settings, survey(0.2F, 2)).refit.support, 0);
   EXPECT_EQ(choice_of(settings, survey(0.2F, 2)).feed.cell, *settings.cell);
-  EXPECT_GT(choice_of(settings, survey(0.2F, 2)).feed.blend, 2);
+  EXPECT_EQ(choice_of(settings, survey(0.2F, 2)).feed.blend, kNoisyBlend);
   EXPECT_FALSE(choice_of(settings, survey(0.01F, 2)).feed.refine_sheets);
 }
 

@@ -61,8 +61,8 @@ TEST_F(SurfaceRefit, ChoiceIsTheSameForThreadsAndWindows) {
   s.blend.reset();
   const std::string once = bytes(s, 1);
   EXPECT_GT(plan_.noise, 0.09);
-  EXPECT_GT(plan_.blend, kNoisyBlend);
-  EXPECT_EQ(plan_.refit, kRoughRefit);
+  EXPECT_LT(plan_.least_blend, plan_.most_blend);
+  EXPECT_DOUBLE_EQ(plan_.refit, static_cast<double>(kRoughRefitPerBlend) * plan_.blend);
   EXPECT_TRUE(once == bytes(s, 2));
   s.window = 3;
   EXPECT_TRUE(once == bytes(s, 2));
