@@ -48,32 +48,32 @@ double choose_deviation(const RadiusSurvey& survey) {
   return kStep * std::round(std::min(wanted, kMostDeviation) / kStep);
 }
 
-void choose_support(const SurfaceSettings& s, const CloudSurvey& cloud, const PointSourceInfo& info,
+void choose_support(const SurfaceSettings& s, const CloudSurvey& survey, const PointSourceInfo& info,
                     ReconstructionPlan& plan) {
-  const RadiusSurvey& survey = cloud.radii;
+  const RadiusSurvey& radii = survey.radii;
   const bool thins = !s.simplify.wanted() && s.deviation.value_or(kCleanDeviation) > 0;
   plan.feed.blend = kDefaultBlend;
   if (s.blend) {
     plan.feed.blend = *s.blend;
-  } else if (survey.noise > kNoisy) {
-    choose_for_noise(cloud, s, thins ? kNoisyCell : kChosenCell, plan);
-  } else if (survey.high < kEven * survey.low) {
-    choose_for_even(s.cell.has_value(), thins && survey.noise <= kSharp ? kThinnedCell : kChosenCell, plan);
+  } else if (radii.noise > kNoisy) {
+    choose_for_noise(survey, s, thins ? kNoisyCell : kChosenCell, plan);
+  } else if (radii.high < kEven * radii.low) {
+    choose_for_even(s.cell.has_value(), thins && radii.noise <= kSharp ? kThinnedCell : kChosenCell, plan);
     // A closed mesh. Normals come with samples of a surface, which ends where they do; positions alone say nothing of
     // wide gaps among them.
     plan.holes.watertight = info.found_normals ? Watertight::any_loops : Watertight::short_loops;
   }
-  if (!s.blend && survey.noise <= kNoisy) plan.trim = kCleanRimOverhang;
+  if (!s.blend && radii.noise <= kNoisy) plan.trim = kCleanRimOverhang;
   if (s.trim) plan.trim = *s.trim;
   // Rims that are cut where the samples end may run on before.
-  if (plan.trim > 0 && survey.noise > kNoisy) plan.doubtful = DoubtfulPoints::as_extended;
+  if (plan.trim > 0 && radii.noise > kNoisy) plan.doubtful = DoubtfulPoints::as_extended;
   if (s.cell) plan.feed.cell = *s.cell;
   if (s.refit) {
     plan.refit.support = *s.refit;
     plan.refit.by_place = nullptr;
   }
-  plan.projection.creases = s.features.value_or(!s.blend && survey.noise <= kSharp) && !s.diffuse;
-  if (plan.projection.creases && !s.refit && survey.noise <= kExact && survey.blurred > kBlurred) {
+  plan.projection.creases = s.features.value_or(!s.blend && radii.noise <= kSharp) && !s.diffuse;
+  if (plan.projection.creases && !s.refit && radii.noise <= kExact && radii.blurred > kBlurred) {
     plan.refit.support = double{kConsensusReach};
     plan.refit.only_blurred = true;
   }
