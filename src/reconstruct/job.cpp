@@ -177,8 +177,7 @@ ReconstructionPlan plan_surface(const SurfaceSettings& settings, const StoredClo
   std::optional<ReconstructionPlan> made;
   job.watch.time("plan", [&] {
     const SlabStore& store = cloud.ingested.store;
-    const ReadBucket read = [&store](std::size_t bucket, LocalSamples& out) { store.read(bucket, out); };
-    survey = cloud.survey ? *cloud.survey : survey_cloud(settings, store, read);
+    survey = cloud.survey ? *cloud.survey : survey_cloud(settings, store, reader_of(store));
     made.emplace(make_plan(settings, cloud, survey));
   });
   const ReconstructionPlan& plan = *made;

@@ -7,23 +7,26 @@
 
 namespace lamina {
 
-std::uint64_t samples_in(const SlabStore& store, BucketRun run) {
+ReadBucket reader_of(const SlabStore& store) {
+  return [&store](std::size_t bucket, LocalSamples& out) { store.read(bucket, out); };
+}
+
+std::uint64_t samples_in(const SlabStore& store, BucketSpan run) {
   std::uint64_t n = 0;
   for (std::size_t b = run.begin; b < run.end; ++b) n += store.count(b);
   return n;
 }
 
-double height_of(const SlabStore& store, BucketRun run) {
-  std::int32_t low = std::numeric_limits<std::int32_t>::max();
-  std::int32_t high = std::numeric_limits<std::int32_t>::min();
+ZRange z_range(const SlabStore& store, BucketSpan run) {
+  ZRange z{std::numeric_limits<std::int32_t>::max(), std::numeric_limits<std::int32_t>::min()};
   for (std::size_t b = run.begin; b < run.end; ++b) {
-    low = std::min(low, store.z_lower(b));
-    high = std::max(high, store.z_upper(b));
+    z.low = std::min(z.low, store.z_lower(b));
+    z.high = std::max(z.high, store.z_upper(b));
   }
-  return static_cast<double>(high) - low;
+  return z;
 }
 
-LocalSamples read_oriented(const SlabStore& store, const ReadBucket& read, BucketRun run) {
+LocalSamples read_oriented(const SlabStore& store, const ReadBucket& read, BucketSpan run) {
   LocalSamples all, bucket;
   const auto append = [](auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); };
   for (std::size_t b = run.begin; b < run.end; ++b) {

@@ -16,19 +16,26 @@ namespace lamina {
 /// Fills a bucket's samples in, as SlabStore::read() does.
 using ReadBucket = std::function<void(std::size_t bucket, LocalSamples& out)>;
 
-/// Buckets [begin, end) looked at together.
-struct BucketRun {
+/// The store's own.
+ReadBucket reader_of(const SlabStore& store);
+
+/// Buckets [begin, end).
+struct BucketSpan {
   std::size_t begin = 0, end = 0;
 };
 
-std::uint64_t samples_in(const SlabStore& store, BucketRun run);
+std::uint64_t samples_in(const SlabStore& store, BucketSpan run);
 
-/// From the lowest sample to the highest, steps; negative where there is none.
-double height_of(const SlabStore& store, BucketRun run);
+/// The lowest sample and the highest, steps; the greatest int32 and the least where there is none.
+struct ZRange {
+  std::int32_t low = 0, high = 0;
+  [[nodiscard]] double height() const { return static_cast<double>(high) - low; }
+};
+ZRange z_range(const SlabStore& store, BucketSpan run);
 
 /// Positions, normals and, where the input gave them, radii of a run's samples: buckets in ascending order, in each the
 /// input's order.
-LocalSamples read_oriented(const SlabStore& store, const ReadBucket& read, BucketRun run);
+LocalSamples read_oriented(const SlabStore& store, const ReadBucket& read, BucketSpan run);
 
 /// Samples in cells as wide as neighbours are looked for, those around the seeds only.
 class SeedNeighbourhoods {

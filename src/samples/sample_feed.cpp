@@ -230,7 +230,8 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
   out.max_support = known.max_support;
   const auto finest = static_cast<float>(lattice_.cell);
   const auto same = static_cast<float>(settings_.blend);
-  const double ratio = settings_.cell_ratio() * (settings_.cell_follows_support() ? same : 1.0F);
+  const bool follows = settings_.cell_follows_support();
+  const double cell_ratio = settings_.cell_ratio();
   const bool has_quality = !out.samples.quality.empty(), fixed = settings_.fixed_cell();
   if (!known.normals.x.empty()) {
     out.samples.nx = known.normals.x;
@@ -242,12 +243,14 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
     if (settings_.support) local.emplace(*settings_.support);
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       const float r = known.radius[i];
-      out.support[i] = r * (local ? local->at(out.samples.x[i], out.samples.y[i], out.samples.z[i]) : same);
+      const float blend = local ? local->at(out.samples.x[i], out.samples.y[i], out.samples.z[i]) : same;
+      out.support[i] = r * blend;
       // q_i is proportional to the sampling density 1 / r^2 (Cuccuru et al. 2009, section 3.1), scaled by the finest
       // cell to stay near one.
       const float q = r > 0 ? finest / r : 0.0F;
       out.weight[i] = q * q * (has_quality ? out.samples.quality[i] : 1.0F);
-      out.level[i] = fixed ? std::uint8_t{0} : level_for(static_cast<double>(r) * ratio, lattice_);
+      out.level[i] = fixed ? std::uint8_t{0}
+                           : level_for(static_cast<double>(r) * (cell_ratio * (follows ? blend : 1.0F)), lattice_);
       if (!known.finer.empty() && known.finer[i]) --out.level[i];
     }
   });

@@ -13,6 +13,7 @@
 #include "lamina/length.h"
 #include "lattice/lattice.h"
 #include "samples/bucket_cache.h"
+#include "samples/bucket_runs.h"
 #include "samples/radius_estimator.h"
 #include "samples/sheet_refinement.h"
 #include "samples/support_field.h"
@@ -59,8 +60,7 @@ struct FeedSettings {
   /// Every sample asks for the finest level.
   [[nodiscard]] bool fixed_cell() const { return cell.unit == Length::Unit::world; }
   [[nodiscard]] bool refines_sheets() const { return refine_sheets && !fixed_cell(); }
-  /// The largest leaf cell in units of R_i (or, in units of r_i, where cells do not follow the support, as they do
-  /// not where H follows places).
+  /// The largest leaf cell in units of R_i (or, in units of r_i, where cells do not follow the support).
   [[nodiscard]] double cell_ratio() const { return fixed_cell() ? 1.0 : cell.value; }
   /// The largest H of a sample.
   [[nodiscard]] double widest() const { return support ? static_cast<double>(support->most()) : blend; }
@@ -75,11 +75,6 @@ struct FeedCounts {
   std::uint64_t undersampled = 0;  ///< left out by max_radius
   std::uint64_t clamped = 0;       ///< radius reduced to what the coarsest level can serve
   std::uint64_t bucket_reads = 0;  ///< times a bucket was decompressed
-};
-
-/// Buckets [begin, end).
-struct BucketSpan {
-  std::size_t begin = 0, end = 0;
 };
 
 /// How far along z what a sample gets depends on others; heights of cells lying on multiples of theirs, 0 where nothing

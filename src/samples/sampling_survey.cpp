@@ -31,13 +31,13 @@ std::size_t bucket_of_rank(const SlabStore& store, std::uint64_t rank) {
 /// end, far more than single cells that the surface clips.
 constexpr double kLow = 0.01, kMiddle = 0.5, kHigh = 0.99;
 
-std::vector<WeightedRadius> run_radii(const SlabStore& store, const ReadBucket& read, BucketRun run,
+std::vector<WeightedRadius> run_radii(const SlabStore& store, const ReadBucket& read, BucketSpan run,
                                       std::uint32_t min_samples) {
   const CutEnds cut{run.begin > 0, run.end < store.buckets()};
   return density_radii(read_oriented(store, read, run), cut, min_samples);
 }
 
-std::vector<WeightedRadius> given_radii(const ReadBucket& read, BucketRun run) {
+std::vector<WeightedRadius> given_radii(const ReadBucket& read, BucketSpan run) {
   std::vector<WeightedRadius> radii;
   LocalSamples bucket;
   for (std::size_t b = run.begin; b < run.end; ++b) {
@@ -53,22 +53,22 @@ std::size_t buckets_in_run(const SlabStore& store, const ReadBucket& read, std::
   const std::size_t middle = bucket_of_rank(store, store.total() / 2);
   for (std::size_t n = 1;; n *= 2) {
     const std::size_t begin = middle - std::min(middle, n / 2);
-    const BucketRun run{begin, std::min(store.buckets(), begin + n)};
+    const BucketSpan run{begin, std::min(store.buckets(), begin + n)};
     if (samples_in(store, run) >= sample_limit || run.end - run.begin == store.buckets()) return n;
     const auto radii = run_radii(store, read, run, min_samples);
     if (radii.empty()) continue;
-    if (height_of(store, run) >= kRunHeight * static_cast<double>(quantile(radii, samples_of(radii), kMiddle)))
+    if (z_range(store, run).height() >= kRunHeight * static_cast<double>(quantile(radii, samples_of(radii), kMiddle)))
       return n;
   }
 }
 
 /// Runs of `size` buckets about evenly spaced ranks, as many as the limit allows; they do not overlap.
-std::vector<BucketRun> choose_runs(const SlabStore& store, std::uint64_t sample_limit, std::size_t size) {
+std::vector<BucketSpan> choose_runs(const SlabStore& store, std::uint64_t sample_limit, std::size_t size) {
   if (store.total() <= sample_limit) return {{0, store.buckets()}};
   const double share = static_cast<double>(sample_limit) / static_cast<double>(store.total());
   const double most = static_cast<double>(store.buckets()) / static_cast<double>(size);
   const auto number = static_cast<std::uint64_t>(std::max(1.0, std::floor(share * most)));
-  std::vector<BucketRun> runs;
+  std::vector<BucketSpan> runs;
   std::size_t free = 0;
   for (std::uint64_t i = 0; i < number; ++i) {
     const auto rank = static_cast<double>(store.total()) * (static_cast<double>(i) + 0.5) / static_cast<double>(number);
@@ -99,12 +99,12 @@ constexpr double kFlat = 4;
 constexpr double kMedianDeviation = 0.67;
 
 /// Buckets about the sample with this rank, until they are tall enough for whole neighbourhoods or many enough.
-BucketRun noise_run(const SlabStore& store, std::uint64_t rank, double height) {
+BucketSpan noise_run(const SlabStore& store, std::uint64_t rank, double height) {
   const std::size_t middle = bucket_of_rank(store, rank);
-  BucketRun run{middle, middle + 1};
+  BucketSpan run{middle, middle + 1};
   for (;;) {
     const std::uint64_t held = samples_in(store, run);
-    if (held >= kRunSamples && height_of(store, run) >= height) return run;
+    if (held >= kRunSamples && z_range(store, run).height() >= height) return run;
     if (held >= 4 * kRunSamples || (run.begin == 0 && run.end == store.buckets())) return run;
     if (run.begin > 0) --run.begin;
     if (run.end < store.buckets()) ++run.end;
@@ -252,10 +252,6 @@ Noise survey_noise(const SlabStore& store, const ReadBucket& read, float radius)
 
 namespace {
 
-ReadBucket reader_of(const SlabStore& store) {
-  return [&store](std::size_t bucket, LocalSamples& out) { store.read(bucket, out); };
-}
-
 RadiusSurvey survey_density(const SlabStore& store, const ReadBucket& read, std::uint64_t sample_limit,
                             std::uint32_t min_samples) {
   RadiusSurvey survey;
@@ -264,7 +260,7 @@ RadiusSurvey survey_density(const SlabStore& store, const ReadBucket& read, std:
   const bool whole = store.total() <= sample_limit;
   const std::size_t size = given || whole ? 1 : buckets_in_run(store, read, sample_limit, min_samples);
   std::vector<WeightedRadius> radii;
-  for (const BucketRun& run : choose_runs(store, sample_limit, size)) {
+  for (const BucketSpan& run : choose_runs(store, sample_limit, size)) {
     const auto found = given ? given_radii(read, run) : run_radii(store, read, run, min_samples);
     radii.insert(radii.end(), found.begin(), found.end());
     survey.samples += samples_in(store, run);

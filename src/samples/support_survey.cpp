@@ -143,22 +143,26 @@ struct Place {
 
 /// Buckets whose samples are seeds, and with those around that hold their neighbours.
 struct SurveyRun {
-  BucketRun seeds, read;
+  BucketSpan seeds, read;
 };
 
 /// Runs twice as tall as the reach, or all of the store; of a long one some, evenly.
 std::vector<SurveyRun> choose_runs(const SlabStore& store, double reach) {
   std::vector<SurveyRun> runs;
   for (std::size_t begin = 0; begin < store.buckets();) {
-    BucketRun seeds{begin, begin + 1};
-    while (seeds.end < store.buckets() && height_of(store, seeds) < 2 * reach) ++seeds.end;
+    BucketSpan seeds{begin, begin + 1};
+    while (seeds.end < store.buckets() && z_range(store, seeds).height() < 2 * reach) ++seeds.end;
     begin = seeds.end;
     if (samples_in(store, seeds) == 0) continue;
-    BucketRun read = seeds;
-    const auto below = static_cast<double>(store.z_lower(seeds.begin)) - reach;
-    const auto above = static_cast<double>(store.z_upper(seeds.end - 1)) + reach;
-    while (read.begin > 0 && static_cast<double>(store.z_upper(read.begin - 1)) >= below) --read.begin;
-    while (read.end < store.buckets() && static_cast<double>(store.z_lower(read.end)) <= above) ++read.end;
+    BucketSpan read = seeds;
+    const ZRange z = z_range(store, seeds);
+    // Empty buckets tell nothing of those beyond them.
+    const auto wanted = [&](std::size_t b) {
+      return store.count(b) == 0 || (static_cast<double>(store.z_upper(b)) >= z.low - reach &&
+                                     static_cast<double>(store.z_lower(b)) <= z.high + reach);
+    };
+    while (read.begin > 0 && wanted(read.begin - 1)) --read.begin;
+    while (read.end < store.buckets() && wanted(read.end)) ++read.end;
     runs.push_back({seeds, read});
   }
   const std::size_t stride = static_cast<std::size_t>(store.total() / kMostRead) + 1;
