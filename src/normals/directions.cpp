@@ -182,8 +182,11 @@ class DirectionFinder {
     std::nth_element(levels.begin(), levels.begin() + Links::kMost / 2, levels.end());
     const std::uint8_t level = levels[Links::kMost / 2];
     if (level == 0) return;
-    const Plane plane = plane_within(tree_, place, std::min(reach_of_level(reach_[i], level), bound_));
-    if (plane.valid()) set_normal(place, plane);
+    const float squared = std::min(reach_of_level(reach_[i], level), bound_);
+    const Plane plane = plane_within(tree_, place, squared);
+    if (!plane.valid()) return;
+    set_normal(place, plane);
+    samples_.lift[place] = height_of_sheet(tree_, place, plane.normal, {squared, reach_[i]});
   }
 
   void set_normal(std::uint32_t place, const Plane& plane) {
@@ -284,6 +287,39 @@ Plane plane_within(const SampleTree& tree, std::uint32_t place, float squared) {
     m.add(offset, 1 - double{n.squared} / double{squared});
   });
   return fit_plane(m);
+}
+
+float height_of_sheet(const SampleTree& tree, std::uint32_t place, const std::array<float, 3>& normal,
+                      const SheetReach& reach) {
+  constexpr float kColumn = 0.4F;  // of the plane's reach: that is wide for its direction, and curved
+  constexpr float kBand = 0.6F;    // of the nearest samples' reach, which among noise grows with it
+  constexpr float kTall = 2;       // bands
+  constexpr float kStill = 0.01F;  // of a band
+  constexpr int kMostSteps = 12;
+  const float band = kBand * std::sqrt(reach.nearest);
+  const float across = kColumn * kColumn * reach.plane;
+  const float tall = kTall * band;
+  std::vector<float> heights{0.0F};
+  tree.within(place, across + tall * tall, [&](const Neighbour& m, const std::array<float, 3>& d) {
+    const float h = normal[0] * d[0] + normal[1] * d[1] + normal[2] * d[2];
+    if (std::abs(h) < tall && m.squared - h * h < across) heights.push_back(h);
+  });
+  float at = 0;
+  for (int step = 0; step < kMostSteps; ++step) {
+    float sum = 0;
+    float weight = 0;
+    for (const float h : heights) {
+      const float u = (h - at) / band;
+      const float w = std::max(0.0F, 1 - u * u);
+      sum += w * w * h;
+      weight += w * w;
+    }
+    const float next = sum / weight;
+    const bool still = std::abs(next - at) < kStill * band;
+    at = next;
+    if (still) break;
+  }
+  return at;
 }
 
 }  // namespace lamina::normals

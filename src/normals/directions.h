@@ -102,4 +102,18 @@ float reach_of_level(float first_squared, std::uint8_t level);
 /// there is none.
 Plane plane_within(const SampleTree& tree, std::uint32_t place, float squared);
 
+// Which sheet a noisy sample belongs to: between the faces of a thin wall noise leaves no gap, and neighbours there say
+// that the two are one.
+
+/// Squared distances, steps^2.
+struct SheetReach {
+  float plane = 0;    ///< of the samples that the normal's plane was fitted to
+  float nearest = 0;  ///< of the first plane's, the nearest
+};
+
+/// How far along the normal the samples of a slim column around this one lie densest, steps: mean shift from the
+/// sample's own height (Fukunaga and Hostetler 1975; Cheng 1995).
+float height_of_sheet(const SampleTree& tree, std::uint32_t place, const std::array<float, 3>& normal,
+                      const SheetReach& reach);
+
 }  // namespace lamina::normals

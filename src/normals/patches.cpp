@@ -114,7 +114,16 @@ class PatchGrower {
   };
 
   [[nodiscard]] float agreement_of(std::size_t i, std::uint32_t place, std::uint32_t other, const Vector3f& n) const {
-    return agreement(tree_.offset(place, other), n, normal_of(samples_, other), links_.scale[i]);
+    return agreement(offset(place, other), n, normal_of(samples_, other), links_.scale[i]);
+  }
+
+  /// Between the sheets that the two belong to.
+  [[nodiscard]] Vector3f offset(std::uint32_t place, std::uint32_t other) const {
+    Vector3f d = tree_.offset(place, other);
+    const Vector3f n = normal_of(samples_, place);
+    const Vector3f m = normal_of(samples_, other);
+    for (std::size_t a = 0; a < 3; ++a) d[a] += samples_.lift[other] * m[a] - samples_.lift[place] * n[a];
+    return d;
   }
 
   /// Joins samples of the cell along their links, the strongest first.
@@ -161,7 +170,7 @@ class PatchGrower {
       // The root is the patch's first sample.
       samples_.node[place] = root == s ? next++ : samples_.node[links_.core[order_[root]]];
       if (forest_->sign(static_cast<std::uint32_t>(s)) < 0) {
-        for (auto* n : {&samples_.nx[place], &samples_.ny[place], &samples_.nz[place]}) *n = -*n;
+        for (auto* n : {&samples_.nx[place], &samples_.ny[place], &samples_.nz[place], &samples_.lift[place]}) *n = -*n;
       }
     }
     sum_up(cell);
@@ -225,7 +234,7 @@ class PatchGrower {
       for (const std::uint32_t other : links_.neighbours[i]) {
         if (other == place || samples_.node[other] == kNoNode) continue;
         const Vector3f m = normal_of(samples_, other);
-        const bool along = lie_along(tree_.offset(place, other), n, m);
+        const bool along = lie_along(offset(place, other), n, m);
         const bool same = dot(n, m) > 0;
         if (samples_.node[other] == node) {
           if (along) ++(same ? cell.same : cell.opposite);

@@ -24,6 +24,7 @@ void for_columns(const WindowSamples& from, WindowSamples& to, const Each& each)
   each(from.row, to.row);
   each(from.node, to.node);
   each(from.given, to.given);
+  each(from.lift, to.lift);
 }
 
 void append_all(const WindowSamples& from, WindowSamples& to) {
@@ -84,6 +85,7 @@ void SampleWindow::load(std::size_t bucket) {
   const std::size_t n = local.size();
   s.row.resize(n);
   s.given.resize(n);
+  s.lift.resize(n);
   s.node.assign(n, kNoNode);
   for (std::size_t i = 0; i < n; ++i) {
     s.row[i] = row_of(local, i);

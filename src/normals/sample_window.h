@@ -23,6 +23,7 @@ inline constexpr std::uint32_t kNoNode = ~0U;
 struct WindowSamples {
   std::vector<std::int32_t> x, y, z;  ///< steps of the frame
   std::vector<float> nx, ny, nz;      ///< unit length, or zero
+  std::vector<float> lift;            ///< from a noisy sample along its normal to its sheet, steps (height_of_sheet())
   std::vector<std::uint64_t> row;     ///< of the input
   std::vector<std::uint32_t> node;    ///< of the patch graph
   std::vector<std::uint8_t> given;    ///< 1: the normal comes from the input

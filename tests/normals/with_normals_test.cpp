@@ -363,6 +363,21 @@ TEST(WithNormals, OfAThinClosedPlateFaceOut) {
   EXPECT_EQ(found.report.unsure, 0);
 }
 
+// Four deviations of noise thick: there are samples all the way from one face to the other.
+TEST(WithNormals, OfANoisyThinWallFaceOut) {
+  std::mt19937 random(6);
+  std::normal_distribution<> noise(0, 0.01);
+  Oriented cloud;
+  Box{{0, 0, 0}, {0.04, 1, 1}, false, false}.scatter(cloud, 12000, random);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const double d = noise(random);
+    for (std::size_t a = 0; a < 3; ++a) cloud.positions[i][a] += d * cloud.normals[i][a];
+  }
+  const Found found = find_normals(cloud);
+  EXPECT_GT(compare(cloud, found.normals).right_side, 0.95);
+  EXPECT_EQ(found.report.unsure, 0);
+}
+
 TEST(WithNormals, OfARealGroundFaceUp) {
   const std::string file = LAMINA_SOURCE_DIR "/../shared/data/las/autzen_trim_7.las";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << "no " << file;
