@@ -183,6 +183,8 @@ void accumulate_some(const TileSamples& s, const SampleRange* ranges, int count,
   switch (s.attributes.size()) {
     case 0:
       return accumulate_body<0, B, F>(s, ranges, count, query, facing, sums);
+    case 1:
+      return accumulate_body<1, B, F>(s, ranges, count, query, facing, sums);
     case 3:
       return accumulate_body<3, B, F>(s, ranges, count, query, facing, sums);
     default:

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <optional>
 #include <span>
 #include <tuple>
 
@@ -213,8 +212,7 @@ void RefitNormals::add(std::size_t bucket, const LocalSamples& samples, const st
   added->bucket.weight.resize(n);
   added->bucket.level.assign(n, static_cast<std::uint8_t>(settings_.level));
   const auto unit = static_cast<float>(lattice_.cell);
-  std::optional<SupportField::Cursor> local;
-  if (settings_.by_place) local.emplace(*settings_.by_place);
+  SupportField::Cursor* const local = settings_.by_place ? &settings_.by_place->cursor() : nullptr;
   for (std::size_t i = 0; i < n; ++i) {
     const float q = radii[i] > 0 ? unit / radii[i] : 0.0F;
     const float support =

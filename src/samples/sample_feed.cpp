@@ -239,8 +239,7 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
     out.samples.nz = known.normals.z;
   }
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 8192), [&](const auto& range) {
-    std::optional<SupportField::Cursor> local;
-    if (settings_.support) local.emplace(*settings_.support);
+    SupportField::Cursor* const local = settings_.support ? &settings_.support->cursor() : nullptr;
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       const float r = known.radius[i];
       const float blend = local ? local->at(out.samples.x[i], out.samples.y[i], out.samples.z[i]) : same;

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <tuple>
 #include <utility>
 
 #include "base/vectors.h"
@@ -13,6 +14,8 @@ namespace {
 
 /// Places whose mean, weighted by how near they are, makes H.
 constexpr std::size_t kBlended = 8;
+/// Places that are passed over together where they lie far away.
+constexpr std::size_t kGrouped = 32;
 
 /// About how far a place is from the next one: of places spread over a surface.
 float typical_distance(const std::vector<SupportPlace>& places) {
@@ -38,40 +41,72 @@ float typical_distance(const std::vector<SupportPlace>& places) {
 }  // namespace
 
 SupportField::SupportField(const std::vector<SupportPlace>& places) {
-  for (const SupportPlace& p : places) {
+  std::vector<float> sorted;
+  for (const SupportPlace& p : places) sorted.push_back(p.blend);
+  const auto [least, most] = std::minmax_element(sorted.begin(), sorted.end());
+  least_ = *least;
+  most_ = *most;
+  median_ = median_of(sorted);
+  const float apart = std::clamp(typical_distance(places), 1.0F, 0x1p29F);
+  edge_ = static_cast<std::int64_t>(std::bit_ceil(static_cast<std::uint32_t>(apart)));
+  put_in_order(places);
+}
+
+void SupportField::put_in_order(std::vector<SupportPlace> places) {
+  // Cells that hold some dozen places of a surface.
+  const float side = 4 * static_cast<float>(edge_);
+  const auto cell = [side](const SupportPlace& p) {
+    return std::tuple(std::floor(p.at[2] / side), std::floor(p.at[1] / side), std::floor(p.at[0] / side));
+  };
+  std::stable_sort(places.begin(), places.end(),
+                   [&](const SupportPlace& a, const SupportPlace& b) { return cell(a) < cell(b); });
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const SupportPlace& p = places[i];
+    if (groups_.empty() || groups_.back().end - groups_.back().begin == kGrouped) groups_.push_back({i, i, p.at, p.at});
+    Group& group = groups_.back();
+    group.end = i + 1;
+    for (std::size_t k = 0; k < 3; ++k) {
+      group.low[k] = std::min(group.low[k], p.at[k]);
+      group.high[k] = std::max(group.high[k], p.at[k]);
+    }
     x_.push_back(p.at[0]);
     y_.push_back(p.at[1]);
     z_.push_back(p.at[2]);
     blend_.push_back(p.blend);
   }
-  const auto [least, most] = std::minmax_element(blend_.begin(), blend_.end());
-  least_ = *least;
-  most_ = *most;
-  std::vector<float> sorted = blend_;
-  median_ = median_of(sorted);
-  const float apart = std::clamp(typical_distance(places), 1.0F, 0x1p29F);
-  edge_ = static_cast<std::int64_t>(std::bit_ceil(static_cast<std::uint32_t>(apart)));
 }
 
 float SupportField::interpolated(const std::array<float, 3>& at) const {
   constexpr float kFar = std::numeric_limits<float>::infinity();
   std::array<std::pair<float, float>, kBlended> near;  // squared distance, H
   near.fill({kFar, 0});
-  std::array<float, 64> squared;
-  for (std::size_t begin = 0; begin < x_.size(); begin += squared.size()) {
-    const std::size_t n = std::min(squared.size(), x_.size() - begin);
-    for (std::size_t i = 0; i < n; ++i) {
-      const float dx = x_[begin + i] - at[0];
-      const float dy = y_[begin + i] - at[1];
-      const float dz = z_[begin + i] - at[2];
-      squared[i] = dx * dx + dy * dy + dz * dz;
-    }
-    for (std::size_t i = 0; i < n; ++i) {
-      if (squared[i] >= near.back().first) continue;
+  const auto look_at = [&](const Group& group) {
+    for (std::size_t i = group.begin; i < group.end; ++i) {
+      const float dx = x_[i] - at[0];
+      const float dy = y_[i] - at[1];
+      const float dz = z_[i] - at[2];
+      const float squared = dx * dx + dy * dy + dz * dz;
+      if (squared >= near.back().first) continue;
       std::size_t k = kBlended - 1;
-      for (; k > 0 && squared[i] < near[k - 1].first; --k) near[k] = near[k - 1];
-      near[k] = {squared[i], blend_[begin + i]};
+      for (; k > 0 && squared < near[k - 1].first; --k) near[k] = near[k - 1];
+      near[k] = {squared, blend_[i]};
     }
+  };
+  // How near a group's places may be. Rounded as their own distances are, so that it is not more than any of these.
+  const auto least_square = [&](const Group& group) {
+    float squared = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const float d = std::max({group.low[k] - at[k], at[k] - group.high[k], 0.0F});
+      squared += d * d;
+    }
+    return squared;
+  };
+  const auto nearest = std::min_element(groups_.begin(), groups_.end(), [&](const Group& a, const Group& b) {
+    return least_square(a) < least_square(b);
+  });
+  look_at(*nearest);
+  for (auto group = groups_.begin(); group != groups_.end(); ++group) {
+    if (group != nearest && least_square(*group) < near.back().first) look_at(*group);
   }
   const std::size_t found = std::min(kBlended, x_.size());
   const float far = near[found - 1].first;

@@ -6,6 +6,8 @@
 // Stone 1974). Neighbours count by their distance along the surface, since those nearest in space to a noisy sample
 // share its error.
 #pragma once
+#include <tbb/enumerable_thread_specific.h>
+
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -47,6 +49,8 @@ class SupportField {
  public:
   /// `places`: at least one.
   explicit SupportField(const std::vector<SupportPlace>& places);
+  SupportField(const SupportField&) = delete;
+  SupportField& operator=(const SupportField&) = delete;
 
   [[nodiscard]] float least() const { return least_; }
   [[nodiscard]] float median() const { return median_; }
@@ -72,13 +76,24 @@ class SupportField {
     bool any_ = false;
     std::unordered_map<Corner, float, Hash> corners_;  ///< seen lately
   };
+  /// The calling thread's own, which knows what it was asked before.
+  [[nodiscard]] Cursor& cursor() const { return cursors_.local(); }
 
  private:
   [[nodiscard]] float interpolated(const std::array<float, 3>& at) const;
 
+  /// Places that lie close together: [begin, end).
+  struct Group {
+    std::size_t begin = 0, end = 0;
+    std::array<float, 3> low{}, high{};
+  };
+  void put_in_order(std::vector<SupportPlace> places);
+
   std::vector<float> x_, y_, z_, blend_;
+  std::vector<Group> groups_;
   std::int64_t edge_ = 1;  ///< of the grid's cubes, steps
   float least_ = 1, median_ = 1, most_ = 1;
+  mutable tbb::enumerable_thread_specific<Cursor> cursors_{[this] { return Cursor(*this); }};
 };
 
 }  // namespace lamina

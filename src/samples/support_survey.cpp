@@ -1,11 +1,14 @@
 // survey_support(): which width of a disk predicts samples best.
 
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <limits>
 #include <numbers>
 #include <optional>
@@ -25,7 +28,7 @@ constexpr std::uint64_t kLeastStride = 16;       ///< samples for a place
 constexpr std::uint64_t kMostRead = 1ULL << 22;  ///< samples, about
 
 /// Radii of the disks that are tried, in radii of the samples.
-constexpr std::array<double, 6> kDisks{1, 1.4, 2, 2.8, 4, 5.6};
+constexpr std::array<float, 6> kDisks{1, 1.4F, 2, 2.8F, 4, 5.6F};
 constexpr std::size_t kMiddleDisk = 2;
 /// Samples in a disk that have something to say of it, and among which the spacing is measured.
 constexpr std::size_t kLeastInDisk = 8;
@@ -43,9 +46,35 @@ constexpr double kSupportPerDisk = 0.65;
 constexpr double kLeastBlend = 1.1;
 constexpr double kBlendPerError = 3.5;
 
-/// A neighbour in the frame of the mean normal around a seed, in radii of the samples.
-struct FlatNeighbour {
-  double x, y, height;
+typedef float Four __attribute__((vector_size(16)));  // NOLINT(modernize-use-using): attributes on typedefs
+
+/// Neighbours in the frame of the mean normal around a seed, in radii of the samples; one array each, so that four are
+/// looked at at once.
+struct FlatNeighbours {
+  std::vector<float> x, y, height, weight;
+  std::size_t count = 0;  ///< behind them come some of weight 0, up to a multiple of four
+
+  void resize(std::size_t n) {
+    count = n;
+    for (std::vector<float>* v : {&x, &y, &height, &weight}) v->assign((n + 3) / 4 * 4, 0);
+  }
+  /// Leaves out those beyond a disk, weighs the others as the projection does (method.md, "Weights and fit").
+  void keep_within(float disk) {
+    // What lies this far off is of another sheet.
+    const float thick = std::max(disk, 2.0F);
+    const float inverse = 1 / (disk * disk);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const float inside = 1 - (x[i] * x[i] + y[i] * y[i]) * inverse;
+      x[kept] = x[i];
+      y[kept] = y[i];
+      height[kept] = height[i];
+      weight[kept] = inside * inside * (inside * inside);
+      kept += static_cast<std::size_t>(static_cast<int>(inside > 0) & static_cast<int>(std::abs(height[i]) < thick));
+    }
+    std::fill(weight.begin() + static_cast<std::ptrdiff_t>(kept), weight.end(), 0.0F);
+    count = kept;
+  }
 };
 
 /// How far a seed, the origin, is from what disks of neighbours suggest, in radii; without the last ones where the
@@ -54,85 +83,142 @@ struct Trial {
   std::array<float, kDisks.size()> error{};
 };
 
-/// The height at the origin of the paraboloid of revolution fitted to the neighbours in a disk, with the projection's
-/// weights (method.md, "Weights and fit"), the second time without strays; nothing where there are too few.
-std::optional<double> height_over(const std::vector<FlatNeighbour>& neighbours, double disk) {
-  // What lies this far off is of another sheet.
-  const double thick = std::max(disk, 2.0);
-  std::vector<std::pair<const FlatNeighbour*, double>> weighted;
-  for (const FlatNeighbour& n : neighbours) {
-    const double inside = 1 - (n.x * n.x + n.y * n.y) / (disk * disk);
-    if (inside > 0 && std::abs(n.height) < thick) weighted.emplace_back(&n, inside * inside * inside * inside);
+Four four(const std::vector<float>& v, std::size_t i) {
+  Four out;
+  std::memcpy(&out, v.data() + i, sizeof(out));
+  return out;
+}
+
+/// The paraboloid of revolution, 1, x, y and x^2 + y^2 (in units of the disk), through the neighbours by their weights.
+Eigen::Vector4f paraboloid(const FlatNeighbours& around, float disk) {
+  const float inverse = 1 / disk;
+  enum : std::uint8_t { kW, kX, kY, kXX, kXY, kYY, kXQ, kYQ, kQQ, kH, kHX, kHY, kHQ, kAll };
+  std::array<Four, kAll> sums{};
+  for (std::size_t i = 0; i < around.count; i += 4) {
+    const Four x = four(around.x, i) * inverse;
+    const Four y = four(around.y, i) * inverse;
+    const Four q = x * x + y * y;
+    const Four w = four(around.weight, i);
+    const Four h = w * four(around.height, i);
+    const Four wx = w * x, wy = w * y, wq = w * q;
+    sums[kW] += w;
+    sums[kX] += wx;
+    sums[kY] += wy;
+    sums[kXX] += wx * x;
+    sums[kXY] += wx * y;
+    sums[kYY] += wy * y;
+    sums[kXQ] += wx * q;
+    sums[kYQ] += wy * q;
+    sums[kQQ] += wq * q;
+    sums[kH] += h;
+    sums[kHX] += h * x;
+    sums[kHY] += h * y;
+    sums[kHQ] += h * q;
   }
-  if (weighted.size() < kLeastInDisk) return std::nullopt;
-  const auto terms = [&](const FlatNeighbour& n) {
-    const double x = n.x / disk, y = n.y / disk;
-    return Eigen::Vector4d(1, x, y, x * x + y * y);
+  const auto sum = [&](int k) {
+    const Four& v = sums[static_cast<std::size_t>(k)];
+    return static_cast<double>((v[0] + v[1]) + (v[2] + v[3]));
   };
-  const auto fit = [&] {
-    Eigen::Matrix4d a = Eigen::Matrix4d::Zero();
-    Eigen::Vector4d b = Eigen::Vector4d::Zero();
-    for (const auto& [n, weight] : weighted) {
-      const Eigen::Vector4d t = terms(*n);
-      a += weight * t * t.transpose();
-      b += weight * n->height * t;
-    }
-    a.diagonal().array() += 1e-6 * a.trace();
-    return Eigen::Vector4d(a.ldlt().solve(b));
-  };
-  const Eigen::Vector4d first = fit();
-  std::vector<double> residuals;
-  residuals.reserve(weighted.size());
-  for (const auto& [n, weight] : weighted) residuals.push_back(std::abs(n->height - first.dot(terms(*n))));
-  std::vector<double> sorted = residuals;
-  constexpr double kStrayMedians = 4;
-  const double far = kStrayMedians * median_of(sorted);
+  Eigen::Matrix4d a = Eigen::Matrix4d::Zero();  // the lower half
+  a.col(0) << sum(kW), sum(kX), sum(kY), sum(kXX) + sum(kYY);
+  a.col(1).tail<3>() << sum(kXX), sum(kXY), sum(kXQ);
+  a.col(2).tail<2>() << sum(kYY), sum(kYQ);
+  a(3, 3) = sum(kQQ);
+  a.diagonal().array() += 1e-6 * a.trace();
+  return a.ldlt().solve(Eigen::Vector4d(sum(kH), sum(kHX), sum(kHY), sum(kHQ))).cast<float>();
+}
+
+/// How far neighbours are from a paraboloid.
+void find_residuals(const FlatNeighbours& around, float disk, const Eigen::Vector4f& of, std::vector<float>& out) {
+  const float inverse = 1 / disk;
+  out.resize(around.count);
+  for (std::size_t i = 0; i < around.count; ++i) {
+    const float x = around.x[i] * inverse;
+    const float y = around.y[i] * inverse;
+    out[i] = std::abs(around.height[i] - (of(0) + of(1) * x + of(2) * y + of(3) * (x * x + y * y)));
+  }
+}
+
+/// Memory kept from seed to seed.
+struct TrialScratch {
+  std::vector<std::uint32_t> found;
+  std::vector<Eigen::Vector3f> places;
+  std::vector<float> squared, residuals, sorted;
+  FlatNeighbours neighbours;
+};
+
+/// The height at the origin of the paraboloid fitted to the neighbours that are left, those in a disk, the second time
+/// without strays; nothing where they are too few.
+std::optional<float> height_over(float disk, TrialScratch& scratch) {
+  FlatNeighbours& around = scratch.neighbours;
+  if (around.count < kLeastInDisk) return std::nullopt;
+  const Eigen::Vector4f first = paraboloid(around, disk);
+  find_residuals(around, disk, first, scratch.residuals);
+  scratch.sorted = scratch.residuals;
+  constexpr float kStrayMedians = 4;
+  const float far = kStrayMedians * median_of(scratch.sorted);
   if (!(far > 0)) return first(0);
-  for (std::size_t i = 0; i < weighted.size(); ++i) {
-    const double inside = std::max(0.0, 1 - residuals[i] * residuals[i] / (far * far));  // Tukey's weights
-    weighted[i].second *= inside * inside;
+  for (std::size_t i = 0; i < around.count; ++i) {
+    const float share = scratch.residuals[i] / far;
+    const float inside = std::max(0.0F, 1 - share * share);  // Tukey's weights
+    around.weight[i] *= inside * inside;
   }
-  return fit()(0);
+  return paraboloid(around, disk)(0);
 }
 
 /// What the neighbours of a seed say; nothing where they are too few. `given`: its radius where the input has it, in
 /// units of the reach, else 0.
-std::optional<Trial> try_disks(const SeedNeighbourhoods& of, std::size_t seed, double given) {
-  const Eigen::Vector3d own = of.normal(seed);
-  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> facing;  // place, normal
-  std::vector<double> squared;
+std::optional<Trial> try_disks(const SeedNeighbourhoods& of, std::size_t seed, double given, TrialScratch& scratch) {
+  const Eigen::Vector3f own = of.normal(seed).cast<float>();
+  auto& [found, places, squared, residuals, sorted, neighbours] = scratch;
+  found.clear();
+  places.clear();
+  squared.clear();
   of.around(seed, [&](std::uint32_t i, const Eigen::Vector3d& place) {
-    squared.push_back(place.squaredNorm());
-    if (of.normal(i).dot(own) > 0) facing.emplace_back(place, of.normal(i));
+    found.push_back(i);
+    places.emplace_back(place.cast<float>());
+    squared.push_back(places.back().squaredNorm());
   });
-  if (squared.size() < kCounted || facing.size() < kCounted) return std::nullopt;
+  if (found.size() < kCounted) return std::nullopt;
   // Two spacings, of samples spread evenly over the disk that just holds so many.
-  const auto last = squared.begin() + (kCounted - 1);
-  std::nth_element(squared.begin(), last, squared.end());
-  const double radius = given > 0 ? given : 2 * std::sqrt(std::numbers::pi / kCounted * *last);
+  sorted = squared;
+  const auto last = sorted.begin() + (kCounted - 1);
+  std::nth_element(sorted.begin(), last, sorted.end());
+  const float radius =
+      given > 0 ? static_cast<float>(given) : 2 * std::sqrt(std::numbers::pi_v<float> / kCounted * *last);
   if (!(radius > 0)) return std::nullopt;
-  constexpr double kAxisReach = 2.5;
-  Eigen::Vector3d axis = own;
-  for (const auto& [place, normal] : facing) {
-    if (place.norm() < kAxisReach * radius) axis += normal;
+  constexpr float kAxisReach = 2.5F;
+  constexpr float kFarthest = 2 * kDisks.back() * kDisks.back();  // squared: a disk is no thicker than it is wide
+  Eigen::Vector3f axis = own;
+  std::size_t facing = 0;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (squared[i] > kFarthest * radius * radius) continue;
+    const Eigen::Vector3f normal = of.normal(found[i]).cast<float>();
+    if (!(normal.dot(own) > 0)) continue;
+    if (squared[i] < kAxisReach * kAxisReach * radius * radius) axis += normal;
+    places[facing++] = places[i];
   }
+  if (facing < kCounted) return std::nullopt;
   axis.normalize();
-  const Eigen::Vector3d u = axis.unitOrthogonal();
-  const Eigen::Vector3d v = axis.cross(u);
-  std::vector<FlatNeighbour> neighbours;
-  neighbours.reserve(facing.size());
-  for (const auto& [place, normal] : facing)
-    neighbours.push_back({place.dot(u) / radius, place.dot(v) / radius, place.dot(axis) / radius});
-  Trial trial;
-  for (std::size_t k = 0; k < kDisks.size(); ++k) {
-    if (k > kMiddleDisk && kDisks[k] * radius > 1) {
-      trial.error[k] = trial.error[k - 1];
-      continue;
-    }
-    const std::optional<double> height = height_over(neighbours, kDisks[k]);
-    if (!height) return std::nullopt;
-    trial.error[k] = static_cast<float>(std::abs(*height));
+  const Eigen::Vector3f u = axis.unitOrthogonal() / radius;
+  const Eigen::Vector3f v = axis.cross(u);
+  axis /= radius;
+  neighbours.resize(facing);
+  for (std::size_t i = 0; i < facing; ++i) {
+    neighbours.x[i] = places[i].dot(u);
+    neighbours.y[i] = places[i].dot(v);
+    neighbours.height[i] = places[i].dot(axis);
   }
+  std::size_t known = kDisks.size();  // of the disks
+  while (known > kMiddleDisk + 1 && kDisks[known - 1] * radius > 1) --known;
+  Trial trial;
+  for (std::size_t k = known; k-- > 0;) {
+    neighbours.keep_within(kDisks[k]);
+    const std::optional<float> height = height_over(kDisks[k], scratch);
+    if (!height) return std::nullopt;
+    trial.error[k] = std::abs(*height);
+  }
+  std::fill(trial.error.begin() + static_cast<std::ptrdiff_t>(known), trial.error.end(), trial.error[known - 1]);
   return trial;
 }
 
@@ -178,12 +264,13 @@ struct BestDisk {
 BestDisk best_of(const std::array<double, kDisks.size()>& squares) {
   const auto least = std::min_element(squares.begin(), squares.end());
   const auto k = static_cast<std::size_t>(least - squares.begin());
-  double radius = kDisks[k];
+  const auto disk = [](std::size_t at) { return double{kDisks[at]}; };
+  double radius = disk(k);
   if (k > 0 && k + 1 < kDisks.size()) {
     // Where the parabola through three has its lowest point.
     const double bend = squares[k - 1] - 2 * squares[k] + squares[k + 1];
     const double step = bend > 0 ? 0.5 * (squares[k - 1] - squares[k + 1]) / bend : 0;
-    radius += step * (step > 0 ? kDisks[k + 1] - kDisks[k] : kDisks[k] - kDisks[k - 1]);
+    radius += step * (step > 0 ? disk(k + 1) - disk(k) : disk(k) - disk(k - 1));
   }
   return {radius, std::sqrt(*least)};
 }
@@ -228,12 +315,13 @@ std::vector<SupportPlace> pooled(const std::vector<Place>& places) {
 
 std::vector<SupportPlace> survey_support(const SlabStore& store, const ReadBucket& read, const RadiusSurvey& survey) {
   constexpr float kFarthest = 4;  // medians: where samples lie farther apart than this, narrower disks must do
-  const double reach = kDisks.back() * static_cast<double>(std::min(survey.high, kFarthest * survey.median));
+  const double reach = double{kDisks.back()} * static_cast<double>(std::min(survey.high, kFarthest * survey.median));
   if (!(reach > 0)) return {};
   const std::vector<SurveyRun> runs = choose_runs(store, reach);
   std::uint64_t total = 0;
   for (const SurveyRun& run : runs) total += samples_in(store, run.seeds);
   const std::uint64_t stride = std::max(kLeastStride, total / kPlaces);
+  tbb::enumerable_thread_specific<TrialScratch> scratch;
   std::vector<Place> places;
   std::uint64_t passed = 0;
   for (const SurveyRun& run : runs) {
@@ -248,7 +336,7 @@ std::vector<SupportPlace> survey_support(const SlabStore& store, const ReadBucke
     tbb::parallel_for(std::size_t{0}, trials.size(), [&](std::size_t s) {
       const std::size_t seed = around.seeds()[s];
       const double given = samples.radius.empty() ? 0 : static_cast<double>(samples.radius[seed]) / reach;
-      trials[s] = try_disks(around, seed, given);
+      trials[s] = try_disks(around, seed, given, scratch.local());
     });
     for (std::size_t s = 0; s < trials.size(); ++s) {
       const std::size_t seed = around.seeds()[s];
