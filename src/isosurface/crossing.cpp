@@ -172,7 +172,7 @@ CornerPlace surface_place(BlockCache& cache, int level, const Cell& corner) {
   Cell c = corner;
   for (int l = level; l >= 0; --l) {
     const CornerBlock* block = cache.block(l, c);
-    if (block != nullptr && block->surface.test(offset_in_block(c))) return {block, offset_in_block(c)};
+    if (block != nullptr && block->surface.test(offset_in_block(c))) return {block, offset_in_block(c), l};
     c = {c.x * 2, c.y * 2, c.z * 2};
   }
   return {};

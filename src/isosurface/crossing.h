@@ -23,6 +23,7 @@ void mark_surface(const TileView& tile, Window& window);
 struct CornerPlace {
   const CornerBlock* block = nullptr;
   int offset = 0;
+  int level = 0;
   [[nodiscard]] std::uint32_t number() const;
 };
 

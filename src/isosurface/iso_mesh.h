@@ -29,9 +29,12 @@ struct SurfaceCorner {
   /// |projected point - weighted average of the samples| / local support radius; negative where that is not trusted and
   /// the value is extended from neighbours, or uncertain. A corner without any value has a zero normal.
   float offset_from_mean = -1;
-  bool crease = false;  ///< the projected point lies on a sharp edge, and the normal is the mean of the sides'
-  float density = 0;    ///< samples along the surface around, 1/steps^2; 0 where none are seen
-  float overhang = 0;   ///< how far the surface reaches beyond its samples here, support radii (mls/overhang.h)
+  bool crease = false;   ///< the projected point lies on a sharp edge, and the normal is the mean of the sides'
+  bool leaning = false;  ///< while edges are numbered: `overhang` has not been averaged yet
+  float density = 0;     ///< samples along the surface around, 1/steps^2; 0 where none are seen
+  /// How far the surface reaches beyond its samples here, support radii (mls/overhang.h). Of a corner that no isovertex
+  /// is nearest to it is not averaged over its neighbours, unless CornerRule asks for that.
+  float overhang = 0;
 };
 
 /// An isovertex: a minimal edge whose ends have different signs. Owned by the slab that holds the edge's lower end.

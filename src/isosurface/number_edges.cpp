@@ -4,6 +4,7 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "base/vectors.h"
@@ -108,6 +109,19 @@ void put_on_crease(const float* record, float cell, SurfaceCorner& c) {
   c.crease = true;
 }
 
+/// How far the surface reaches beyond its samples at a corner; what its own lean tells, where Numbering is to ask its
+/// neighbours only if the corner is wanted. `record`: null where it has no samples of its own.
+void put_overhang(const CornerPlace& at, const float* record, int slab_layers, const CornerRule& rule,
+                  const std::array<float, 3>& normal, SurfaceCorner& c) {
+  if (record != nullptr) {
+    c.overhang = own_overhang(record, normal);
+    if (c.overhang < kUpright * rule.trim && at.block->trusted.test(at.offset)) return;
+    c.leaning = !rule.all_overhangs && !c.crease;
+    if (c.leaning) return;
+  }
+  c.overhang = overhang(*at.block, at.offset, slab_layers, normal);
+}
+
 /// Fills in the tile's surface corners. Trusted corners are read here, which is what corner_value() answers for them in
 /// the finest level that holds them, without its search.
 void fill_corners(const Window& window, const TileView& tile, const CornerRule& rule, IsoSlab& out) {
@@ -151,8 +165,9 @@ void fill_corners(const Window& window, const TileView& tile, const CornerRule& 
       if (leaf.creased.test(z * 64 + bit) &&
           takes_crease(window, tile.level, cell, static_cast<std::int32_t>(out.slab), record()))
         put_on_crease(record(), cell_of_value(window, tile.level, cell), c);
-      if ((leaf.seen.words[z] & active & one) != 0) c.density = record()[kDensity];
-      if (rule.trim > 0) c.overhang = overhang(leaf, z * 64 + bit, slab_layers, value.normal, rule.trim);
+      const float* const own = (leaf.seen.words[z] & active & one) != 0 ? record() : nullptr;
+      if (own != nullptr) c.density = own[kDensity];
+      if (rule.trim > 0) put_overhang({&leaf, z * 64 + bit, tile.level}, own, slab_layers, rule, value.normal, c);
       for (int a = 0; a < attributes; ++a) out.corner_attributes[a][id] = extra[a];
       out.corners[id++] = c;
     });
@@ -195,18 +210,28 @@ class Numbering {
                                                                    std::popcount(below->accepted[1].words[z]));
     for_bits(below->accepted[2].words[z], [&](int bit) {
       IsoVertex& v = previous.vertices[id++];
-      const std::uint32_t high = corner_number(tile, &tile.leaf(), tile.begin * 64 + bit, {0, 0, 0});
-      v.high.bits = high | SlabIndex::kNextSlab;
-      place(v, previous.corners[v.low.index()], slab_.corners[high]);
+      const CornerPlace high = corner_place(tile, &tile.leaf(), tile.begin * 64 + bit, {0, 0, 0});
+      const std::uint32_t number = high.number();
+      v.high.bits = number | SlabIndex::kNextSlab;
+      place(v, previous.corners[v.low.index()], slab_.corners[number]);
+      if (v.near_high) average_overhang(high, number);
     });
   }
 
  private:
-  /// Number of the corner at an offset of one of the tile's blocks, `beyond` blocks away.
-  std::uint32_t corner_number(const TileView& tile, const CornerBlock* block, int offset, const Cell& beyond) {
-    if (block != nullptr && block->surface.test(offset)) return CornerPlace{block, offset}.number();
+  /// The corner at an offset of one of the tile's blocks, `beyond` blocks away.
+  CornerPlace corner_place(const TileView& tile, const CornerBlock* block, int offset, const Cell& beyond) {
+    if (block != nullptr && block->surface.test(offset)) return {block, offset, tile.level};
     const Cell c = tile.cell(offset) + Cell{beyond.x * 8, beyond.y * 8, beyond.z * 8};
-    return surface_place(cache_, tile.level, c).number();
+    return surface_place(cache_, tile.level, c);
+  }
+
+  /// Of a corner that an isovertex is nearest to. Threads may ask for the same one.
+  void average_overhang(const CornerPlace& at, std::uint32_t number) {
+    SurfaceCorner& c = slab_.corners[number];
+    const std::atomic_ref<bool> leaning(c.leaning);
+    if (!leaning.load(std::memory_order_relaxed) || !leaning.exchange(false, std::memory_order_relaxed)) return;
+    c.overhang = overhang(*at.block, at.offset, cache_.window().slab_layers(at.level), c.normal);
   }
 
   /// Vertices of a layer's edges along an axis, the first of which is `id`; returns the number behind the last.
@@ -225,15 +250,20 @@ class Numbering {
       if (((open >> bit) & 1U) != 0) {
         for (int q = 0; q < 4; ++q) v.open |= static_cast<std::uint8_t>(((~full.words[q] >> bit) & 1U) << q);
       }
-      v.low.bits = corner_number(tile, &leaf, offset, {0, 0, 0});
+      const CornerPlace low = corner_place(tile, &leaf, offset, {0, 0, 0});
+      v.low.bits = low.number();
       if (both_ends) {
         constexpr int kStep = 1 << (3 * kAxis);
         constexpr int kLast = 7 * kStep;
         const bool leaves = (offset & kLast) == kLast;
-        v.high.bits = leaves ? corner_number(tile, next, offset - kLast, kBeyond)
-                             : corner_number(tile, &leaf, offset + kStep, {0, 0, 0});
+        const CornerPlace high = leaves ? corner_place(tile, next, offset - kLast, kBeyond)
+                                        : corner_place(tile, &leaf, offset + kStep, {0, 0, 0});
+        v.high.bits = high.number();
         place(v, slab_.corners[v.low.index()], slab_.corners[v.high.index()]);
+        if (v.near_high) average_overhang(high, v.high.index());
       }
+      // An upper end yet to come may be the farther one, and then it is too late.
+      if (!both_ends || !v.near_high) average_overhang(low, v.low.index());
       slab_.vertices[id++] = v;
     });
     return id;

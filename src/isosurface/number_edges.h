@@ -24,7 +24,8 @@ enum class DoubtfulPoints : std::uint8_t {
 /// What is wanted of the corners at the surface.
 struct CornerRule {
   DoubtfulPoints doubtful = DoubtfulPoints::near_samples;
-  float trim = 0;  ///< overhang at which rims are going to be cut, support radii; 0: nobody asks for it
+  float trim = 0;              ///< overhang at which rims are going to be cut, support radii; 0: nobody asks for it
+  bool all_overhangs = false;  ///< of all corners, also of those that no isovertex is nearest to
 };
 
 /// Calls for consecutive slabs go: number_edges(0), number_edges(1), triangulate(0), separate_fans(0), number_edges(2),

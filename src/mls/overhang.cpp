@@ -53,7 +53,11 @@ std::array<float, 3> unpacked_lean(float packed) {
           kLeanOfBits[bits >> (2 * kLeanBits) & kLeanMask]};
 }
 
-float overhang(const CornerBlock& block, int offset, int slab_layers, const std::array<float, 3>& normal, float trim) {
+float own_overhang(const float* record, const std::array<float, 3>& normal) {
+  return across(unpacked_lean(record[kLean]), normal);
+}
+
+float overhang(const CornerBlock& block, int offset, int slab_layers, const std::array<float, 3>& normal) {
   const CornerValues& values = block.values[static_cast<std::size_t>((offset >> 6) / slab_layers)];
   const float* own = nullptr;
   if (block.seen.test(offset) && values.count > 0) own = values.of(block.value_index(offset, slab_layers));
@@ -62,8 +66,6 @@ float overhang(const CornerBlock& block, int offset, int slab_layers, const std:
   if (own != nullptr) {
     sum = unpacked_lean(own[kLean]);
     total = 1;
-    const float alone = across(sum, normal);
-    if (alone < kUpright * trim && block.trusted.test(offset)) return alone;
   }
   for_records_around(block, offset, &Projected::seen, slab_layers, [&](int dx, int dy, int dz, const float* v) {
     if (dot(normal, v + kNormalX) < kSheetCosine) return;

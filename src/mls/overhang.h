@@ -12,7 +12,7 @@
 namespace lamina {
 
 /// A corner that leans by less than this share of the overhang at which rims are cut, and is trusted, has samples on
-/// all sides without asking others.
+/// all sides without asking others: its own lean will do.
 inline constexpr float kUpright = 0.55F;
 /// Neighbours belong to the same sheet while the cosine between their normals is more than this (60 degrees).
 inline constexpr float kSheetCosine = 0.5F;
@@ -25,10 +25,12 @@ inline constexpr float kLeanPerCell = 0.5F;
 float packed_lean(const std::array<float, 3>& lean);
 std::array<float, 3> unpacked_lean(float packed);
 
+/// The length of a corner's own lean along the surface with this normal (support radii); `record`: its values.
+float own_overhang(const float* record, const std::array<float, 3>& normal);
+
 /// The length, along the surface, of the mean lean of a corner and its neighbours on the same sheet (support radii); 1
 /// where there are none. `block` and `offset`: the corner in the finest level that holds it, whose slabs have so many
-/// layers in a leaf; `normal`: its own. The slabs around must be projected. That of a corner that is upright for a cut
-/// at `trim` is its own lean.
-float overhang(const CornerBlock& block, int offset, int slab_layers, const std::array<float, 3>& normal, float trim);
+/// layers in a leaf; `normal`: its own. The slabs around must be projected.
+float overhang(const CornerBlock& block, int offset, int slab_layers, const std::array<float, 3>& normal);
 
 }  // namespace lamina

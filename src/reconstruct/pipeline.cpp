@@ -86,7 +86,8 @@ void Pipeline::number_to(std::int32_t slab, Stopwatch& watch) {
   for (; numbered_ < std::min(slab + 1, stages_.of(Stage::number).end); ++numbered_) {
     IsoSlab* below = iso_.empty() ? nullptr : iso_.back().get();
     std::shared_ptr<IsoSlab> here = output_.spare();
-    number_edges(window_, numbered_, {plan_.doubtful, static_cast<float>(plan_.trim)}, below, *here);
+    const CornerRule rule{plan_.doubtful, static_cast<float>(plan_.trim), plan_.cluster == ClusterMode::none};
+    number_edges(window_, numbered_, rule, below, *here);
     isovertices_ += here->vertices.size();
     if (volume_ != nullptr) watch.time("volume", [&] { volume_->add(window_, *here, numbered_); });
     iso_.push_back(std::move(here));
