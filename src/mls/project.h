@@ -2,6 +2,7 @@
 // (Cuccuru et al. 2009, section 3.2), on the window's layers of one slab.
 #pragma once
 #include <cstdint>
+#include <limits>
 #include <memory>
 
 #include "mls/kernel.h"
@@ -18,6 +19,8 @@ struct ProjectSettings {
   int steps = 1;          ///< N >= 1: almost orthogonal projection steps (Alexa & Adamson 2004)
   float tolerance = 0;    ///< a point is done when a step moves it no more than so many supports; 0: next to nothing
   float band = 2.25F;     ///< a corner keeps a value only if a sample lies this near, in cells of the sample's level
+  /// And, where samples say exactly where the surface is, only if it lies this near to such a sample's tangent plane.
+  float height = std::numeric_limits<float>::infinity();
   /// A point whose samples' mean normal is shorter than this sees two sheets, or one bent sharply, and counts only the
   /// samples on its own side, that face where the mean does; 0: all count always.
   float sheets = 0.8F;

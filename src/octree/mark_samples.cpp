@@ -25,21 +25,34 @@ typedef std::int16_t FourRows __attribute__((vector_size(8)));   // NOLINT(moder
 /// Four rows of 16 bits, from the lowest bits up.
 using RowWord = std::uint64_t;
 
-/// Of the 4^3 corners around a cell, from one below its low corner on, those less than `radius` from a point in the
-/// cell (all in cells): rows of x, a word per layer.
-std::array<RowWord, 4> corners_within(const std::array<float, 3>& point, float radius) {
-  const auto squares = [](float at) {
-    const Four d = Four{-1, 0, 1, 2} - at;
-    return d * d;
-  };
-  const Four dx = squares(point[0]);
-  const Four dy = squares(point[1]);
-  const Four dz = squares(point[2]);
+/// A sample as its cell sees it: all in cells, from the cell's low corner.
+struct InCell {
+  std::array<float, 3> point, normal;
+  float radius, height;
+};
+
+/// Of the 4^3 corners around a cell, from one below its low corner on, those that a sample in the cell acts on: rows of
+/// x, a word per layer.
+std::array<RowWord, 4> corners_near(const InCell& sample) {
+  const auto from_sample = [&](std::size_t axis) { return Four{-1, 0, 1, 2} - sample.point[axis]; };
+  const Four dx = from_sample(0);
+  const Four dy = from_sample(1);
+  const Four dz = from_sample(2);
+  const Four x2 = dx * dx;
+  const Four y2 = dy * dy;
+  const Four up_x = dx * sample.normal[0];
+  const Four up_y = dy * sample.normal[1];
+  const Four up_z = dz * sample.normal[2];
   std::array<RowWord, 4> out;
   for (int z = 0; z < 4; ++z) {
-    const Four left = (radius * radius - dz[z]) - dy;  // a lane a row
+    const Four left = (sample.radius * sample.radius - dz[z] * dz[z]) - y2;  // a lane a row
+    const Four up = up_y + up_z[z];
     FourInts rows{};
-    for (int x = 0; x < 4; ++x) rows |= (left > dx[x] + Four{}) & (1 << x);
+    for (int x = 0; x < 4; ++x) {
+      const Four height = up + up_x[x];
+      const FourInts near = (height < Four{} + sample.height) & (height > Four{} - sample.height);
+      rows |= (left > x2[x] + Four{}) & near & (1 << x);
+    }
     out[static_cast<std::size_t>(z)] = std::bit_cast<RowWord>(__builtin_convertvector(rows, FourRows));
   }
   return out;
@@ -58,7 +71,7 @@ class BlockMarks {
   [[nodiscard]] bool holds(int level, const Block& home) const { return level == level_ && home == home_; }
 
   void mark_cell(int offset) { cells_[static_cast<std::size_t>(offset >> 6)] |= std::uint64_t{1} << (offset & 63); }
-  /// The corners around a cell of the block, as of corners_within().
+  /// The corners around a cell of the block, as of corners_near().
   void mark_corners(int offset, const std::array<RowWord, 4>& layers) {
     for (int k = 0; k < 4; ++k) {
       std::uint16_t* const rows =
@@ -128,9 +141,11 @@ void mark_samples(Window& window, std::span<const Mark> marks) {
       return static_cast<float>(std::int64_t{v} - std::int64_t{low} * a) * inv;
     };
     block.mark_cell(offset_in_block(cell));
-    block.mark_corners(
-        offset_in_block(cell),
-        corners_within({inside(m.x, cell.x), inside(m.y, cell.y), inside(m.z, cell.z)}, m.active_radius * inv));
+    block.mark_corners(offset_in_block(cell),
+                       corners_near({{inside(m.x, cell.x), inside(m.y, cell.y), inside(m.z, cell.z)},
+                                     m.normal,
+                                     m.active_radius * inv,
+                                     m.active_height}));
   }
   for (const BlockMarks& block : blocks) block.write_to(window);
 }

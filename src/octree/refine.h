@@ -1,7 +1,9 @@
 // Adaptive refinement: samples leave their marks in the window, and from these follows which cells of which level
 // exist, and which corners are worth projecting (Cuccuru et al. 2009, section 3.4).
 #pragma once
+#include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 
 #include "octree/window.h"
@@ -13,6 +15,8 @@ struct Mark {
   std::int32_t x, y, z;  ///< fixed-point position
   std::uint8_t level;    ///< coarsest level whose cells are small enough for the sample
   float active_radius;   ///< how far it acts on corners, steps, > 0
+  std::array<float, 3> normal{};
+  float active_height = std::numeric_limits<float>::infinity();  ///< how far along its normal, cells of its level, > 0
 };
 
 /// Notes samples' home cells and the corners they act on among those up to two cells away (on each axis the two below

@@ -35,6 +35,7 @@ void choose_for_even(bool cell_given, double cell, ReconstructionPlan& plan) {
   plan.feed.cell = {cell, Length::Unit::sample_radius};
   plan.projection.trusted_offset = kEvenTrust;
   plan.projection.trusted_samples = kEvenTrustedSamples;
+  plan.projection.height = kEvenHeight;
   if (cell_given) return;
   plan.feed.refine_sheets = true;
   plan.projection.band = kSheetBand;

@@ -43,6 +43,10 @@ inline constexpr double kNoisyCell = 0.7;
 inline constexpr double kNoisyReach = 1.05;
 inline constexpr float kSheetBand = 4;
 
+/// How far (cells) from the tangent planes of an even cloud's samples corners get values. Ends of edges that the
+/// surface crosses are no farther than one; beyond it values are worth next to nothing.
+inline constexpr float kEvenHeight = 1.15F;
+
 /// How far (support radii) a corner's projection may lie from its samples' mean, and how many must act, to be trusted.
 inline constexpr float kEvenTrust = 0.25F;
 inline constexpr int kEvenTrustedSamples = 4;

@@ -53,7 +53,9 @@ void Pipeline::mark(const ActiveBucket& bucket) {
       if (bucket.support[i] <= 0) continue;
       const auto cell = static_cast<float>(plan_.lattice.cell_size(bucket.level[i]));
       const float reach = narrow ? std::min(bucket.support[i], plan_.projection.band * cell) : bucket.support[i];
-      marks[count++] = {bucket.samples.x[i], bucket.samples.y[i], bucket.samples.z[i], bucket.level[i], reach};
+      const LocalSamples& s = bucket.samples;
+      marks[count++] = {
+          s.x[i], s.y[i], s.z[i], bucket.level[i], reach, {s.nx[i], s.ny[i], s.nz[i]}, plan_.projection.height};
     }
     mark_samples(window_, {marks.data(), count});
   });

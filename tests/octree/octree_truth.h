@@ -30,6 +30,13 @@ class OctreeTruth {
     };
     return std::hypot(axis(m.x, corner.x), axis(m.y, corner.y), axis(m.z, corner.z));
   }
+  /// Of a corner above a sample's tangent plane, cells of its level.
+  static double height(const Lattice& lattice, const Mark& m, const Cell& corner) {
+    const double a = lattice.cell_size(m.level);
+    return ((corner.x - m.x / a) * static_cast<double>(m.normal[0]) +
+            (corner.y - m.y / a) * static_cast<double>(m.normal[1]) +
+            (corner.z - m.z / a) * static_cast<double>(m.normal[2]));
+  }
 
   OctreeTruth(const Lattice& lattice, const std::vector<Mark>& marks) : lattice_(lattice) {
     levels.resize(static_cast<std::size_t>(lattice.levels));
@@ -102,7 +109,8 @@ class OctreeTruth {
         continue;
       }
       bool active = std::any_of(samples_.begin(), samples_.end(), [&](const Sample& s) {
-        return s.level == level && distance(lattice_, s.mark, corner) < static_cast<double>(s.mark.active_radius);
+        return s.level == level && distance(lattice_, s.mark, corner) < static_cast<double>(s.mark.active_radius) &&
+               std::abs(height(lattice_, s.mark, corner)) < static_cast<double>(s.mark.active_height);
       });
       for_around(corner, -1, 0, [&](const Cell& c) {
         active =

@@ -37,14 +37,19 @@ struct Marked {
   }
 };
 
-/// A sample whose active radius ends so far from all corners that rounding leaves no doubt.
+/// A sample whose active radius and height end so far from all corners that rounding leaves no doubt.
 Mark decided(const Lattice& lattice, Mark m) {
   const std::int32_t a = lattice.cell_size(m.level);
   const Cell home{floor_div(m.x, a), floor_div(m.y, a), floor_div(m.z, a)};
   for (int i = 0; i < 64; ++i) {
-    const double d = OctreeTruth::distance(lattice, m, home + Cell{i % 4 - 1, i / 4 % 4 - 1, i / 16 - 1});
-    if (std::abs(d - static_cast<double>(m.active_radius)) > 1e-5 * a) continue;
+    const Cell corner = home + Cell{i % 4 - 1, i / 4 % 4 - 1, i / 16 - 1};
+    const double d = OctreeTruth::distance(lattice, m, corner);
+    const double h = std::abs(OctreeTruth::height(lattice, m, corner));
+    if (std::abs(d - static_cast<double>(m.active_radius)) > 1e-5 * a &&
+        std::abs(h - static_cast<double>(m.active_height)) > 1e-5)
+      continue;
     m.active_radius *= 1.001F;
+    m.active_height *= 1.001F;
     i = -1;
   }
   return m;
@@ -64,8 +69,13 @@ Marked random_marks(std::uint64_t seed, int levels) {
     for (int i = 0; i < n; ++i) {
       const auto level = static_cast<std::uint8_t>(between(0, levels - 1));
       const float radius = static_cast<float>(out.lattice.cell_size(level)) * static_cast<float>(between(1, 300)) / 100;
-      out.marks.push_back(decided(out.lattice, {at[0] + between(-width, width), at[1] + between(-width, width),
-                                                at[2] + between(-width, width), level, radius}));
+      Mark mark{at[0] + between(-width, width), at[1] + between(-width, width), at[2] + between(-width, width), level,
+                radius};
+      if (between(0, 1) == 0) {
+        mark.normal = {0.48F, between(0, 1) == 0 ? 0.6F : -0.6F, -0.64F};
+        mark.active_height = static_cast<float>(between(1, 200)) / 100;
+      }
+      out.marks.push_back(decided(out.lattice, mark));
     }
   }
   out.bound();
