@@ -7,6 +7,7 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <span>
 
 #include "lattice/morphology.h"
 
@@ -121,17 +122,26 @@ class TileExtender {
     return n;
   }
 
+  /// A trusted corner in reach of the tile, and where it lies from the tile's origin.
+  struct Found {
+    const float* record;
+    std::int8_t x, y, z;
+  };
+
+  /// Records lie anywhere in memory: all are asked for before the first is looked at.
   void gather_field() {
-    field_.clear(layers_.begin, layers_.end);
+    found_count_ = 0;
     for (int z = layers_.begin - 1; z <= layers_.end; ++z) {
       for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) gather_layer(dx, dy, z);
+        for (int dx = -1; dx <= 1; ++dx) find_records(dx, dy, z);
       }
     }
+    field_.clear(layers_.begin, layers_.end);
+    for (const Found& f : std::span(found_.data(), found_count_)) field_.put(f.x, f.y, f.z, plane_of(f.record));
   }
 
-  /// Layer z, in [-1, 8], of the block's neighbour at (dx, dy) across the sweep axis.
-  void gather_layer(int dx, int dy, int z) {
+  /// Of layer z, in [-1, 8], of the block's neighbour at (dx, dy) across the sweep axis.
+  void find_records(int dx, int dy, int z) {
     const CornerBlock* const from = leaf_->around[CornerBlock::towards(dx, dy, z >> 3)];
     if (from == nullptr) return;
     const int layer = z & 7;
@@ -148,8 +158,10 @@ class TileExtender {
     for (; w != 0; w &= w - 1) {
       const int bit = std::countr_zero(w);
       const std::uint64_t before = active & ((std::uint64_t{1} << bit) - 1);
-      field_.put(dx * 8 + (bit & 7), dy * 8 + (bit >> 3), z,
-                 plane_of(values.of(base + static_cast<std::uint32_t>(std::popcount(before)))));
+      const float* const record = values.of(base + static_cast<std::uint32_t>(std::popcount(before)));
+      __builtin_prefetch(record);
+      found_[found_count_++] = {record, static_cast<std::int8_t>(dx * 8 + (bit & 7)),
+                                static_cast<std::int8_t>(dy * 8 + (bit >> 3)), static_cast<std::int8_t>(z)};
     }
   }
 
@@ -161,6 +173,8 @@ class TileExtender {
   CornerBlock* leaf_ = nullptr;
   LeafLayers layers_{0, 0};
   bool gathered_ = false;  ///< the tile's field
+  std::array<Found, 1000> found_;
+  std::size_t found_count_ = 0;
 };
 
 /// A corner's place in its level.
