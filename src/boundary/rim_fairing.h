@@ -12,12 +12,12 @@
 namespace lamina {
 
 /// Every step takes away what winds from one edge to the next, and half of what takes four edges; corners of a rim lose
-/// less than an edge.
-inline constexpr int kFairingSteps = 2;
+/// about an edge.
+inline constexpr int kFairingSteps = 4;
 
 /// A vertex moves in a step by no more than this share of the least height of the triangles at it, which keep their
 /// side so. (Cuts leave narrow ones.)
-inline constexpr double kMostFairing = 0.5;
+inline constexpr double kMostFairing = 0.35;
 
 /// Takes a streamed mesh slab by slab and gives it back, kFairingSteps slabs later: vertices on the boundary with one
 /// neighbour to either side along it have gone half of the way to the middle between these, kFairingSteps times, across

@@ -13,6 +13,13 @@ namespace {
 /// Where corners themselves say how many projections they need.
 constexpr int kMostProjections = 16;
 
+/// Where rims of noisy clouds are cut.
+double rim_overhang(double blend) {
+  constexpr double kStep = 1e-4;  // so that what is told as an option gives the same mesh
+  const double wanted = kRimOverhang - kRimOverhangPerBlend * std::max(0.0, blend - kRimBlend);
+  return kStep * std::round(wanted / kStep);
+}
+
 /// What noise asks for: supports as wide as it is at each place, and normals that agree.
 void choose_for_noise(const CloudSurvey& survey, const SurfaceSettings& s, double cell, ReconstructionPlan& plan) {
   plan.feed.blend = kNoisyBlend;
@@ -26,7 +33,7 @@ void choose_for_noise(const CloudSurvey& survey, const SurfaceSettings& s, doubl
   plan.refit.per_blend = rough ? kRoughRefitPerBlend : kRefitPerBlend;
   plan.refit.support = static_cast<double>(plan.refit.per_blend) * plan.feed.blend;
   plan.feed.cell = {cell, Length::Unit::sample_radius};
-  plan.trim = kRimOverhang;
+  plan.trim = rim_overhang(plan.feed.blend);
   if (!s.cell) plan.projection.band = static_cast<float>(kNoisyReach / cell);
 }
 

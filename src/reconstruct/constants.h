@@ -55,6 +55,10 @@ inline constexpr int kEvenTrustedSamples = 4;
 /// support averages chance out, so noisy clouds can be cut a little inside of it, which takes most of the flakes of
 /// strays along.
 inline constexpr double kRimOverhang = 0.19;
+/// And so much less for each by which the usual H is more than this: the same way from the samples is a smaller share
+/// of a wider support.
+inline constexpr double kRimOverhangPerBlend = 0.01;
+inline constexpr double kRimBlend = 2;
 inline constexpr double kCleanRimOverhang = 0.35;
 
 /// Rims up to this long (R) are closed where nobody says otherwise and the surface around tells how: gaps some hundred

@@ -34,15 +34,15 @@ struct StageReach {
 };
 
 inline constexpr std::array<StageReach, kStages> kStageReach{{
-    {"mark", 3 + kTouchSlabs, 12 + kTouchSlabs, 10 + kTouchSlabs, "samples touch cells three slabs away"},
-    {"refine", 3, 12, 10, "a corner belongs to the cells of the slab below, too"},
-    {"place", 3, 11, 10, "corners of the cells; the values of a slab are extended from those above it"},
-    {"project", 3, 11, 10, "as place; with diffusion a slab more below, for the centres of its cells"},
-    {"extend", 2, 10, 9, "signs by the values around, a slab either way"},
-    {"number", 1, 10, 9, "an edge's ends lie in its slab and on the first plane above"},
-    {"triangulate", 0, 10, 8,
-     "clusters look two slabs down and two up, fans and vertices at one position one further down, rims four further "
-     "down and five up"},
+    {"mark", 3 + kTouchSlabs, 14 + kTouchSlabs, 12 + kTouchSlabs, "samples touch cells three slabs away"},
+    {"refine", 3, 14, 12, "a corner belongs to the cells of the slab below, too"},
+    {"place", 3, 13, 12, "corners of the cells; the values of a slab are extended from those above it"},
+    {"project", 3, 13, 12, "as place; with diffusion a slab more below, for the centres of its cells"},
+    {"extend", 2, 12, 11, "signs by the values around, a slab either way"},
+    {"number", 1, 12, 11, "an edge's ends lie in its slab and on the first plane above"},
+    {"triangulate", 0, 12, 10,
+     "clusters look two slabs down and two up, fans and vertices at one position one further down, rims six further "
+     "down and seven up"},
 }};
 
 constexpr const StageReach& reach_of(Stage stage) {

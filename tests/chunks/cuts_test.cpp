@@ -56,10 +56,10 @@ RC_GTEST_PROP(Cuts, FollowEachOtherAndAreAsEvenAsCanBe, ()) {
 }
 
 TEST(Cuts, SlabsBesideAChunkCost) {
-  const std::vector<double> cost(20, 1.0);
-  EXPECT_DOUBLE_EQ(chunk_cost(cost, 0, 20), 20);
-  EXPECT_DOUBLE_EQ(chunk_cost(cost, 10, 12), 2 + 0.7 * 18);
-  EXPECT_DOUBLE_EQ(chunk_cost(cost, 0, 2), 2 + 0.7 * 10);
+  const std::vector<double> cost(60, 1.0);
+  EXPECT_DOUBLE_EQ(chunk_cost(cost, 0, 60), 60);
+  EXPECT_DOUBLE_EQ(chunk_cost(cost, 30, 32), 2 + 0.7 * 25);
+  EXPECT_DOUBLE_EQ(chunk_cost(cost, 0, 2), 2 + 0.7 * 12);
   // So the chunks at the ends are longer.
   const auto spans = cut(cost, 0, 3);
   EXPECT_GT(spans[0].end - spans[0].begin, spans[1].end - spans[1].begin);
