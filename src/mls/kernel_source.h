@@ -112,7 +112,7 @@ void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count,
   Vec wr = vec(sums[kWR]);
   Vec nearest = vec(sums[kNearest]);
   Vec seen = vec(sums[kSeen]);
-  std::array<Vec, (A > 0 ? A : 1)> own{};
+  std::array<Vec, std::max(A, 1)> own{};
   for (int a = 0; a < A; ++a) own[a] = vec(sums[kSums + a]);
   const Vec seen_before = seen;
   const Vec zero = splat(0.0F);

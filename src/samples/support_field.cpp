@@ -42,6 +42,7 @@ float typical_distance(const std::vector<SupportPlace>& places) {
 
 SupportField::SupportField(const std::vector<SupportPlace>& places) {
   std::vector<float> sorted;
+  sorted.reserve(places.size());
   for (const SupportPlace& p : places) sorted.push_back(p.blend);
   const auto [least, most] = std::minmax_element(sorted.begin(), sorted.end());
   least_ = *least;

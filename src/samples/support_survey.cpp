@@ -170,7 +170,11 @@ std::optional<float> height_over(float disk, TrialScratch& scratch) {
 /// units of the reach, else 0.
 std::optional<Trial> try_disks(const SeedNeighbourhoods& of, std::size_t seed, double given, TrialScratch& scratch) {
   const Eigen::Vector3f own = of.normal(seed).cast<float>();
-  auto& [found, places, squared, residuals, sorted, neighbours] = scratch;
+  std::vector<std::uint32_t>& found = scratch.found;
+  std::vector<Eigen::Vector3f>& places = scratch.places;
+  std::vector<float>& squared = scratch.squared;
+  std::vector<float>& sorted = scratch.sorted;
+  FlatNeighbours& neighbours = scratch.neighbours;
   found.clear();
   places.clear();
   squared.clear();
