@@ -11,7 +11,6 @@
 
 #include <Eigen/Core>
 
-#include "base/hashing.h"
 #include "lattice/lattice.h"
 #include "mls/tile_samples.h"
 #include "samples/consensus_plane.h"
@@ -218,9 +217,7 @@ void RefitNormals::add(std::size_t bucket, const LocalSamples& samples, const st
     const float q = radii[i] > 0 ? unit / radii[i] : 0.0F;
     const float support =
         local ? settings_.per_blend * local->at(s.x[i], s.y[i], s.z[i]) : static_cast<float>(settings_.support);
-    // By place, for the order of the input may tell one side from the other.
-    const bool spared = settings_.halved && support > kManyAct && scrambled(cell_hash(s.x[i], s.y[i], s.z[i])) % 2 == 0;
-    added->bucket.support[i] = spared ? 0 : support * std::min(radii[i], settings_.max_radius);
+    added->bucket.support[i] = support * std::min(radii[i], settings_.max_radius);
     added->bucket.weight[i] = q * q * (samples.quality.empty() ? 1.0F : samples.quality[i]);
   }
   const auto [low, high] = std::minmax_element(s.z.begin(), s.z.end());

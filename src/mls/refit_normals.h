@@ -25,9 +25,6 @@ inline constexpr float kBlurredVariance = 0.0005F;
 inline constexpr float kNoiseVariance = 0.1F;
 inline constexpr float kShapeRatio = 3;
 
-/// Where samples act farther than this (radii), some hundred act on each other, and half of them may do.
-inline constexpr float kManyAct = 2.9F;
-
 struct RefitSettings {
   double support = 0;    ///< radii within which a sample acts, about that where it follows places; 0: normals stay
   float max_radius = 0;  ///< a longer radius acts as this, steps, > 0: how far is known before streaming
@@ -36,7 +33,6 @@ struct RefitSettings {
   /// Instead of all normals, noisy ones, only those are replaced that were interpolated over a sharp edge, by those of
   /// the planes that the samples' neighbours lie on (samples/consensus_plane.h).
   bool only_blurred = false;
-  bool halved = false;  ///< half of the samples act where many do: for normals that are not rough
   /// Null: the same everywhere; else the radii are so many times H.
   std::shared_ptr<const SupportField> by_place{};
   float per_blend = 0;

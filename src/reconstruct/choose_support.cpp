@@ -29,7 +29,6 @@ void choose_for_noise(const CloudSurvey& survey, const SurfaceSettings& s, doubl
   }
   const bool rough = static_cast<double>(survey.radii.normal_noise) * 180 / std::numbers::pi > kRoughNormals;
   plan.refit.by_place = plan.feed.support;
-  plan.refit.halved = !rough;
   plan.refit.per_blend = rough ? kRoughRefitPerBlend : kRefitPerBlend;
   plan.refit.support = static_cast<double>(plan.refit.per_blend) * plan.feed.blend;
   plan.feed.cell = {cell, Length::Unit::sample_radius};
@@ -80,7 +79,6 @@ void choose_support(const SurfaceSettings& s, const CloudSurvey& survey, const P
   if (s.refit) {
     plan.refit.support = *s.refit;
     plan.refit.by_place = nullptr;
-    plan.refit.halved = false;
   }
   plan.projection.creases = s.features.value_or(!s.blend && radii.noise <= kSharp) && !s.diffuse;
   if (plan.projection.creases && !s.refit && radii.noise <= kExact && radii.blurred > kBlurred) {
