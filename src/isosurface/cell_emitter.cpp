@@ -4,7 +4,7 @@
 #include <atomic>
 #include <limits>
 
-#include "isosurface/number_edges.h"
+#include "isosurface/extract.h"
 
 namespace lamina {
 namespace {

@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "isosurface/extract.h"
 #include "isosurface/loops.h"
-#include "isosurface/triangulate.h"
 #include "octree/window.h"
 
 namespace lamina {

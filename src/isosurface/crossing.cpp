@@ -1,4 +1,4 @@
-#include "isosurface/crossing.h"
+#include "isosurface/tile_view.h"
 
 #include <algorithm>
 #include <atomic>

@@ -1,4 +1,4 @@
-#include "isosurface/number_edges.h"
+#include "isosurface/extract.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include "base/vectors.h"
-#include "isosurface/crossing.h"
+#include "isosurface/tile_view.h"
 #include "mls/extension.h"
 #include "mls/overhang.h"
 #include "mls/sheets.h"

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <vector>
 
-#include "isosurface/triangulate.h"
+#include "isosurface/extract.h"
 
 namespace lamina {
 namespace {

@@ -1,4 +1,4 @@
-#include "isosurface/triangulate.h"
+#include "isosurface/extract.h"
 
 #include <tbb/parallel_for.h>
 

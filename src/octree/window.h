@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "lattice/lattice.h"
-#include "octree/ask_ahead.h"
 #include "octree/corner_block.h"
 
 namespace lamina {

@@ -6,8 +6,7 @@
 #include <memory>
 #include <optional>
 
-#include "isosurface/number_edges.h"
-#include "isosurface/triangulate.h"
+#include "isosurface/extract.h"
 #include "levelset/surface_volume.h"
 #include "mls/project.h"
 #include "octree/window.h"

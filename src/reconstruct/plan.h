@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "boundary/hole_closer.h"
-#include "isosurface/number_edges.h"
+#include "isosurface/extract.h"
 #include "lamina/surface.h"
 #include "lattice/lattice.h"
 #include "meshes/mesh_sink.h"

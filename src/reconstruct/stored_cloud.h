@@ -11,7 +11,7 @@
 #include "lamina/points.h"
 #include "lamina/run.h"
 #include "lamina/surface.h"
-#include "samples/outliers.h"
+#include "samples/cleaning.h"
 #include "samples/support_field.h"
 #include "store/ingest.h"
 

@@ -15,7 +15,6 @@
 #include "edit/rows.h"
 #include "lamina/clean.h"
 #include "lamina/error.h"
-#include "samples/strays.h"
 #include "store/ingest.h"
 
 namespace lamina {

@@ -1,4 +1,4 @@
-#include "samples/density_octree.h"
+#include "samples/sampling_survey.h"
 
 #include <algorithm>
 #include <array>

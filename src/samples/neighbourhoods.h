@@ -15,9 +15,9 @@
 #include <vector>
 
 #include "lattice/lattice.h"
+#include "samples/cleaning.h"
 #include "samples/median_split.h"
 #include "samples/nearest.h"
-#include "samples/outliers.h"
 #include "store/slab_store.h"
 
 namespace lamina {

@@ -1,4 +1,4 @@
-#include "samples/outliers.h"
+#include "samples/cleaning.h"
 
 #include <fmt/format.h>
 #include <tbb/parallel_for.h>

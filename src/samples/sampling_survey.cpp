@@ -10,7 +10,6 @@
 
 #include "base/vectors.h"
 #include "samples/consensus_plane.h"
-#include "samples/density_octree.h"
 
 namespace lamina {
 namespace {

@@ -1,4 +1,4 @@
-#include "samples/strays.h"
+#include "samples/cleaning.h"
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>

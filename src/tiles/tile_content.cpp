@@ -1,4 +1,4 @@
-#include "tiles/tile_content.h"
+#include "tiles/tile_mesh.h"
 
 #include <meshoptimizer.h>
 

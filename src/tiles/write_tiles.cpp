@@ -28,7 +28,6 @@
 #include "meshes/stored_mesh.h"
 #include "simplify/matching.h"
 #include "tiles/georeference.h"
-#include "tiles/tile_content.h"
 #include "tiles/tile_mesh.h"
 #include "tiles/tile_octree.h"
 

@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <limits>
 
-#include "isosurface/number_edges.h"
+#include "isosurface/extract.h"
 #include "mls/extension.h"
 #include "mls/project.h"
 #include "octree/refine.h"

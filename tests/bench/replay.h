@@ -7,7 +7,7 @@
 
 #include "bench/scene.h"
 #include "clustering/clusterer.h"
-#include "isosurface/triangulate.h"
+#include "isosurface/extract.h"
 #include "mls/project.h"
 #include "octree/window.h"
 #include "samples/sample_feed.h"

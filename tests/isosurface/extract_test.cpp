@@ -1,5 +1,4 @@
-#include "isosurface/number_edges.h"
-#include "isosurface/triangulate.h"
+#include "isosurface/extract.h"
 
 #include <gtest/gtest.h>
 #include <tbb/task_arena.h>

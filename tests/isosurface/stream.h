@@ -6,8 +6,7 @@
 #include <tuple>
 #include <vector>
 
-#include "isosurface/number_edges.h"
-#include "isosurface/triangulate.h"
+#include "isosurface/extract.h"
 #include "support/mesh_check.h"
 #include "support/octree_window.h"
 

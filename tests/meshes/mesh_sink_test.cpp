@@ -20,80 +20,20 @@
 #include "lamina/error.h"
 #include "lamina/mesh.h"
 #include "lamina/points.h"
+#include "meshes/sunk_mesh.h"
 
 namespace lamina {
 namespace {
 
+using test::kColours;
+using test::outcome;
+using test::outcome_in_child;
+using test::some_triangles;
+using test::some_vertices;
+using test::strip;
+using test::Triangles;
+using test::write_mesh_to;
 using testing::HasSubstr;
-using Triangles = std::vector<std::array<std::uint32_t, 3>>;
-
-const AttributeLayout kColours{{"red", ScalarType::uint8}, {"depth", ScalarType::uint16}, {"w", ScalarType::float32}};
-
-VertexBatch some_vertices(std::size_t first, std::size_t count) {
-  VertexBatch batch;
-  batch.attributes.resize(kColours.size());
-  for (std::size_t i = first; i < first + count; ++i) {
-    const auto v = static_cast<float>(i);
-    batch.x.push_back(std::sin(v));
-    batch.y.push_back(4e6 + v / 7);
-    batch.z.push_back(-v);
-    batch.nx.push_back(v / 3);
-    batch.ny.push_back(1);
-    batch.nz.push_back(-v);
-    batch.attributes[0].push_back(static_cast<float>(i % 256));
-    batch.attributes[1].push_back(static_cast<float>(i % 65536));
-    batch.attributes[2].push_back(v / 11);
-  }
-  return batch;
-}
-
-Triangles some_triangles(std::size_t first, std::size_t count, std::size_t vertices) {
-  Triangles triangles;
-  for (std::size_t i = first; i < first + count; ++i) {
-    triangles.push_back({static_cast<std::uint32_t>(i % vertices), static_cast<std::uint32_t>((i * 7 + 1) % vertices),
-                         static_cast<std::uint32_t>((i * 31 + 2) % vertices)});
-  }
-  return triangles;
-}
-
-/// Runs `work` and gives its error's message, "code: message".
-std::string outcome(const std::function<void()>& work) {
-  try {
-    work();
-  } catch (const Error& e) {
-    return std::to_string(static_cast<int>(e.code())) + ": " + e.what();
-  }
-  return "nothing";
-}
-
-/// The same in a process of its own, whose limits and mounts end with it.
-std::string outcome_in_child(const std::function<void()>& work) {
-  int ends[2];
-  if (::pipe(ends) != 0) return "no pipe";
-  const pid_t child = ::fork();
-  if (child == 0) {
-    const std::string text = outcome(work);
-    const ssize_t n = ::write(ends[1], text.data(), text.size());
-    ::_exit(n == static_cast<ssize_t>(text.size()) ? 0 : 1);
-  }
-  ::close(ends[1]);
-  std::string text;
-  char buffer[512];
-  for (ssize_t n = 0; (n = ::read(ends[0], buffer, sizeof buffer)) > 0;)
-    text.append(buffer, static_cast<std::size_t>(n));
-  ::close(ends[0]);
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  return status == 0 ? text : "the child died";
-}
-
-void write_mesh_to(const MeshSinkSettings& settings, std::size_t vertices, std::size_t triangles) {
-  MeshSink sink(settings);
-  sink.append_vertices(some_vertices(0, vertices));
-  sink.append_triangles(some_triangles(0, triangles, vertices));
-  sink.commit();
-}
-
 TEST(MeshSink, WritesWhatWasAppended) {
   constexpr std::size_t kVertices = 30'000;  // beyond the buffers
   constexpr std::size_t kTriangles = 60'000;
@@ -265,61 +205,6 @@ TEST(MeshSink, DefectsOfTheCallerAreNamed) {
   EXPECT_EQ(folder.entries(), 1);
 }
 
-TEST(MeshSink, FileSizeLimitIsReportedAndNothingLeft) {
-  const test::TemporaryFolder folder;
-  const std::string text = outcome_in_child([&] {
-    std::signal(SIGXFSZ, SIG_IGN);
-    const rlimit limit{1'000'000, 1'000'000};
-    ::setrlimit(RLIMIT_FSIZE, &limit);
-    write_mesh_to({.path = folder / "mesh.ply", .attributes = kColours}, 100'000, 10);
-  });
-  EXPECT_THAT(text, HasSubstr("4: " + (folder / "mesh.ply") + ": cannot be written: File too large"));
-  EXPECT_EQ(folder.entries(), 0);
-}
-
-/// In a small file system of its own, seen by the child process alone.
-std::string outcome_on_small_disk(const std::string& where, const std::function<void()>& work) {
-  return outcome_in_child([&] {
-    if (::unshare(CLONE_NEWNS) != 0 || ::mount("none", "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
-        ::mount("none", where.c_str(), "tmpfs", 0, "size=1m") != 0) {
-      throw Error(ExitCode::internal, "no mount");
-    }
-    work();
-  });
-}
-
-TEST(MeshSink, FullDiskIsReportedWhereverItFills) {
-  const test::TemporaryFolder small;
-  const test::TemporaryFolder large;
-  // Vertices too many; faces too many for the temporary folder; each fits but not both together.
-  const std::string vertices = outcome_on_small_disk(
-      small.path(), [&] { write_mesh_to({.path = small / "mesh.ply", .attributes = kColours}, 100'000, 9); });
-  if (vertices == "1: no mount") GTEST_SKIP() << "may not mount";
-  EXPECT_THAT(vertices, HasSubstr("4: " + (small / "mesh.ply") +
-                                  ": cannot be written: No space left on device; free some space"));
-  const std::string faces = outcome_on_small_disk(small.path(), [&] {
-    write_mesh_to({.path = large / "mesh.ply", .tmp_dir = small.path(), .attributes = kColours}, 9, 200'000);
-  });
-  EXPECT_THAT(faces, HasSubstr("4: " + small.path() + ": the temporary face file"));
-  EXPECT_THAT(faces, HasSubstr("No space left on device"));
-  EXPECT_EQ(large.entries(), 0);
-  const std::string both = outcome_on_small_disk(small.path(), [&] {
-    const auto count = [&] { return std::distance(std::filesystem::directory_iterator(small.path()), {}); };
-    const std::string text =
-        outcome([&] { write_mesh_to({.path = small / "mesh.ply", .attributes = kColours}, 15'000, 40'000); });
-    throw Error(ExitCode::internal, text + " left " + std::to_string(count()));
-  });
-  EXPECT_THAT(both, HasSubstr("mesh.ply: cannot be written: No space left on device"));
-  EXPECT_THAT(both, HasSubstr("left 0"));
-}
-
-/// Faces of some_triangles() name a vertex twice now and then, which readers of meshes do not take.
-Triangles strip(std::size_t count) {
-  Triangles triangles;
-  for (std::uint32_t i = 0; i < count; ++i) triangles.push_back({i, i + 1, i + 2});
-  return triangles;
-}
-
 TEST(MeshSink, OtherFormatsHoldTheMeshOfThePly) {
   constexpr std::size_t kVertices = 30'000;  // some blocks
   const AttributeLayout layout{{"red", ScalarType::uint8},
@@ -362,34 +247,6 @@ TEST(MeshSink, OtherFormatsHoldTheMeshOfThePly) {
   }
   EXPECT_EQ(folder.entries(), 4);
   EXPECT_THAT(test::read_file(folder / "mesh.obj").substr(0, 60), HasSubstr("# shift 1 2 3"));
-}
-
-TEST(MeshSink, OtherFormatsFailAsThePlyDoes) {
-  const test::TemporaryFolder folder;
-  const auto write = [&](const std::string& path, const RunContext& run) {
-    MeshSink sink({.path = path, .attributes = kColours});
-    sink.append_vertices(some_vertices(0, 1000));
-    sink.append_triangles(strip(998));
-    sink.commit(run);
-  };
-  for (const char* name : {"mesh.obj", "mesh.off", "mesh.stl"}) {
-    std::atomic<bool> cancelled = true;
-    RunContext run;
-    run.cancel = &cancelled;
-    EXPECT_EQ(outcome([&] { write(folder / name, run); }), "1: cancelled") << name;
-    EXPECT_THAT(outcome([&] { write(folder / (std::string("no/such/") + name), {}); }), HasSubstr("4: ")) << name;
-    const std::string text = outcome_in_child([&] {
-      const rlimit limit{100'000, 100'000};  // the PLY's records fit, the text does not
-      ::setrlimit(RLIMIT_FSIZE, &limit);
-      std::signal(SIGXFSZ, SIG_IGN);
-      MeshSink sink({.path = folder / name, .attributes = kColours});
-      sink.append_vertices(some_vertices(0, 2400));
-      sink.append_triangles(strip(2398));
-      sink.commit();
-    });
-    EXPECT_THAT(text, HasSubstr("4: " + (folder / name) + ": cannot be written")) << name;
-    EXPECT_EQ(folder.entries(), 0) << name;
-  }
 }
 
 TEST(MeshSink, StandardOutputGetsTheSameBytes) {

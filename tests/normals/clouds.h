@@ -112,6 +112,15 @@ inline std::vector<Vector> normals_of(PointSource& source) {
   return normals;
 }
 
+inline NormalsSettings in_mode(NormalsMode mode, int k = 16) {
+  NormalsSettings settings;
+  settings.mode = mode;
+  settings.k = k;
+  return settings;
+}
+
+inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
 struct Found {
   std::vector<Vector> normals;
   NormalsReport report;

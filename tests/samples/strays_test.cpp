@@ -1,4 +1,4 @@
-#include "samples/strays.h"
+#include "samples/cleaning.h"
 
 #include <gtest/gtest.h>
 
