@@ -196,7 +196,8 @@ void Proof::forget(std::span<const std::uint32_t> triangles) {
     faces_[t] = nullptr;
   }
   for (OldProof& proof : proofs_) {
-    for (std::size_t i = 0; i < proof.size && proof.done; ++i) proof.done = !gone[proof.faces[i]];
+    const auto faces = faces_of(proof);
+    proof.done = proof.done && std::none_of(faces.begin(), faces.end(), [&](std::uint32_t f) { return gone[f]; });
   }
 }
 
@@ -232,10 +233,7 @@ void Proof::prove_old(std::uint32_t number) {
   const Triangle& t = old_.triangles[number];
   const auto error = static_cast<double>(old_.errors[number].out);
   if (now_.stars.alive(number) && !changed(number)) {
-    proof.faces[0] = number;
-    proof.size = 1;
-    proof.error = old_.errors[number].out;
-    proof.done = true;
+    keep(proof, old_.errors[number].out, std::span(&number, 1));
     return;
   }
   const Corners corners{old_.positions[t[0]], old_.positions[t[1]], old_.positions[t[2]]};
@@ -244,7 +242,10 @@ void Proof::prove_old(std::uint32_t number) {
   if (const std::uint32_t home = home_of(number); home != kNone) {
     const Overlay::Answer answer = overlay_.prove(corners, PresentView{now_}, home, old_.bound - error);
     const auto seen = overlay_.used();
-    if (answer == Overlay::Answer::near && keep(proof, overlay_.error() + error, seen)) return;
+    if (answer == Overlay::Answer::near) {
+      keep(proof, no_less_than(overlay_.error() + error), seen);
+      return;
+    }
     add_face(home);
     if (answer == Overlay::Answer::likely) {
       for (const std::uint32_t face : seen) add_face(face);
@@ -269,16 +270,21 @@ void Proof::prove_old(std::uint32_t number) {
 }
 
 bool Proof::take_proof(OldProof& proof, const Corners& corners, double error) {
-  return cover_.prove(corners, error, list_, kCuts) && keep(proof, cover_.error(), cover_.used());
+  if (!cover_.prove(corners, error, list_, kCuts)) return false;
+  keep(proof, no_less_than(cover_.error()), cover_.used());
+  return true;
 }
 
-bool Proof::keep(OldProof& proof, double error, std::span<const std::uint32_t> faces) const {
-  if (faces.size() > kFaces) return false;
-  proof.error = no_less_than(error);
-  proof.size = static_cast<std::uint8_t>(faces.size());
-  std::copy(faces.begin(), faces.end(), proof.faces.begin());
+/// A list that is no longer than the one before takes its place.
+void Proof::keep(OldProof& proof, float error, std::span<const std::uint32_t> faces) {
+  if (faces.size() > proof.count) {
+    proof.begin = proved_by_.size();
+    proved_by_.resize(proved_by_.size() + faces.size());
+  }
+  std::copy(faces.begin(), faces.end(), proved_by_.begin() + static_cast<std::ptrdiff_t>(proof.begin));
+  proof.count = static_cast<std::uint32_t>(faces.size());
+  proof.error = error;
   proof.done = true;
-  return true;
 }
 
 void Proof::prove_face(std::uint32_t face) {
@@ -312,8 +318,7 @@ std::vector<Errors> Proof::errors() const {
   std::vector<Errors> errors(back_.size());
   for (std::size_t t = 0; t < back_.size(); ++t) errors[t].back = std::max(back_[t], 0.0F);
   for (const OldProof& proof : proofs_) {
-    for (std::size_t i = 0; i < proof.size; ++i)
-      errors[proof.faces[i]].out = std::max(errors[proof.faces[i]].out, proof.error);
+    for (const std::uint32_t face : faces_of(proof)) errors[face].out = std::max(errors[face].out, proof.error);
   }
   return errors;
 }

@@ -97,18 +97,20 @@ class Proof {
   [[nodiscard]] std::vector<Errors> errors() const;
 
  private:
-  static constexpr std::size_t kFaces = 12;  ///< an old triangle lies near no more
   struct OldProof {
     float error = 0;  ///< of its points to the present mesh, its own added
     bool done = false;
-    std::uint8_t size = 0;
-    std::array<std::uint32_t, kFaces> faces{};
+    std::uint32_t count = 0;  ///< of the present triangles it is near, in proved_by_
+    std::size_t begin = 0;
   };
 
   void prove_old(std::uint32_t number);
   std::uint32_t home_of(std::uint32_t number);
   bool take_proof(OldProof& proof, const Corners& corners, double error);
-  bool keep(OldProof& proof, double error, std::span<const std::uint32_t> faces) const;
+  void keep(OldProof& proof, float error, std::span<const std::uint32_t> faces);
+  [[nodiscard]] std::span<const std::uint32_t> faces_of(const OldProof& proof) const {
+    return {proved_by_.data() + proof.begin, proof.count};
+  }
   void prove_face(std::uint32_t face);
   [[nodiscard]] Corners corners_of(std::uint32_t face) const;
   const Facet* face_facet(std::uint32_t face);
@@ -125,6 +127,7 @@ class Proof {
   std::deque<Facet> facets_;         ///< those asked for
   std::vector<const Facet*> faces_;  ///< of the present triangles; or none yet
   std::vector<OldProof> proofs_;
+  std::vector<std::uint32_t> proved_by_;
   std::vector<float> back_;  ///< of the present triangles; below 0: not proved
   std::vector<std::uint32_t> failures_;
   std::vector<const Facet*> list_;

@@ -23,6 +23,7 @@ namespace lamina {
 namespace {
 
 using test::all_rows;
+using test::kLazFolder;
 using test::kPairs;
 using test::las_of;
 using test::Opened;

@@ -158,6 +158,16 @@ TEST(SimplifyBound, APlaneGoesAtAnyBound) {
   EXPECT_LT(mesh.triangles.size(), before / 2);
 }
 
+/// Hundreds of triangles meet in a corner of a large flat part: what lies there is near all of them at once.
+TEST(SimplifyBound, FlatPartsGoToTheirCreases) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<> noise(-1e-4, 1e-4);
+  TriangleMesh mesh =
+      test::height_field(120, [&](double x, double) { return 0.5 * std::abs(x - 0.5) + noise(random); });
+  simplify_mesh(mesh, {0, 2e-4});
+  EXPECT_LT(mesh.triangles.size(), 600);  // 1037 where only twelve of them are remembered
+}
+
 /// Where proofs fail, contractions are taken back and others tried, between vertices that pieces have in common, too.
 TEST(SimplifyBound, TopologyStaysWhereContractionsAreTakenBack) {
   // More squares than a piece has.
