@@ -127,8 +127,8 @@ class Proof {
   std::deque<Facet> facets_;         ///< those asked for
   std::vector<const Facet*> faces_;  ///< of the present triangles; or none yet
   std::vector<OldProof> proofs_;
-  std::vector<std::uint32_t> proved_by_;
-  std::vector<float> back_;  ///< of the present triangles; below 0: not proved
+  std::vector<std::uint32_t> proved_by_;  ///< present triangles, a list for each proof
+  std::vector<float> back_;               ///< of the present triangles; below 0: not proved
   std::vector<std::uint32_t> failures_;
   std::vector<const Facet*> list_;
   std::vector<std::uint32_t> asked_;     ///< what is in list_

@@ -9,7 +9,6 @@
 #include "lamina/tiles.h"
 #include "meshes/formats.h"
 #include "tiles/georeference.h"
-
 #include "tiles/tile_mesh.h"
 #include "tiles/tile_octree.h"
 

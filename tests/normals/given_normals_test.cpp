@@ -10,21 +10,13 @@
 #include "lamina/normals.h"
 #include "normals/clouds.h"
 
-namespace lamina {
+namespace lamina::test {
 namespace {
-
-using test::compare;
-using test::find_normals;
-using test::Found;
-using test::in_mode;
-using test::kNan;
-using test::Oriented;
-using test::Quality;
 
 /// A cap of the sphere turned inward.
 Oriented flipped_patch(double height, std::size_t& turned) {
   Oriented cloud;
-  test::add_sphere(cloud, 12000, 1);
+  add_sphere(cloud, 12000, 1);
   turned = 0;
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     if (cloud.positions[i][2] < height) continue;
@@ -36,7 +28,7 @@ Oriented flipped_patch(double height, std::size_t& turned) {
 
 TEST(GivenNormals, CheckTellsOfAFlippedPatch) {
   Oriented sphere;
-  test::add_sphere(sphere, 12000, 1);
+  add_sphere(sphere, 12000, 1);
   const NormalsSettings check = in_mode(NormalsMode::check);
   EXPECT_EQ(find_normals(sphere, check, true).report.conflicts.conflicts, 0);
   std::size_t turned = 0;
@@ -63,7 +55,7 @@ std::string warning_of(const NormalsReport& report) {
 
 TEST(GivenNormals, FlippedPatchesAreWarnedOf) {
   Oriented cloud;
-  test::add_sphere(cloud, 12000, 1);
+  add_sphere(cloud, 12000, 1);
   EXPECT_EQ(warning_of(find_normals(cloud, in_mode(NormalsMode::check), true).report), "");
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const bool turned = static_cast<int>(std::floor(4 * cloud.positions[i][2])) % 2 == 0;
@@ -99,7 +91,7 @@ TEST(GivenNormals, ReorientingChangesSignsOnly) {
 
 TEST(GivenNormals, CompletingKeepsWhatIsThere) {
   Oriented cloud;
-  test::add_sphere(cloud, 8000, 1);
+  add_sphere(cloud, 8000, 1);
   const Oriented truth = cloud;
   // Inward ones: the found ones must follow them, not what is outside.
   std::size_t missing = 0;
@@ -122,4 +114,4 @@ TEST(GivenNormals, CompletingKeepsWhatIsThere) {
 }
 
 }  // namespace
-}  // namespace lamina
+}  // namespace lamina::test

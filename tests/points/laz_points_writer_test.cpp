@@ -19,18 +19,13 @@
 #include "points/point_rows.h"
 #include "support/paths.h"
 
-namespace lamina {
+namespace lamina::test {
 namespace {
 
-using test::all_rows;
-using test::kLazFolder;
-using test::kPairs;
-using test::las_of;
-using test::Opened;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-class LazPointsWriter : public test::LazFolder {};
+class LazPointsWriter : public LazFolder {};
 
 TEST_F(LazPointsWriter, AnyRecordsCanBeEncoded) {
   // Records that LASzip wrote: all fields on a random walk, four channels of a scanner, extra bytes; and those whose
@@ -82,7 +77,7 @@ TEST_F(LazPointsWriter, FieldsOfRecordsAreWrittenAgain) {
     const SampleBatch rows = all_rows(*source);
     for (const char* ending : {".las", ".laz"}) {
       const std::string path = folder_ / ("again" + std::string(ending));
-      test::write_rows(path, columns_of(source->info()), rows);
+      write_rows(path, columns_of(source->info()), rows);
       const auto again = open_points(path, all);
       const SampleBatch back = all_rows(*again);
       ASSERT_EQ(back.size(), rows.size());
@@ -121,7 +116,7 @@ TEST_F(LazPointsWriter, FieldsThatNoRecordHasRoomForAreRefused) {
     rows.attributes = {{value}};
     rows.exact.resize(1);
     try {
-      test::write_rows(folder_ / "a.laz", columns, rows);
+      write_rows(folder_ / "a.laz", columns, rows);
       ADD_FAILURE() << value;
     } catch (const Error& e) {
       EXPECT_THAT(e.what(), HasSubstr("a.laz: LAS has room for a classification of 0 to 255 without a fraction"));
@@ -139,7 +134,7 @@ TEST_F(LazPointsWriter, WrittenAsTheRecordsOfLas) {
   for (const PointColumns& c : {PointColumns{.double_positions = true}, columns, coloured}) {
     for (const std::size_t n : {0U, 1U, 2U, 50'000U, 50'001U, 130'007U}) {
       SCOPED_TRACE(fmt::format("{} rows, {} attributes", n, c.attributes.size()));
-      const SampleBatch rows = test::random_rows(c, n, 3);
+      const SampleBatch rows = random_rows(c, n, 3);
       const std::string las = folder_ / "a.las";
       const std::string laz = folder_ / "a.laz";
       for (const std::string& path : {las, laz}) {
@@ -160,7 +155,7 @@ TEST_F(LazPointsWriter, WrittenAsTheRecordsOfLas) {
 TEST_F(LazPointsWriter, TheCoordinateSystemGoesAlong) {
   const std::string crs = "COMPD_CS[\"town grid + heights\",PROJCS[\"town grid\"]]";
   const std::string laz = folder_ / "a.laz";
-  const SampleBatch rows = test::random_rows({.double_positions = true}, 10, 3);
+  const SampleBatch rows = random_rows({.double_positions = true}, 10, 3);
   for (const char* name : {"a.laz", "a.las", "a.ply"}) {
     const std::string path = folder_ / name;
     const auto writer = open_points_writer(path, {.double_positions = true}, {.crs = crs});
@@ -176,4 +171,4 @@ TEST_F(LazPointsWriter, TheCoordinateSystemGoesAlong) {
 }
 
 }  // namespace
-}  // namespace lamina
+}  // namespace lamina::test
