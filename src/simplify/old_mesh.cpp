@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace lamina::simplify {
 namespace {
@@ -126,7 +127,7 @@ const Facet* NearOld::facet(std::uint32_t number) {
   return facets_[number];
 }
 
-/// Where there are many facets the triangle is halved.
+/// Where there are many facets the triangle is halved; one smaller than the bound asks those nearest to its middle.
 bool NearOld::cover(const Corners& triangle, const std::vector<const Facet*>& all, double error, int halvings) {
   if (all.size() <= kFewFacets) {
     if (!cover_.prove(triangle, error, all, kCutsForEach * static_cast<int>(all.size()))) return false;
@@ -138,16 +139,29 @@ bool NearOld::cover(const Corners& triangle, const std::vector<const Facet*>& al
   for (const Facet* facet : all) {
     if (box.meets(facet->corners[0], facet->corners[1], facet->corners[2])) near.push_back(facet);
   }
-  if (near.size() <= kFewFacets) return cover(triangle, near, error, halvings);
-  if (halvings == 0) return false;
   std::size_t longest = 0;
+  const auto length = [&](std::size_t i) { return norm(triangle[(i + 1) % 3] - triangle[i]); };
   for (std::size_t k = 1; k < 3; ++k) {
-    const auto length = [&](std::size_t i) { return norm(triangle[(i + 1) % 3] - triangle[i]); };
     if (length(k) > length(longest)) longest = k;
   }
+  if (near.size() > kFewFacets && (halvings == 0 || length(longest) < old_.bound))
+    keep_nearest(1. / 3 * (triangle[0] + triangle[1] + triangle[2]), near);
+  if (near.size() <= kFewFacets) return cover(triangle, near, error, halvings);
   const Vec3 &a = triangle[longest], &b = triangle[(longest + 1) % 3], &c = triangle[(longest + 2) % 3];
   const Vec3 middle = 0.5 * (a + b);
   return cover({a, middle, c}, near, error, halvings - 1) && cover({middle, b, c}, near, error, halvings - 1);
+}
+
+void NearOld::keep_nearest(const Vec3& place, std::vector<const Facet*>& facets) {
+  std::vector<std::pair<double, const Facet*>> by_distance;
+  by_distance.reserve(facets.size());
+  for (const Facet* facet : facets) by_distance.emplace_back(distance_within(place, *facet, old_.bound), facet);
+  const auto nearer = [](const auto& a, const auto& b) {
+    return a.first != b.first ? a.first < b.first : a.second->id < b.second->id;
+  };
+  std::nth_element(by_distance.begin(), by_distance.begin() + kFewFacets, by_distance.end(), nearer);
+  facets.clear();
+  for (std::size_t i = 0; i < kFewFacets; ++i) facets.push_back(by_distance[i].second);
 }
 
 }  // namespace lamina::simplify

@@ -22,8 +22,6 @@ namespace {
 
 using namespace meshes;
 
-constexpr double kBoundaryWeight = 1;  ///< of planes through boundary edges, beside the squared edge
-
 constexpr std::size_t kPieceTriangles = 24'000;  ///< some 3 MB with queue and quadrics
 constexpr double kRoundShrinks = 0.5;            ///< a round leaves no smaller share of the triangles
 constexpr double kLastRound = 1.15;              ///< of the wanted ones: what the last round begins with at the most
@@ -34,7 +32,10 @@ constexpr double kHardlyAny =
 
 constexpr std::uint64_t kPieceKeeps = 8;  ///< one in so many triangles, where a limit of the cost says how far to go
 
-constexpr int kBoundRounds = 3;  ///< with a bound: a round goes as far as it can, the others clear what it held fast
+// With a bound:
+constexpr double kFirstBound = 0.125;  ///< of the median edge: few triangles lie so near another; no step is less
+constexpr double kBoundGrows = 4;      ///< from one step to the next; what a step has used up is missing in the last
+constexpr int kBoundRounds = 3;  ///< of the last step: the first goes as far as it can, others clear what it held fast
 
 /// Where a round cuts: different from the two before it.
 double share_of_round(int round) {
@@ -118,11 +119,11 @@ class Round {
     return all;
   }
 
-  /// As far as the bound goes. Pieces are made one after the other: proofs take memory.
-  void exhaust(const RunContext& run) {
+  /// As far as a bound goes. Pieces are made one after the other: proofs take memory.
+  void exhaust(double bound, const RunContext& run) {
     tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) {
       if (run.cancelled()) return;
-      make_piece(p);
+      make_piece(p, bound);
       Contractor& c = *pieces_[p];
       for (float dearest = 0; !run.cancelled() && !std::isinf(c.next_cost());) {
         dearest = std::max(c.next_cost(), 2 * dearest);
@@ -176,14 +177,14 @@ class Round {
     tbb::parallel_for(std::size_t{0}, pieces_.size(), [&](std::size_t p) { make_piece(p); });
   }
 
-  void make_piece(std::size_t p) {
+  void make_piece(std::size_t p, double bound = 0) {
     std::vector<std::uint32_t>& number = numbers_.local();
     if (number.empty()) number.resize(owner_.size(), kNone);
     std::vector<std::uint32_t>& vertices = vertices_[p];
     Piece piece;
     piece.centre = work_.centre;
     piece.floats = work_.floats;
-    piece.bound = work_.bound;
+    piece.bound = bound;
     piece.triangles.reserve(triangles_of(p).size());
     for (const std::uint32_t t : triangles_of(p)) {
       Triangle local = work_.mesh.triangles[t];
@@ -272,70 +273,6 @@ class Round {
 
 }  // namespace
 
-WorkMesh begin_work_mesh(TriangleMesh& mesh) {
-  WorkMesh work{mesh, std::vector<Quadric>(mesh.positions.size())};
-  Vec3 low = mesh.positions[mesh.triangles[0][0]], high = low;
-  work.floats = true;
-  for (const Triangle& t : mesh.triangles) {
-    for (const std::uint32_t v : t) {
-      for (std::size_t k = 0; k < 3; ++k) {
-        const double c = mesh.positions[v][k];
-        low[k] = std::min(low[k], c);
-        high[k] = std::max(high[k], c);
-        work.floats = work.floats && static_cast<double>(static_cast<float>(c)) == c;
-      }
-    }
-  }
-  work.centre = 0.5 * (low + high);
-  return work;
-}
-
-namespace {
-
-/// Of a corner of a work mesh, about its centre.
-Vec3 local_place(const WorkMesh& work, std::uint32_t v) {
-  return work.mesh.positions[v] - work.centre;
-}
-Vec3 local_normal(const WorkMesh& work, const Triangle& t) {
-  const Vec3 a = local_place(work, t[0]);
-  return cross(local_place(work, t[1]) - a, local_place(work, t[2]) - a);
-}
-
-}  // namespace
-
-void add_planes(WorkMesh& work) {
-  for (const Triangle& t : work.mesh.triangles) {
-    const Vec3 n = local_normal(work, t);
-    const double twice = norm(n);
-    if (!(twice > 0)) continue;
-    const Quadric plane = plane_quadric(local_place(work, t[0]), (1 / twice) * n, 0.5 * twice, kNormalNoise);
-    for (const std::uint32_t v : t) work.quadrics[v] += plane;
-  }
-}
-
-void add_walls(WorkMesh& work, const measure::EdgeTable& edges) {
-  edges.for_each_edge([&](std::span<const measure::Side> sides) {
-    if (sides.size() != 1) return;
-    const std::uint32_t corner = sides[0].corner;
-    const Triangle& t = work.mesh.triangles[corner / 3];
-    const std::uint32_t u = t[corner % 3], v = t[sides[0].next_corner() % 3];
-    if (!work.locked.empty() && work.locked[u] != 0 && work.locked[v] != 0) return;
-    const Vec3 edge = local_place(work, v) - local_place(work, u), n = local_normal(work, t);
-    if (!(norm(n) > 0)) return;
-    const Quadric wall = plane_quadric(local_place(work, u), unit(cross(edge, unit(n))),
-                                       kBoundaryWeight * dot(edge, edge), kNormalNoise);
-    work.quadrics[u] += wall;
-    work.quadrics[v] += wall;
-  });
-}
-
-WorkMesh make_work_mesh(TriangleMesh& mesh, const measure::EdgeTable& edges) {
-  WorkMesh work = begin_work_mesh(mesh);
-  add_planes(work);
-  add_walls(work, edges);
-  return work;
-}
-
 std::uint64_t contract_to(WorkMesh& work, std::uint64_t wanted, const RunContext& run) {
   const auto times_wanted = [&](double factor) {
     return static_cast<std::uint64_t>(factor * static_cast<double>(wanted));
@@ -375,17 +312,48 @@ CostCurve sample_costs(WorkMesh& work, std::size_t stride) {
   return Round(work, share_of_round(0)).costs(stride);
 }
 
+namespace {
+
+/// A bound of many edges is approached in steps: each has a mesh of fewer triangles to ask and to prove. The last is
+/// the bound itself; one larger than the mesh needs no more steps than its size.
+std::vector<double> steps_to_bound(const WorkMesh& work) {
+  std::vector<double> lengths;
+  lengths.reserve(work.mesh.triangles.size());
+  double farthest = 0;
+  for (const Triangle& t : work.mesh.triangles) {
+    const Vec3& a = work.mesh.positions[t[0]];
+    lengths.push_back(norm(work.mesh.positions[t[1]] - a));
+    farthest = std::max(farthest, norm(a - work.centre));
+  }
+  std::vector<double> steps{work.bound};
+  if (lengths.empty()) return steps;
+  const auto median = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+  std::nth_element(lengths.begin(), median, lengths.end());
+  const double least = kFirstBound * *median;
+  for (double next = std::min(work.bound, farthest) / kBoundGrows; least > 0 && next >= least; next /= kBoundGrows)
+    steps.push_back(next);
+  std::reverse(steps.begin(), steps.end());
+  return steps;
+}
+
+}  // namespace
+
 std::uint64_t contract_within(WorkMesh& work, const RunContext& run) {
   if (work.errors.empty()) work.errors.assign(work.mesh.triangles.size(), {});
   if (work.tried.empty()) work.tried.assign(work.mesh.positions.size(), 0);
+  const std::vector<std::uint8_t> tried = work.tried;
   std::uint64_t contractions = 0;
-  for (int number = 0; number < kBoundRounds; ++number) {
-    const std::size_t there = work.mesh.triangles.size();
-    Round round(work, share_of_round(number));
-    round.exhaust(run);
-    contractions += round.finish();
-    const std::size_t gone = there - work.mesh.triangles.size();
-    if (there <= kPieceTriangles || gone < there / 200) break;
+  int number = 0;
+  for (const double step : steps_to_bound(work)) {
+    work.tried = tried;
+    for (int more = step < work.bound ? 1 : kBoundRounds; more > 0; --more) {
+      const std::size_t there = work.mesh.triangles.size();
+      Round round(work, share_of_round(number++));
+      round.exhaust(step, run);
+      contractions += round.finish();
+      const std::size_t gone = there - work.mesh.triangles.size();
+      if (there <= kPieceTriangles || gone < there / 200) break;
+    }
   }
   return contractions;
 }

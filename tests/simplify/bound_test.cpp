@@ -168,6 +168,19 @@ TEST(SimplifyBound, FlatPartsGoToTheirCreases) {
   EXPECT_LT(mesh.triangles.size(), 600);  // 1037 where only twelve of them are remembered
 }
 
+/// Where hundreds of triangles lie within the bound of any other.
+TEST(SimplifyBound, OneOfManyEdgesLeavesLittle) {
+  TriangleMesh cube = sphere(1, 96, 192);
+  for (Vec3& p : cube.positions) p = (1 / std::max({std::abs(p[0]), std::abs(p[1]), std::abs(p[2])})) * p;
+  for (const double bound : {0.05, 0.2, 0.8, 1e30}) {
+    TriangleMesh fewer = cube;
+    simplify_mesh(fewer, {0, bound});
+    EXPECT_TRUE(check_mesh(fewer).manifold()) << bound;
+    EXPECT_EQ(check_mesh(fewer).euler_characteristic, 2) << bound;
+    EXPECT_LE(fewer.triangles.size(), 40U) << bound;
+  }
+}
+
 /// Where proofs fail, contractions are taken back and others tried, between vertices that pieces have in common, too.
 TEST(SimplifyBound, TopologyStaysWhereContractionsAreTakenBack) {
   // More squares than a piece has.
