@@ -47,6 +47,19 @@ struct Box {
   Vec3 low{}, high{};
 };
 
+/// kFewFacets of them.
+void keep_nearest(const Vec3& place, double within, std::vector<const Facet*>& facets) {
+  std::vector<std::pair<double, const Facet*>> by_distance;
+  by_distance.reserve(facets.size());
+  for (const Facet* facet : facets) by_distance.emplace_back(distance_within(place, *facet, within), facet);
+  const auto nearer = [](const auto& a, const auto& b) {
+    return a.first != b.first ? a.first < b.first : a.second->id < b.second->id;
+  };
+  std::nth_element(by_distance.begin(), by_distance.begin() + kFewFacets, by_distance.end(), nearer);
+  facets.clear();
+  for (std::size_t i = 0; i < kFewFacets; ++i) facets.push_back(by_distance[i].second);
+}
+
 }  // namespace
 
 float no_less_than(double error) {
@@ -145,23 +158,11 @@ bool NearOld::cover(const Corners& triangle, const std::vector<const Facet*>& al
     if (length(k) > length(longest)) longest = k;
   }
   if (near.size() > kFewFacets && (halvings == 0 || length(longest) < old_.bound))
-    keep_nearest(1. / 3 * (triangle[0] + triangle[1] + triangle[2]), near);
+    keep_nearest(1. / 3 * (triangle[0] + triangle[1] + triangle[2]), old_.bound, near);
   if (near.size() <= kFewFacets) return cover(triangle, near, error, halvings);
   const Vec3 &a = triangle[longest], &b = triangle[(longest + 1) % 3], &c = triangle[(longest + 2) % 3];
   const Vec3 middle = 0.5 * (a + b);
   return cover({a, middle, c}, near, error, halvings - 1) && cover({middle, b, c}, near, error, halvings - 1);
-}
-
-void NearOld::keep_nearest(const Vec3& place, std::vector<const Facet*>& facets) {
-  std::vector<std::pair<double, const Facet*>> by_distance;
-  by_distance.reserve(facets.size());
-  for (const Facet* facet : facets) by_distance.emplace_back(distance_within(place, *facet, old_.bound), facet);
-  const auto nearer = [](const auto& a, const auto& b) {
-    return a.first != b.first ? a.first < b.first : a.second->id < b.second->id;
-  };
-  std::nth_element(by_distance.begin(), by_distance.begin() + kFewFacets, by_distance.end(), nearer);
-  facets.clear();
-  for (std::size_t i = 0; i < kFewFacets; ++i) facets.push_back(by_distance[i].second);
 }
 
 }  // namespace lamina::simplify

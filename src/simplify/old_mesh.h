@@ -89,8 +89,6 @@ class NearOld {
  private:
   void search(const Corners& triangle, std::uint32_t begin);
   bool cover(const Corners& triangle, const std::vector<const Facet*>& all, double error, int halvings);
-  /// kFewFacets of them.
-  void keep_nearest(const meshes::Vec3& place, std::vector<const Facet*>& facets);
   const Facet* facet(std::uint32_t number);
 
   const OldMesh& old_;
