@@ -157,10 +157,6 @@ double expected_triangles(const ReconstructionPlan& plan) {
   return cells * (plan.cluster == ClusterMode::none ? 3.3 : 1.8);
 }
 
-std::uint64_t expected_mesh_memory(const ReconstructionPlan& plan, const SlabStore& store) {
-  return static_cast<std::uint64_t>(mesh_memory(plan, store, densest_layer(store, plan.lattice.slab_height())));
-}
-
 std::uint64_t table_bytes(const ReconstructionPlan& plan, const SlabStore& store) {
   double tallest = 0;
   for (std::size_t b = 0; b < store.buckets(); ++b) {

@@ -20,8 +20,9 @@ namespace lamina {
 namespace {
 
 constexpr int kDefaultLevels = 4;
-/// Expected memory from which on slabs are made half as high where the main cells are the finest.
-constexpr std::uint64_t kRoomy = 224u << 20;
+/// Slabs are as high as the coarsest cells. Levels that no radius asks for make none higher than so many median radii:
+/// twice as high would take a third more memory for next to no time.
+constexpr double kSlabRadii = 4.5;
 constexpr int kMaxLevels = 12;
 constexpr std::int32_t kMinSteps = 64;  ///< fixed-point steps a finest cell must have for exact enough positions
 constexpr double kMaxCells = 1 << 20;   ///< finest cells from the origin, the limit of the lattice's keys
@@ -56,6 +57,11 @@ struct Levels {
   int count;
 };
 
+/// `main`: side of the main cells in median radii; `finer`: levels below them.
+int levels_in_slab(double main, int finer) {
+  return std::clamp(1 + finer + static_cast<int>(std::floor(std::log2(kSlabRadii / main))), 1, kDefaultLevels);
+}
+
 /// Main cells follow the median radius; levels are added below for the 1 % smallest and for sheets, and above for the
 /// 1 % largest.
 Levels choose_levels(int asked, const FeedSettings& feed, const RadiusSurvey& radii) {
@@ -64,7 +70,8 @@ Levels choose_levels(int asked, const FeedSettings& feed, const RadiusSurvey& ra
   const int finer = std::max(0, static_cast<int>(std::ceil(std::log2(main / (ratio * radii.low)) - 1e-9))) +
                     (feed.refine_sheets ? 1 : 0);
   const int coarser = std::max(0, static_cast<int>(std::floor(std::log2(ratio * radii.high / main))));
-  const int count = asked > 0 ? asked : std::clamp(finer + coarser + 1, kDefaultLevels, kMaxLevels);
+  const int least = levels_in_slab(kMainCell * ratio, finer);
+  const int count = asked > 0 ? asked : std::clamp(finer + coarser + 1, least, kMaxLevels);
   return {std::ldexp(main, -std::min(finer, count - 1)), count};
 }
 
@@ -84,7 +91,7 @@ Levels addressable(Levels levels, int asked, const FeedSettings& feed, const Ext
     // Detail finer than the lattice can address: the finest level ends there.
     const int skip = static_cast<int>(std::ceil(std::log2(smallest / levels.finest)));
     levels.finest = std::ldexp(levels.finest, skip);
-    levels.count = std::max(asked > 0 ? asked : kDefaultLevels, levels.count - skip);
+    levels.count = std::max(asked > 0 ? asked : std::min(levels.count, kDefaultLevels), levels.count - skip);
   }
   if (levels.finest > kMaxSlab && feed.fixed_cell())
     usage(fmt::format("--cell {}: larger than the whole cloud", feed.cell.value));
@@ -100,7 +107,7 @@ RadiiSettings counting_cells(const SurfaceSettings& s, const ReconstructionPlan&
   RadiiSettings out;
   out.min_samples = s.density;
   double finest_radius = plan.radius.low;
-  out.levels = plan.lattice.levels;
+  out.levels = std::max(plan.lattice.levels, kDefaultLevels);
   if (plan.feed.fixed_cell()) {
     const double octaves = std::log2(std::max(1.0F, plan.radius.high / plan.radius.low));
     out.levels = std::clamp(static_cast<int>(std::ceil(octaves)) + 3, 3, kMaxLevels);
@@ -132,13 +139,16 @@ RadiusSurvey scaled_radii(const SurfaceSettings& s, RadiusSurvey survey, const R
   return survey;
 }
 
-void plan_lattice(const SurfaceSettings& s, int asked_levels, ReconstructionPlan& plan) {
+/// One level in use, whatever the radii.
+Levels fixed_levels(int asked, double cell, double median_radius) {
+  return {cell, asked > 0 ? asked : levels_in_slab(cell / median_radius, 0)};
+}
+
+void plan_lattice(const SurfaceSettings& s, ReconstructionPlan& plan) {
   const bool fixed = plan.feed.fixed_cell();
-  // A fixed cell: one level in use, whatever the radii.
-  const Levels wanted =
-      fixed ? Levels{plan.feed.cell.value / plan.frame.step, asked_levels > 0 ? asked_levels : kDefaultLevels}
-            : choose_levels(asked_levels, plan.feed, plan.radius);
-  const Levels levels = addressable(wanted, asked_levels, plan.feed, plan.extent, plan.frame.step);
+  const Levels wanted = fixed ? fixed_levels(s.levels, plan.feed.cell.value / plan.frame.step, plan.radius.median)
+                              : choose_levels(s.levels, plan.feed, plan.radius);
+  const Levels levels = addressable(wanted, s.levels, plan.feed, plan.extent, plan.frame.step);
   plan.lattice.cell = static_cast<std::int32_t>(std::lrint(levels.finest));
   plan.lattice.levels = levels.count;
   plan.main_level = 0;
@@ -212,14 +222,6 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
   if (cloud.shift) plan.comments.push_back("shift " + shift_text(*cloud.shift));
 }
 
-/// Slabs half as high where memory is short: where most cells are of the finest level, the coarsest of the default
-/// levels only makes slabs higher, which is faster on small clouds, but takes twice the memory. The mesh must not
-/// depend on whether there is a volume beside it, whose memory therefore does not count.
-bool wants_lower_slabs(const SurfaceSettings& s, const ReconstructionPlan& plan, const SlabStore& store) {
-  return s.levels == 0 && plan.lattice.levels == kDefaultLevels && plan.main_level == 0 &&
-         expected_mesh_memory(plan, store) > kRoomy;
-}
-
 }  // namespace
 
 void check_settings(const SurfaceSettings& s) {
@@ -279,8 +281,7 @@ ReconstructionPlan make_plan(const SurfaceSettings& s, const StoredCloud& cloud,
   double max_radius = 0;
   plan.radius = scaled_radii(s, survey.radii, plan, plan.feed.blend, max_radius);
   plan.feed.max_radius = static_cast<float>(max_radius);
-  plan_lattice(s, s.levels, plan);
-  if (wants_lower_slabs(s, plan, store)) plan_lattice(s, kDefaultLevels - 1, plan);
+  plan_lattice(s, plan);
   plan_mesh(s, cloud, plan);
   plan.expected = expected_cost(plan, cloud.ingested);
   return plan;

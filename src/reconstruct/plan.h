@@ -136,9 +136,6 @@ std::string describe_findings(const SurfaceSettings& settings, const SurfaceStat
 /// Of the mesh.
 double expected_triangles(const ReconstructionPlan& plan);
 
-/// Bytes at the peak without a volume and without the window's look-up tables.
-std::uint64_t expected_mesh_memory(const ReconstructionPlan& plan, const SlabStore& store);
-
 /// The whole of it, for a plan that is complete but for its cost.
 ExpectedCost expected_cost(const ReconstructionPlan& plan, const Ingested& cloud);
 

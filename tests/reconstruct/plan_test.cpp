@@ -39,7 +39,7 @@ TEST(SurfacePlan, DescribesTheCloud) {
   EXPECT_NEAR(plan.radius_median, 2 * spacing, 0.4 * spacing);
   EXPECT_LE(plan.radius_low, plan.radius_median);
   EXPECT_GE(plan.radius_high, plan.radius_median);
-  EXPECT_GE(plan.levels, 4);
+  EXPECT_GE(plan.levels, 1);
   EXPECT_NEAR(plan.slab_height, plan.finest_cell * std::exp2(plan.levels - 1), 1e-9);
   EXPECT_NEAR(static_cast<double>(plan.slabs), plan.extent[2] / plan.slab_height, 2);
 }
@@ -48,10 +48,20 @@ TEST(SurfacePlan, LevelsFollowTheSpreadOfRadii) {
   const auto varying = [](double octaves) {
     return test::sphere_cloud(20000, [=](const Point3& v) { return std::exp2(octaves * (v[2] - 1)); });
   };
-  EXPECT_EQ(plan_of(varying(0)).levels, 4);
+  EXPECT_LE(plan_of(varying(0)).levels, 4);
   EXPECT_GT(plan_of(varying(6)).levels, 4);
   EXPECT_EQ(plan_of(varying(6), [](auto& s) { s.levels = 3; }).levels, 3);
   EXPECT_EQ(plan_of(varying(0), [](auto& s) { s.levels = 5; }).levels, 5);
+}
+
+// Samples fill them: memory must not grow with the blending factor.
+TEST(SurfacePlan, SlabsAreAsHighAsSoManyRadii) {
+  const Cloud cloud = test::sphere_cloud(20000);
+  for (const double blend : {0.5, 1.0, 1.2, 2.0, 4.0}) {
+    const SurfacePlan plan = plan_of(cloud, [&](auto& s) { s.blend = blend; });
+    EXPECT_LE(plan.slab_height, 4.6 * plan.radius_median) << blend;
+    EXPECT_GE(plan.slab_height, 2 * plan.radius_median) << blend;
+  }
 }
 
 TEST(SurfacePlan, CellsFollowTheSettings) {
