@@ -118,6 +118,7 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
   j["trim"] = s.plan.trim;
   j["features"] = s.plan.features;
   j["deviation"] = s.plan.deviation;
+  j["lines"] = s.plan.lines;
   j["blurred_normals"] = s.plan.blurred_normals;
   j["close_holes"] = s.plan.longest_rim;
   j["finest_cell"] = s.plan.finest_cell;

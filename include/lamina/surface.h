@@ -140,6 +140,7 @@ struct SurfacePlan {
   std::array<double, 3> noisiest{};  ///< the middle of that stretch
   double normal_noise = 0;           ///< median angle of their normals to that surface's, degrees
   double blurred_normals = 0;        ///< share of normals that are interpolated over sharp edges
+  bool lines = false;                ///< samples lie on lines far apart, such as profiles; not looked at with `blend`
   double blend = 0, refit = 0;       ///< as given or chosen, about that where they follow places
   double least_blend = 0, most_blend = 0;  ///< of all places
   Length cell;

@@ -1,6 +1,7 @@
 #include "normals/directions.h"
 
 #include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -102,6 +103,42 @@ bool is_line(const Plane& plane) {
   return !plane.valid() || plane.middle < kLine * plane.most;
 }
 
+// Lines of samples that lie far apart, as a profile scanner's do. The nearest samples all lie in the scanner's plane
+// then, and where the noise along its rays is as large as their spacing they fill a disc of it.
+constexpr double kGrowth = 3;  ///< samples within twice the distance, on a surface: there are four times as many
+constexpr std::size_t kMostOnLines = 2048;  ///< samples: lines so much farther apart than samples make no surface
+
+/// Samples around one that lie on several lines, nearest first, and their plane.
+struct AcrossLines {
+  std::vector<Neighbour> near;
+  Plane plane;
+};
+
+/// Goes on from the nearest samples, so many and so far away (steps^2), to where there are as many as on a surface.
+/// Returns how often the distance was doubled for it; 0 where that is nowhere within `bound` (steps^2).
+int look_across(const SampleTree& tree, std::uint32_t place, std::size_t count, float squared, float bound,
+                AcrossLines& out) {
+  if (!(squared > 0)) return 0;  // all of them at one place
+  for (int doubled = 1; squared < bound && count < kMostOnLines; ++doubled) {
+    squared = std::min(4 * squared, bound);
+    out.near.clear();
+    Moments m;
+    m.count = 1;
+    tree.within(place, squared, [&](const Neighbour& n, const std::array<float, 3>& offset) {
+      m.add(offset);
+      out.near.push_back(n);
+    });
+    const bool grows = static_cast<double>(out.near.size()) > kGrowth * static_cast<double>(count);
+    count = out.near.size();
+    if (!grows) continue;
+    out.plane = fit_plane(m);
+    if (is_line(out.plane)) continue;
+    std::sort(out.near.begin(), out.near.end());
+    return doubled;
+  }
+  return 0;
+}
+
 /// Of samples outside the slab, and of those whose normals are given.
 constexpr std::uint8_t kNoLevel = 255;
 
@@ -148,12 +185,24 @@ class DirectionFinder {
       taken = count = tree_.nearest(place, wanted, bound_, found.data());
       plane = plane_of(tree_, place, found.data(), count);
     }
-    link(found.data(), count, place, i, links_);
+    float squared = taken > 0 ? found[taken - 1].squared : 0.0F;
+    AcrossLines& across = across_.local();
+    const bool line = is_line(plane) && count == most;
+    // Samples that lie on a surface as near as that are not asked to look farther.
+    const int least = line ? 1 : 2;
+    if ((line || settings_.lines) && taken > 0 && look_across(tree_, place, taken, squared, bound_, across) >= least) {
+      plane = across.plane;
+      taken = across.near.size();
+      squared = across.near.back().squared;
+      link(across.near.data(), taken, place, i, links_);
+    } else {
+      link(found.data(), count, place, i, links_);
+    }
     if (samples_.given[place] != 0) return;
     if (settings_.radius > 0) {
       plane = plane_of_ball(place, plane);
     } else if (taken > 0) {
-      reach_[i] = plane.valid() ? found[taken - 1].squared : 0.0F;
+      reach_[i] = plane.valid() ? squared : 0.0F;
       level_[place] = choose_level(tree_, {place, plane, static_cast<double>(taken + 1), reach_[i], bound_});
     }
     set_normal(place, plane);
@@ -202,6 +251,7 @@ class DirectionFinder {
   Links& links_;
   std::vector<float> reach_;  ///< by number of the core sample: of its first plane, squared; 0 where there is none
   std::vector<std::uint8_t> level_;  ///< by place
+  tbb::enumerable_thread_specific<AcrossLines> across_;
 };
 
 }  // namespace

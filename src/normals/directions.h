@@ -65,6 +65,7 @@ struct DirectionSettings {
   int k = 16;               ///< neighbours the plane is fitted to, where they are not noisy
   float radius = 0;         ///< steps; above 0: all neighbours within it, however many
   float search_radius = 0;  ///< steps: samples farther apart are no neighbours
+  bool lines = false;       ///< many samples lie on lines far apart: neighbours are to be from several of them
 };
 
 /// Finds the links of the samples links.core names, and the normals of those that have none. Where the nearest samples

@@ -30,6 +30,7 @@ constexpr std::uint64_t kLeastSlab = 1 << 17;           ///< samples that keep a
 constexpr double kPatches = 150'000;  ///< of a large cloud; cells and slabs cut them to about twice as many
 constexpr double kLeastPatch = 128;   ///< samples
 constexpr double kMostSteps = 1 << 29;
+constexpr float kLined = 0.1F;  ///< share of samples on lines: of object scans it is under 0.04, of profiles 0.3 to 1
 
 double percent(std::uint64_t part, std::uint64_t whole) {
   return whole == 0 ? 0.0 : 100.0 * static_cast<double>(part) / static_cast<double>(whole);
@@ -68,6 +69,7 @@ Scale scale_of(const NormalsSettings& settings, const SlabStore& store, const Fr
   const double usual = std::sqrt(std::max(settings.k, 16) / 16.0) * double{radii.high};
   constexpr double kSearched = 5;
   s.directions.search_radius = static_cast<float>(steps(std::max(kSearched * usual, double{s.directions.radius})));
+  s.directions.lines = radii.lined > kLined;
   s.window.halo = static_cast<std::int32_t>(s.directions.search_radius);
   const double in_patch = std::max(kLeastPatch, static_cast<double>(store.total()) / kPatches);
   const double cell = std::max(0.5 * double{radii.median} * std::sqrt(in_patch), double{kLeastPatchCell});

@@ -20,13 +20,15 @@ double rim_overhang(double blend) {
   return kStep * std::round(wanted / kStep);
 }
 
+void follow_places(const SupportSurvey& survey, ReconstructionPlan& plan) {
+  plan.feed.support = std::make_shared<const SupportField>(survey.places);
+  plan.feed.blend = static_cast<double>(plan.feed.support->median());
+}
+
 /// What noise asks for: supports as wide as it is at each place, and normals that agree.
 void choose_for_noise(const CloudSurvey& survey, const SurfaceSettings& s, double cell, ReconstructionPlan& plan) {
   plan.feed.blend = kNoisyBlend;
-  if (!survey.support.empty()) {
-    plan.feed.support = std::make_shared<const SupportField>(survey.support);
-    plan.feed.blend = static_cast<double>(plan.feed.support->median());
-  }
+  if (!survey.support.places.empty()) follow_places(survey.support, plan);
   const bool rough = static_cast<double>(survey.radii.normal_noise) * 180 / std::numbers::pi > kRoughNormals;
   plan.refit.by_place = plan.feed.support;
   plan.refit.per_blend = rough ? kRoughRefitPerBlend : kRefitPerBlend;
@@ -48,6 +50,18 @@ void choose_for_even(bool cell_given, double cell, ReconstructionPlan& plan) {
   plan.projection.band = kSheetBand;
 }
 
+/// What lines of samples far apart ask for: supports that reach from one to the next, and cells that are found in the
+/// middle between two.
+void choose_for_lines(const SupportSurvey& survey, ReconstructionPlan& plan) {
+  plan.lines = true;
+  if (plan.feed.support == nullptr) follow_places(survey, plan);
+  plan.feed.cell = {kLinesCell, Length::Unit::influence_radius};
+  plan.projection.band = ProjectSettings{}.band;
+  // Normals were found across lines, and a support may hold one alone.
+  plan.refit.support = 0;
+  plan.refit.by_place = nullptr;
+}
+
 }  // namespace
 
 double choose_deviation(const RadiusSurvey& survey) {
@@ -65,12 +79,13 @@ void choose_support(const SurfaceSettings& s, const CloudSurvey& survey, const P
     plan.feed.blend = *s.blend;
   } else if (radii.noise > kNoisy) {
     choose_for_noise(survey, s, thins ? kNoisyCell : kChosenCell, plan);
-  } else if (radii.high < kEven * radii.low) {
+  } else if (radii.high < kEven * radii.low && !survey.support.lines) {
     choose_for_even(s.cell.has_value(), thins && radii.noise <= kSharp ? kThinnedCell : kChosenCell, plan);
     // A closed mesh. Normals come with samples of a surface, which ends where they do; positions alone say nothing of
     // wide gaps among them.
     plan.holes.watertight = info.found_normals ? Watertight::any_loops : Watertight::short_loops;
   }
+  if (survey.support.lines) choose_for_lines(survey.support, plan);
   if (!s.blend && radii.noise <= kNoisy) plan.trim = kCleanRimOverhang;
   if (s.trim) plan.trim = *s.trim;
   // Rims that are cut where the samples end may run on before.
@@ -80,7 +95,7 @@ void choose_support(const SurfaceSettings& s, const CloudSurvey& survey, const P
     plan.refit.support = *s.refit;
     plan.refit.by_place = nullptr;
   }
-  plan.projection.creases = s.features.value_or(!s.blend && radii.noise <= kSharp) && !s.diffuse;
+  plan.projection.creases = s.features.value_or(!s.blend && radii.noise <= kSharp && !plan.lines) && !s.diffuse;
   if (plan.projection.creases && !s.refit && radii.noise <= kExact && radii.blurred > kBlurred) {
     plan.refit.support = double{kConsensusReach};
     plan.refit.only_blurred = true;

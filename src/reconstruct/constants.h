@@ -26,6 +26,12 @@ inline constexpr double kRoughNormals = 10;
 /// gaps.
 inline constexpr float kEven = 3;
 
+/// Share of samples without neighbours on all sides from which on a clean cloud may lie on lines: of clean objects it
+/// is under 0.1, of lines twelve times as far apart as their samples 0.9.
+inline constexpr float kLopsided = 0.3F;
+/// Largest leaf cell (R) where samples lie on lines: the middle between two is 0.6 R from either, and half a cell more.
+inline constexpr double kLinesCell = 0.5;
+
 /// Largest leaf cell (sample radii) where it is chosen: no more than 1.3 M triangles of a million samples.
 inline constexpr double kChosenCell = 0.892;
 

@@ -264,9 +264,9 @@ std::string normals_text(const SurfaceStats& stats) {
 std::string seen(const SurfaceStats& stats) {
   const SurfacePlan& plan = stats.plan;
   // Density radii are twice the spacing.
-  std::string text = fmt::format("seen: {} samples{}, spacing {:.3g} ({:.3g} to {:.3g}); {}; {}", plan.samples,
+  std::string text = fmt::format("seen: {} samples{}, spacing {:.3g} ({:.3g} to {:.3g}){}; {}; {}", plan.samples,
                                  scans_text(stats), plan.radius_median / 2, plan.radius_low / 2, plan.radius_high / 2,
-                                 noise_text(plan), normals_text(stats));
+                                 plan.lines ? ", on lines" : "", noise_text(plan), normals_text(stats));
   const std::uint64_t strays = stats.cleaned.lonely + stats.cleaned.off_surface;
   if (strays > 0) {
     text += fmt::format("; {} strays ({:.2g} %) left out", strays,
@@ -286,8 +286,9 @@ std::string chosen(const SurfaceSettings& s, const SurfacePlan& plan) {
                          : fmt::format("--blend {:g}", plan.blend));
   add(!s.blend && !s.cell, fmt::format("--cell {}{}", to_string(plan.cell),
                                        plan.refine_sheets ? " (half of it where things are thin)" : ""));
-  add(!s.refit && !s.blend, by_place ? fmt::format("--refit auto ({:.2g} in the middle, by place)", plan.refit)
-                                     : fmt::format("--refit {:g}", plan.refit));
+  add(!s.refit && !s.blend, by_place && plan.refit > 0
+                                ? fmt::format("--refit auto ({:.2g} in the middle, by place)", plan.refit)
+                                : fmt::format("--refit {:g}", plan.refit));
   add(!s.trim && !s.blend, fmt::format("--trim {:g}", plan.trim));
   add(!s.features && !s.blend, fmt::format("--features {}{}", plan.features ? "yes" : "no",
                                            plan.sharpen ? " (and normals found again at edges)" : ""));

@@ -258,7 +258,11 @@ void check_settings(const SurfaceSettings& s) {
 CloudSurvey survey_cloud(const SurfaceSettings& s, const SlabStore& store, const ReadBucket& read) {
   CloudSurvey out;
   out.radii = survey_radii(store, read, kSurveySamples, s.density);
-  if (!s.blend && out.radii.noise > kNoisy) out.support = survey_support(store, read, out.radii);
+  if (s.blend) return out;
+  if (out.radii.noise > kNoisy)
+    out.support = survey_support(store, read, out.radii, SupportAim::noise);
+  else if (out.radii.lopsided > kLopsided)
+    out.support = survey_support(store, read, out.radii, SupportAim::all_round);
   return out;
 }
 
@@ -337,6 +341,7 @@ SurfacePlan summary_of(const ReconstructionPlan& p) {
   out.least_blend = p.feed.support ? static_cast<double>(p.feed.support->least()) : p.feed.blend;
   out.most_blend = p.feed.widest();
   out.refit = p.refit.only_blurred ? 0 : p.refit.support;
+  out.lines = p.lines;
   out.blurred_normals = static_cast<double>(p.radius.blurred);
   out.features = p.projection.creases;
   out.sharpen = p.refit.only_blurred;

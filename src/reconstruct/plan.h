@@ -47,6 +47,7 @@ struct ReconstructionPlan {
   AttributeLayout attributes;
   bool given_radii = false;
   RadiusSurvey radius;  ///< scaled and bounded as the samples' own are
+  bool lines = false;   ///< SupportSurvey::lines
 
   // The octree.
   Lattice lattice;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "base/vectors.h"
+#include "samples/all_round.h"
 #include "samples/consensus_plane.h"
 
 namespace lamina {
@@ -94,6 +95,8 @@ constexpr std::size_t kMost = 512;
 constexpr std::size_t kEnough = 32;  ///< values that make a median
 /// Ratio of the second moments along two axes from which on the neighbours are flat, or on a line.
 constexpr double kFlat = 4;
+/// And from which on they are on a line even if that is flat: of lines far apart a neighbourhood holds one.
+constexpr double kLine = 32;
 /// Half of a normal distribution lies within so many of its deviations.
 constexpr double kMedianDeviation = 0.67;
 
@@ -124,6 +127,7 @@ Deviation deviation(const std::vector<Eigen::Vector3d>& points, const Eigen::Vec
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& p : points) scatter += (p - mean) * (p - mean).transpose();
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(scatter);
+  if (axes.eigenvalues()(2) > kLine * axes.eigenvalues()(1)) return {};
   // A line of samples has no plane. Nor has a ball, but that is what much noise looks like.
   if (!(axes.eigenvalues()(1) > kFlat * axes.eigenvalues()(0))) {
     if (axes.eigenvalues()(2) > kFlat * axes.eigenvalues()(1)) return {};
@@ -188,6 +192,32 @@ bool is_blurred(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3
          found[0] * own.x() + found[1] * own.y() + found[2] * own.z() < kBlurredCosine;
 }
 
+/// Within four times the distance of the nearest eight: on a surface there are sixteen times as many, on a line four.
+bool is_lined(const std::vector<Eigen::Vector3d>& points) {
+  constexpr std::size_t kNear = 8, kFew = 8 * kNear;
+  if (points.size() <= kNear || points.size() == kMost) return false;
+  std::vector<double> squared;
+  squared.reserve(points.size());
+  for (const Eigen::Vector3d& p : points) squared.push_back(p.squaredNorm());
+  std::nth_element(squared.begin(), squared.begin() + kNear - 1, squared.end());
+  const double far = 16 * squared[kNear - 1];
+  if (far > 1) return false;  // neighbours are not known as far
+  return std::count_if(squared.begin(), squared.end(), [&](double d) { return d < far; }) <
+         static_cast<std::ptrdiff_t>(kFew);
+}
+
+/// Radii within which a sample has neighbours on all sides: nine in ten of an evenly sampled surface have.
+constexpr double kAllRoundWithin = 1.4;
+
+bool is_lopsided(const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& normal) {
+  if (normal.isZero()) return false;
+  const Eigen::Vector3d u = normal.unitOrthogonal();
+  const Eigen::Vector3d v = normal.cross(u);
+  AllRound sides;
+  for (const Eigen::Vector3d& p : points) sides.add(static_cast<float>(p.dot(u)), static_cast<float>(p.dot(v)));
+  return !(static_cast<double>(sides.distance()) <= kAllRoundWithin / kNeighbourhood);
+}
+
 /// quantile_of(), or 0 where there are too few values to tell.
 float quantile_of_enough(std::vector<float>& values, double share) {
   return values.size() < kEnough ? 0 : quantile_of(values, share);
@@ -215,6 +245,8 @@ Noise survey_noise(const SlabStore& store, const ReadBucket& read, float radius)
   ConsensusPlane plane;
   std::size_t looked_at = 0;
   std::size_t blurred = 0;
+  std::size_t lopsided = 0;
+  std::size_t lined = 0;
   Noise noise;
   const bool small = store.total() <= kRuns * kRunSamples;
   for (int run = 0; run < (small ? 1 : kRuns); ++run) {
@@ -230,6 +262,8 @@ Noise survey_noise(const SlabStore& store, const ReadBucket& read, float radius)
       gather(around, seed, neighbours);
       if (neighbours.size() < kLeast) continue;
       ++looked_at;
+      lined += is_lined(neighbours) ? 1 : 0;
+      lopsided += is_lopsided(neighbours, around.normal(seed)) ? 1 : 0;
       blurred += is_blurred(neighbours, around.normal(seed), plane) ? 1 : 0;
       const Deviation d = deviation(neighbours, around.normal(seed));
       if (d.distance >= 0) here.push_back(static_cast<float>(d.distance * kNeighbourhood));
@@ -245,7 +279,10 @@ Noise survey_noise(const SlabStore& store, const ReadBucket& read, float radius)
   noise.distance = quantile_of_enough(distances, 0.5);
   noise.high = quantile_of_enough(distances, kAllButATenth);
   noise.angle = quantile_of_enough(angles, 0.5);
-  if (looked_at >= kEnough) noise.blurred = static_cast<float>(blurred) / static_cast<float>(looked_at);
+  if (looked_at < kEnough) return noise;
+  noise.blurred = static_cast<float>(blurred) / static_cast<float>(looked_at);
+  noise.lined = static_cast<float>(lined) / static_cast<float>(looked_at);
+  noise.lopsided = static_cast<float>(lopsided) / static_cast<float>(looked_at);
   return noise;
 }
 
@@ -291,6 +328,8 @@ RadiusSurvey survey_radii(const SlabStore& store, const ReadBucket& read, std::u
   survey.normal_noise = noise.angle;
   survey.high_noise = noise.high;
   survey.blurred = noise.blurred;
+  survey.lopsided = noise.lopsided;
+  survey.lined = noise.lined;
   survey.worst_noise = noise.worst;
   survey.noisiest = noise.worst_at;
   return survey;

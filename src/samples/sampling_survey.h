@@ -20,6 +20,10 @@ struct RadiusSurvey {
   /// Share of samples whose normals are far from their neighbours' places and near those of several sides: interpolated
   /// over a sharp edge (samples/consensus_plane.h).
   float blurred = 0;
+  /// Share of samples whose neighbours do not lie on all sides (AllRound) within 1.4 `median`: on lines, at rims.
+  float lopsided = 0;
+  /// Share of samples around which the number of others grows with the distance as along a line, not as on a surface.
+  float lined = 0;
   float high_noise = 0;  ///< a tenth of samples lies farther from that surface, in units of `median`
   /// The noisiest of a few stretches of the cloud: the median there, and its middle, steps.
   float worst_noise = 0;
@@ -45,6 +49,8 @@ struct Noise {
   float distance = 0;               ///< in units of the median radius
   float angle = 0;                  ///< of normals, radians, 0 to pi / 2
   float blurred = 0;                ///< RadiusSurvey::blurred
+  float lopsided = 0;               ///< RadiusSurvey::lopsided
+  float lined = 0;                  ///< RadiusSurvey::lined
   float high = 0;                   ///< a tenth of the samples has a larger distance
   float worst = 0;                  ///< median distance in the stretch where it is largest
   std::array<float, 3> worst_at{};  ///< the middle of that stretch, steps

@@ -1,10 +1,14 @@
-// How wide supports are from place to place where a cloud is noisy: H, a sample's support in units of its radius.
+// How wide supports are from place to place where a cloud is noisy or lies on lines: H, a sample's support in units of
+// its radius.
 //
 // A wide support averages noise and a narrow one keeps detail, and how much there is of both changes from place to
 // place. So samples all over the cloud are compared with the surface that their neighbours suggest over disks of
 // several widths: the disk that predicts them best is as wide as noise asks for and detail allows (cross-validation,
 // Stone 1974). Neighbours count by their distance along the surface, since those nearest in space to a noisy sample
 // share its error.
+//
+// And a support has to hold samples on all sides. Those of profile scanners and of grazing rays lie on lines; a support
+// that ends before the next line makes a ribbon of each.
 #pragma once
 #include <tbb/enumerable_thread_specific.h>
 
@@ -26,20 +30,30 @@ struct SupportPlace {
   float blend = 0;            ///< H
 };
 
-/// The least and the most H that is chosen.
+/// The least H that is chosen, the most for noise, and the most to reach the next line.
 inline constexpr float kLeastSupport = 1.2F;
 inline constexpr float kMostSupport = 3;
+inline constexpr float kMostAllRound = 4;
+
+/// Supports are to hold samples on all sides, or to be as wide as noise asks for as well.
+enum class SupportAim : std::uint8_t { all_round, noise };
+
+struct SupportSurvey {
+  std::vector<SupportPlace> places;
+  bool lines = false;  ///< at most places the least H does not reach neighbours on all sides
+};
 
 /// H at some four thousand samples from all over the cloud, one in sixteen at the most; `survey` is of the same store.
-/// Empty where no sample has neighbours to tell. A function of the store alone. Reads some four million samples, each
-/// about twice, in runs of buckets, from all over the store where it has more. Memory: 28 bytes for each sample of a
-/// run, which is as tall as some fifty radii.
-std::vector<SupportPlace> survey_support(const SlabStore& store, const ReadBucket& read, const RadiusSurvey& survey);
+/// Empty where no sample has neighbours to tell, and where all_round is the aim and samples do not lie on lines. A
+/// function of the store alone. Reads some four million samples, each about twice, in runs of buckets, from all over
+/// the store where it has more. Memory: 28 bytes for each sample of a run, which is as tall as some fifty radii.
+SupportSurvey survey_support(const SlabStore& store, const ReadBucket& read, const RadiusSurvey& survey,
+                             SupportAim aim);
 
 /// What is seen of a cloud before it is streamed.
 struct CloudSurvey {
   RadiusSurvey radii;
-  std::vector<SupportPlace> support;  ///< empty where supports do not follow places
+  SupportSurvey support;  ///< without places where supports do not follow them
 };
 
 /// H anywhere: a continuous function of the places alone, between the least and the most of theirs. It is the weighted

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "base/vectors.h"
+#include "samples/all_round.h"
 #include "samples/bucket_runs.h"
 #include "samples/sample_tree.h"
 #include "samples/support_field.h"
@@ -45,6 +46,12 @@ constexpr double kSupportPerDisk = 0.65;
 /// H is at least so much, and so much more for each radius of error: fits to few very noisy samples go astray.
 constexpr double kLeastBlend = 1.1;
 constexpr double kBlendPerError = 3.5;
+/// A support reaches so much less than the neighbours that lie on all sides: between two lines of samples it has to
+/// hold some of both.
+constexpr float kAllRoundPerSupport = 1.25F;
+constexpr double kAllRoundShare = 0.75;  ///< of the places around reach those neighbours
+constexpr float kMostByDensity = 1.1F;   ///< radii nearby: what counts of samples make of those out there
+constexpr float kMostAround = 8;         ///< radii: neighbours farther away are not looked at
 
 typedef float Four __attribute__((vector_size(16)));  // NOLINT(modernize-use-using): attributes on typedefs
 
@@ -81,6 +88,7 @@ struct FlatNeighbours {
 /// disks are wider than neighbours are known.
 struct Trial {
   std::array<float, kDisks.size()> error{};
+  float all_round = 0;  ///< neighbours lie on all sides of it within so many radii; infinite: in no disk
 };
 
 Four four(const std::vector<float>& v, std::size_t i) {
@@ -166,6 +174,22 @@ std::optional<float> height_over(float disk, TrialScratch& scratch) {
   return paraboloid(around, disk)(0);
 }
 
+/// How far away neighbours lie on all sides of a seed, in radii of the density out there, where `farthest` (radii of
+/// the samples nearby) is enough; else infinite. Along a line of samples those nearby are denser than the surface.
+float all_round(const FlatNeighbours& neighbours, float farthest) {
+  AllRound sides;
+  float within = 0;
+  for (std::size_t i = 0; i < neighbours.count; ++i) {
+    const float x = neighbours.x[i], y = neighbours.y[i];
+    if (std::abs(neighbours.height[i]) > farthest || x * x + y * y > farthest * farthest) continue;
+    sides.add(x, y);
+    within += 1;
+  }
+  const float distance = sides.distance();
+  if (!(distance <= farthest)) return std::numeric_limits<float>::infinity();
+  return distance / std::min(kMostByDensity, 2 * farthest * std::sqrt(std::numbers::pi_v<float> / within));
+}
+
 /// What the neighbours of a seed say; nothing where they are too few. `given`: its radius where the input has it, in
 /// units of the reach, else 0.
 std::optional<Trial> try_disks(const SeedNeighbourhoods& of, std::size_t seed, double given, TrialScratch& scratch) {
@@ -192,7 +216,7 @@ std::optional<Trial> try_disks(const SeedNeighbourhoods& of, std::size_t seed, d
       given > 0 ? static_cast<float>(given) : 2 * std::sqrt(std::numbers::pi_v<float> / kCounted * *last);
   if (!(radius > 0)) return std::nullopt;
   constexpr float kAxisReach = 2.5F;
-  constexpr float kFarthest = 2 * kDisks.back() * kDisks.back();  // squared: a disk is no thicker than it is wide
+  constexpr float kFarthest = 2 * kMostAround * kMostAround;  // squared: a disk is no thicker than it is wide
   Eigen::Vector3f axis = own;
   std::size_t facing = 0;
   for (std::size_t i = 0; i < found.size(); ++i) {
@@ -216,6 +240,7 @@ std::optional<Trial> try_disks(const SeedNeighbourhoods& of, std::size_t seed, d
   std::size_t known = kDisks.size();  // of the disks
   while (known > kMiddleDisk + 1 && kDisks[known - 1] * radius > 1) --known;
   Trial trial;
+  trial.all_round = all_round(neighbours, std::min(1 / radius, kMostAround));
   for (std::size_t k = known; k-- > 0;) {
     neighbours.keep_within(kDisks[k]);
     const std::optional<float> height = height_over(kDisks[k], scratch);
@@ -279,8 +304,27 @@ BestDisk best_of(const std::array<double, kDisks.size()>& squares) {
   return {radius, std::sqrt(*least)};
 }
 
-/// H by what the places around say together.
-std::vector<SupportPlace> pooled(const std::vector<Place>& places) {
+/// H that reaches neighbours on all sides at most of some places. Those at rims have none.
+float blend_all_round(std::vector<float>& distances) {
+  std::erase_if(distances, [](float d) { return std::isinf(d); });
+  return distances.size() < kPooled / 2 ? 0 : quantile_of(distances, kAllRoundShare) / kAllRoundPerSupport;
+}
+
+/// What the places around one say together.
+struct Pool {
+  std::array<double, kDisks.size()> squares{};
+  std::vector<float> all_round;
+};
+
+float blend_of(Pool& pool, SupportAim aim) {
+  const float sides = std::clamp(blend_all_round(pool.all_round), kLeastSupport, kMostAllRound);
+  if (aim == SupportAim::all_round) return sides;
+  const BestDisk best = best_of(pool.squares);
+  const double wanted = std::max(kSupportPerDisk * best.radius, kLeastBlend + kBlendPerError * best.error);
+  return std::max(sides, std::clamp(static_cast<float>(wanted), kLeastSupport, kMostSupport));
+}
+
+SupportSurvey pooled(const std::vector<Place>& places, SupportAim aim) {
   std::vector<float> errors;
   errors.reserve(places.size());
   std::array<std::vector<std::int32_t>, 3> at;
@@ -290,34 +334,38 @@ std::vector<SupportPlace> pooled(const std::vector<Place>& places) {
   }
   const float most = kMostError * median_of(errors);
   const SampleTree tree(at[0], at[1], at[2]);
-  std::vector<SupportPlace> out(places.size());
+  SupportSurvey out;
+  out.places.resize(places.size());
+  std::vector<float> sides(places.size());
   tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t p) {
     std::array<Neighbour, kPooled - 1> found;
     const std::size_t n =
         tree.nearest(static_cast<std::uint32_t>(p), found.size(), std::numeric_limits<float>::infinity(), found.data());
-    std::array<double, kDisks.size()> squares{};
+    Pool pool;
     const auto add = [&](std::uint32_t place) {
       const Trial& t = places[tree.order()[place]].trial;
+      pool.all_round.push_back(t.all_round);
       for (std::size_t k = 0; k < kDisks.size(); ++k) {
         const double error = static_cast<double>(std::min(t.error[k], most));
-        squares[k] += error * error / static_cast<double>(n + 1);
+        pool.squares[k] += error * error / static_cast<double>(n + 1);
       }
     };
     add(static_cast<std::uint32_t>(p));
     for (std::size_t i = 0; i < n; ++i) add(found[i].sample);
-    const BestDisk best = best_of(squares);
-    const double wanted = std::max(kSupportPerDisk * best.radius, kLeastBlend + kBlendPerError * best.error);
-    const auto blend = std::clamp(static_cast<float>(wanted), kLeastSupport, kMostSupport);
-    SupportPlace& made = out[tree.order()[p]];
-    made.blend = blend;
+    SupportPlace& made = out.places[tree.order()[p]];
+    made.blend = blend_of(pool, aim);
+    sides[p] = blend_all_round(pool.all_round);
     for (std::size_t k = 0; k < 3; ++k) made.at[k] = static_cast<float>(places[tree.order()[p]].at[k]);
   });
+  out.lines = median_of(sides) > kLeastSupport;
+  if (aim == SupportAim::all_round && !out.lines) out.places.clear();
   return out;
 }
 
 }  // namespace
 
-std::vector<SupportPlace> survey_support(const SlabStore& store, const ReadBucket& read, const RadiusSurvey& survey) {
+SupportSurvey survey_support(const SlabStore& store, const ReadBucket& read, const RadiusSurvey& survey,
+                             SupportAim aim) {
   constexpr float kFarthest = 4;  // medians: where samples lie farther apart than this, narrower disks must do
   const double reach = double{kDisks.back()} * static_cast<double>(std::min(survey.high, kFarthest * survey.median));
   if (!(reach > 0)) return {};
@@ -348,7 +396,7 @@ std::vector<SupportPlace> survey_support(const SlabStore& store, const ReadBucke
     }
   }
   if (places.empty()) return {};
-  return pooled(places);
+  return pooled(places, aim);
 }
 
 }  // namespace lamina

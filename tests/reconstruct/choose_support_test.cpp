@@ -16,7 +16,7 @@ RadiusSurvey survey(float noise, float high) {
 ReconstructionPlan choice_of(const SurfaceSettings& settings, const RadiusSurvey& survey, const PointSourceInfo& info,
                              const std::vector<SupportPlace>& support = {}) {
   ReconstructionPlan plan;
-  choose_support(settings, {survey, support}, info, plan);
+  choose_support(settings, {survey, {support, false}}, info, plan);
   return plan;
 }
 ReconstructionPlan choice_of(const SurfaceSettings& settings, const RadiusSurvey& survey, bool found_normals = false) {

@@ -42,7 +42,7 @@ std::vector<SupportPlace> surveyed(const LocalSamples& samples, std::size_t buck
   SlabStoreWriter writer({}, {::testing::TempDir(), 0, height, buckets, 1 << 20});
   writer.append(samples);
   const SlabStore store = writer.finish();
-  return survey_support(store, reader_of(store), survey_radii(store, kSurveySamples));
+  return survey_support(store, reader_of(store), survey_radii(store, kSurveySamples), SupportAim::noise).places;
 }
 
 /// The median H of the places with y in a part of the sheet's width.
