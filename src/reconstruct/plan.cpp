@@ -21,7 +21,8 @@ namespace {
 
 constexpr int kDefaultLevels = 4;
 /// Slabs are as high as the coarsest cells. Levels that no radius asks for make none higher than so many median radii:
-/// twice as high would take a third more memory for next to no time.
+/// twice as high would take a third more memory for next to no time. Where density varies, coarse levels serve the few
+/// samples that are sparser than the survey's 99 %.
 constexpr double kSlabRadii = 4.5;
 constexpr int kMaxLevels = 12;
 constexpr std::int32_t kMinSteps = 64;  ///< fixed-point steps a finest cell must have for exact enough positions
@@ -70,7 +71,8 @@ Levels choose_levels(int asked, const FeedSettings& feed, const RadiusSurvey& ra
   const int finer = std::max(0, static_cast<int>(std::ceil(std::log2(main / (ratio * radii.low)) - 1e-9))) +
                     (feed.refine_sheets ? 1 : 0);
   const int coarser = std::max(0, static_cast<int>(std::floor(std::log2(ratio * radii.high / main))));
-  const int least = levels_in_slab(kMainCell * ratio, finer);
+  const bool even = radii.high < kEven * radii.low;
+  const int least = even ? levels_in_slab(kMainCell * ratio, finer) : kDefaultLevels;
   const int count = asked > 0 ? asked : std::clamp(finer + coarser + 1, least, kMaxLevels);
   return {std::ldexp(main, -std::min(finer, count - 1)), count};
 }
