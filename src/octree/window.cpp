@@ -1,7 +1,6 @@
 #include "octree/window.h"
 
 #include <algorithm>
-#include <atomic>
 #include <deque>
 #include <limits>
 #include <mutex>
@@ -9,6 +8,7 @@
 #include <tuple>
 
 #include "octree/corner_leaf.h"
+#include "octree/layer_table.h"
 
 namespace lamina {
 
@@ -17,9 +17,6 @@ namespace {
 openvdb::Coord leaf_origin(const Block& b) {
   return {b.z * 8, b.y * 8, b.x * 8};
 }
-
-/// Beyond this many entries a layer's lookup table costs more memory than it saves time.
-constexpr std::int64_t kTableLimit = std::int64_t{1} << 22;
 
 std::size_t value_bytes(const Projected& points) {
   std::size_t bytes = 0;
@@ -53,35 +50,34 @@ struct Window::Trees {
   struct Layer {
     std::vector<Tile> tiles;
     std::size_t ordered = 0;  ///< so many of the tiles are in canonical order
-    std::vector<CornerBlock*> table;
+    LayerTable table;
   };
   struct Level {
     CornerTree tree{false};
     std::deque<Layer> layers;  ///< block layers z_base, z_base + 1, ...
     std::int32_t z_base = 0;
-    std::vector<Layer> spare;                     ///< without leaves; tables for other layers
-    Branches lower, upper;                        ///< inner nodes with retired leaves
-    std::int32_t x0 = 0, y0 = 0, nx = 0, ny = 0;  ///< extent of the tables in blocks
+    std::vector<Layer> spare;  ///< without leaves; tables for other layers
+    Branches lower, upper;     ///< inner nodes with retired leaves
+    TableExtent extent;        ///< of the layers' tables
   };
+  explicit Trees(int count) : levels(static_cast<std::size_t>(count)) {}
+
   std::vector<Level> levels;
   std::vector<std::unique_ptr<CornerLeaf>> spare;  ///< retired leaves, used again: leaves come and go all the time
+  SparePages spare_pages;
   std::mutex creation;
 
-  /// Entry of the lookup table, null where the block lies outside of it.
-  static CornerBlock** slot(Level& level, const Block& b) {
-    const std::int32_t x = b.x - level.x0;
-    const std::int32_t y = b.y - level.y0;
+  /// The lookup table that knows of the block, null where none does.
+  static LayerTable* table(Level& level, const Block& b) {
     const std::int32_t z = b.z - level.z_base;
-    if (x < 0 || y < 0 || z < 0 || x >= level.nx || y >= level.ny ||
-        z >= static_cast<std::int32_t>(level.layers.size())) {
-      return nullptr;
-    }
-    return &level.layers[z].table[static_cast<std::size_t>(y) * level.nx + x];
+    if (z < 0 || z >= static_cast<std::int32_t>(level.layers.size())) return nullptr;
+    LayerTable& table = level.layers[z].table;
+    return table.covers(b.x, b.y) ? &table : nullptr;
   }
 
   CornerBlock* find(int l, const Block& b) {
     Level& level = levels[l];
-    if (CornerBlock** s = slot(level, b)) return *s;
+    if (const LayerTable* known = table(level, b)) return known->find(b.x, b.y);
     // Every leaf has its layer.
     if (b.z < level.z_base || b.z - level.z_base >= static_cast<std::int32_t>(level.layers.size())) return nullptr;
     CornerLeaf* leaf = level.tree.probeLeaf(leaf_origin(b));
@@ -90,9 +86,8 @@ struct Window::Trees {
 
   void cover(Level& level, std::int32_t z) {
     if (level.layers.empty()) level.z_base = z;
-    const auto entries = static_cast<std::size_t>(level.nx) * static_cast<std::size_t>(level.ny);
     const auto empty_layer = [&] {
-      if (level.spare.empty()) return Layer{{}, 0, std::vector<CornerBlock*>(entries, nullptr)};
+      if (level.spare.empty()) return Layer{{}, 0, LayerTable(level.extent)};
       Layer layer = std::move(level.spare.back());
       level.spare.pop_back();
       return layer;
@@ -112,7 +107,7 @@ struct Window::Trees {
     CornerBlock& block = leaf->block;
     level.layers[b.z - level.z_base].tiles.push_back({b, &block});
     introduce(l, b, block);
-    if (CornerBlock** s = slot(level, b)) std::atomic_ref(*s).store(&block, std::memory_order_release);
+    if (LayerTable* known = table(level, b)) known->set(b.x, b.y, &block, spare_pages);
     return block;
   }
 
@@ -149,14 +144,12 @@ struct Window::Trees {
     }
   }
 
-  /// Takes out the lowest layer. Its tables are used again.
-  static void clear_front(Level& level) {
-    for (const Tile& t : level.layers.front().tiles) {
-      if (CornerBlock** s = slot(level, t.block)) *s = nullptr;
-    }
-    Layer& spare = level.spare.emplace_back(std::move(level.layers.front()));
-    spare.tiles.clear();
-    spare.ordered = 0;
+  /// Takes out the lowest layer. Its table is used again.
+  void clear_front(Level& level) {
+    Layer& empty = level.spare.emplace_back(std::move(level.layers.front()));
+    empty.tiles.clear();
+    empty.ordered = 0;
+    empty.table.clear(spare_pages);
     level.layers.pop_front();
   }
 
@@ -171,19 +164,18 @@ struct Window::Trees {
 };
 
 Window::Window(const Lattice& lattice, int attributes, const Bounds& bounds)
-    : lattice_(lattice), attributes_(attributes), trees_(std::make_unique<Trees>()) {
-  trees_->levels.resize(static_cast<std::size_t>(lattice.levels));
+    : lattice_(lattice), attributes_(attributes), trees_(std::make_unique<Trees>(lattice.levels)) {
   for (int l = 0; l < lattice.levels; ++l) {
     Trees::Level& level = trees_->levels[l];
     // Cells reach 2^28 steps, eight of them more than an int; one block holds every bound then, whatever its end.
     const std::int32_t block = std::min(lattice.cell_size(l), std::numeric_limits<std::int32_t>::max() / 8) * 8;
     if (bounds.x_max < bounds.x_min) continue;
-    const std::int32_t x0 = floor_div(bounds.x_min, block) - 1;
-    const std::int32_t y0 = floor_div(bounds.y_min, block) - 1;
-    const std::int32_t nx = floor_div(bounds.x_max, block) + 2 - x0;
-    const std::int32_t ny = floor_div(bounds.y_max, block) + 2 - y0;
-    if (std::int64_t{nx} * ny > kTableLimit) continue;
-    std::tie(level.x0, level.y0, level.nx, level.ny) = std::tie(x0, y0, nx, ny);
+    TableExtent extent;
+    extent.x0 = floor_div(bounds.x_min, block) - 1;
+    extent.y0 = floor_div(bounds.y_min, block) - 1;
+    extent.nx = floor_div(bounds.x_max, block) + 2 - extent.x0;
+    extent.ny = floor_div(bounds.y_max, block) + 2 - extent.y0;
+    if (extent.pages() <= kMostTablePages) level.extent = extent;
   }
 }
 
@@ -211,8 +203,8 @@ void Window::cover(std::int32_t slab) {
 }
 
 CornerBlock& Window::touch_shared(int level, const Block& b) {
-  if (CornerBlock** slot = Trees::slot(trees_->levels[level], b)) {
-    if (CornerBlock* block = std::atomic_ref(*slot).load(std::memory_order_acquire)) return *block;
+  if (const LayerTable* table = Trees::table(trees_->levels[level], b)) {
+    if (CornerBlock* block = table->find(b.x, b.y)) return *block;
   }
   const std::lock_guard lock(trees_->creation);
   return touch(level, b);
@@ -259,7 +251,7 @@ void Window::retire_below(std::int32_t slab) {
         level.lower.insert(lower);
         level.upper.insert(origin & ~(static_cast<std::int32_t>(Upper::DIM) - 1));
       }
-      Trees::clear_front(level);
+      trees_->clear_front(level);
       ++level.z_base;
     }
     retire_branches<Lower>(level.tree, level.lower, first);
@@ -268,7 +260,9 @@ void Window::retire_below(std::int32_t slab) {
     if (level.upper.size() < before) level.tree.root().eraseBackgroundTiles();
   }
   // A slab behind the widest cross-section gives its memory back.
-  if (const std::size_t used = leaf_count(); trees_->spare.size() > used) trees_->spare.resize(used);
+  const std::size_t used = leaf_count();
+  if (trees_->spare.size() > used) trees_->spare.resize(used);
+  if (trees_->spare_pages.size() > used) trees_->spare_pages.resize(used);
 }
 
 std::size_t Window::leaf_count() const {
@@ -280,12 +274,12 @@ std::size_t Window::leaf_count() const {
 }
 
 std::size_t Window::memory() const {
-  std::size_t bytes = trees_->spare.size() * sizeof(CornerLeaf);
+  std::size_t bytes = trees_->spare.size() * sizeof(CornerLeaf) + trees_->spare_pages.size() * sizeof(TablePage);
   for (const auto& level : trees_->levels) {
     const std::vector<openvdb::Index32> nodes = level.tree.nodeCount();
     bytes += nodes[Lower::LEVEL] * sizeof(Lower) + nodes[Upper::LEVEL] * sizeof(Upper);
     for (const auto& layer : level.layers) {
-      bytes += layer.table.capacity() * sizeof(CornerBlock*);
+      bytes += layer.table.memory();
       for (const Tile& t : layer.tiles) {
         bytes += sizeof(CornerLeaf);
         bytes += value_bytes(*t.leaf);

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "meshes/mesh_sink.h"
+#include "octree/layer_table.h"
 #include "reconstruct/constants.h"
 #include "reconstruct/stages.h"
 #include "simplify/streamed.h"
@@ -162,15 +163,18 @@ std::uint64_t table_bytes(const ReconstructionPlan& plan, const SlabStore& store
   for (std::size_t b = 0; b < store.buckets(); ++b) {
     if (store.count(b) > 0) tallest = std::max(tallest, static_cast<double>(store.z_upper(b)) - store.z_lower(b));
   }
-  constexpr double kLargestTable = 1 << 22;
-  double entries = 0;  // of a slab
+  constexpr double kPage = TablePage::kSide;
+  double pages = 0;  // of a slab
   for (int level = 0; level < plan.lattice.levels; ++level) {
     const double block = 8.0 * plan.lattice.cell_size(level);
-    const double table = (static_cast<double>(plan.extent.x_max) - plan.extent.x_min + 3 * block) / block *
-                         (static_cast<double>(plan.extent.y_max) - plan.extent.y_min + 3 * block) / block;
-    if (table <= kLargestTable) entries += table * plan.lattice.layers(level) / 8;
+    const auto along = [&](std::int32_t low, std::int32_t high) {
+      return std::ceil(((static_cast<double>(high) - low) / block + 3) / kPage);
+    };
+    const double table = along(plan.extent.x_min, plan.extent.x_max) * along(plan.extent.y_min, plan.extent.y_max);
+    constexpr auto kMost = static_cast<double>(kMostTablePages);
+    pages += (table <= kMost ? table : 0) * plan.lattice.layers(level) / 8;
   }
-  return static_cast<std::uint64_t>(tallest / plan.lattice.slab_height() * entries * sizeof(void*));
+  return static_cast<std::uint64_t>(tallest / plan.lattice.slab_height() * pages * sizeof(TablePage*));
 }
 
 ExpectedCost expected_cost(const ReconstructionPlan& plan, const Ingested& cloud) {

@@ -127,6 +127,27 @@ TEST(Window, NothingIsLeftBehindTheSweep) {
   EXPECT_EQ(window.memory(), empty);
 }
 
+TEST(Window, WideLayersTakeMemoryForTheirLeavesOnly) {
+  // A station's scan: thousands of the finest blocks wide, a hundred layers within reach of its widest supports.
+  const Lattice lattice{8, 1};
+  constexpr std::int32_t kHalf = 1'000;  // blocks
+  Window window(lattice, 0, {-kHalf * 64, kHalf * 64, -kHalf * 64, kHalf * 64});
+  const auto place = [](std::int32_t z, std::int32_t i) { return Block{i * 37 % 900, -i * 11 % 900, z}; };
+  constexpr std::int32_t kLayers = 100, kLeaves = 40;
+  for (std::int32_t z = 0; z < kLayers; ++z) {
+    window.cover(z * 8);
+    for (std::int32_t i = 0; i < kLeaves; ++i) window.touch(0, place(z, i));
+  }
+  for (std::int32_t z = 0; z < kLayers; ++z) {
+    for (std::int32_t i = 0; i < kLeaves; ++i) ASSERT_NE(window.probe(0, place(z, i)), nullptr);
+    EXPECT_EQ(window.probe(0, {kHalf - 1, kHalf - 1, z}), nullptr);
+  }
+  // A place for each block of the layers would take 3.2 GB.
+  EXPECT_LE(window.memory(), 64U << 20);
+  window.retire_below(10'000);
+  EXPECT_EQ(window.memory(), Window(lattice, 0).memory());
+}
+
 TEST(Window, LeavesUsedAgainAreEmpty) {
   const Lattice lattice{10, 1};
   Window window(lattice, 1, {0, 400, 0, 400});
@@ -149,7 +170,8 @@ TEST(Window, LeavesUsedAgainAreEmpty) {
 }
 
 TEST(Window, SlantedSheetsLeaveNothingBehindEither) {
-  // Leaves move sideways with the sweep, so that most inner nodes have none in their last layer.
+  // Leaves move sideways with the sweep, so that most inner nodes have none in their last layer; early on they pass
+  // through the table.
   for (const std::int32_t slope : {-16, 0, 3, 16}) {
     Window window({10, 4}, 0, {0, 400, 0, 400});
     std::size_t early = 0;
@@ -157,7 +179,7 @@ TEST(Window, SlantedSheetsLeaveNothingBehindEither) {
     for (std::int32_t slab = -400; slab < 1200; ++slab) {
       for (std::int32_t x = 0; x < 4; ++x) window.touch(0, {slab * slope + x, 0, slab});
       window.retire_below(slab - 2);
-      std::size_t& most = slab < 0 ? early : late;
+      std::size_t& most = slab < 400 ? early : late;
       most = std::max(most, window.memory());
     }
     EXPECT_LE(late, early) << "slope " << slope;
