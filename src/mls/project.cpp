@@ -154,7 +154,7 @@ class Projector::Level {
       list_queries(work_[t], local.queries);
       TileSteps steps(rule_, local.queries, local.state);
       steps.start();
-      local.rows.gather(lattice_, layers_, blocks[t], bins.of(t), rule_.settings.band);
+      local.rows.gather(lattice_, layers_, blocks[t], bins.of(t));
       steps.accumulate(local.rows);
       for (int pass = 1; pass < rule_.passes() && steps.advance(pass); ++pass) steps.accumulate(local.rows);
       steps.settle();
@@ -249,7 +249,7 @@ class Projector::Level {
     const TileRuns bins = bin_clusters(lattice_, layers_, batch, blocks);
     tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t a) {
       Scratch::Local& local = scratch_.local.local();
-      local.rows.gather(lattice_, layers_, blocks[a], bins.of(a), rule_.settings.band);
+      local.rows.gather(lattice_, layers_, blocks[a], bins.of(a));
       add(tiles[a], local);
     });
   }

@@ -18,8 +18,8 @@ struct ProjectSettings {
   bool centres = false;   ///< project the centres of leaf cells instead of corners (section 3.3; see diffuse_slab())
   int steps = 1;          ///< N >= 1: almost orthogonal projection steps (Alexa & Adamson 2004)
   float tolerance = 0;    ///< a point is done when a step moves it no more than so many supports; 0: next to nothing
-  float band = 2.25F;     ///< a corner keeps a value only if a sample lies this near, in cells of the sample's level
-  /// And, where samples say exactly where the surface is, only if it lies this near to such a sample's tangent plane.
+  /// A corner keeps a value only if it lies this near to a sample's tangent plane (cells of the sample's level): where
+  /// samples say exactly where the surface is.
   float height = std::numeric_limits<float>::infinity();
   /// A point whose samples' mean normal is shorter than this sees two sheets, or one bent sharply, and counts only the
   /// samples on its own side, that face where the mean does; 0: all count always.

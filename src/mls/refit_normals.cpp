@@ -210,6 +210,8 @@ void RefitNormals::add(std::size_t bucket, const LocalSamples& samples, const st
   const std::size_t n = s.size();
   added->bucket.support.resize(n);
   added->bucket.weight.resize(n);
+  constexpr float kNoBand = 1e12F;  // steps
+  added->bucket.band.assign(n, kNoBand);
   added->bucket.level.assign(n, static_cast<std::uint8_t>(settings_.level));
   const auto unit = static_cast<float>(lattice_.cell);
   SupportField::Cursor* const local = settings_.by_place ? &settings_.by_place->cursor() : nullptr;
@@ -255,8 +257,7 @@ UnitNormals RefitNormals::find(std::size_t bucket) {
   tbb::enumerable_thread_specific<Scratch> scratch;
   tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t t) {
     Scratch& local = scratch.local();
-    constexpr float kNoBand = 1e4F;
-    local.rows.gather(lattice_, layers, blocks[t], bins.of(t), kNoBand);
+    local.rows.gather(lattice_, layers, blocks[t], bins.of(t));
     TileRefit(kernel_, settings_, own.bucket, local, out)
         .fit(blocks[t], cell, std::span(placed).subspan(tiles[t].begin, tiles[t].end - tiles[t].begin));
   });

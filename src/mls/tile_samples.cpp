@@ -218,7 +218,7 @@ void cluster_samples(const ActiveBucket& bucket, const Lattice& lattice, Cluster
   pick(s.nz, order, out.nz);
   pick(bucket.support, order, out.support);
   pick(bucket.weight, order, out.weight);
-  resize_anew(out.cell, order.size());
+  pick(bucket.band, order, out.band);
   out.attributes.resize(s.attributes.size());
   for (std::size_t a = 0; a < s.attributes.size(); ++a) pick(s.attributes[a], order, out.attributes[a]);
   out.clusters.clear();
@@ -227,7 +227,6 @@ void cluster_samples(const ActiveBucket& bucket, const Lattice& lattice, Cluster
       if (k > 0) out.clusters.back().end = static_cast<std::uint32_t>(k);
       out.clusters.push_back({static_cast<std::uint32_t>(k), 0, {kMost, kMost, kMost}, {kLeast, kLeast, kLeast}});
     }
-    out.cell[k] = static_cast<float>(lattice.cell_size(bucket.level[order[k].sample]));
     include(out, k, out.clusters.back());
   }
   if (!order.empty()) out.clusters.back().end = static_cast<std::uint32_t>(order.size());
@@ -257,9 +256,9 @@ TileRuns bin_clusters(const Lattice& lattice, const QueryLayers& layers, const C
 }
 
 void RowSamples::gather(const Lattice& lattice, const QueryLayers& layers, const Block& block,
-                        std::span<const Run> runs, float band) {
+                        std::span<const Run> runs) {
   select(lattice, layers, block, runs);
-  place(lattice, layers.level, runs, band);
+  place(lattice, layers.level, runs);
 }
 
 void RowSamples::select(const Lattice& lattice, const QueryLayers& layers, const Block& block,
@@ -324,7 +323,7 @@ void RowSamples::select(const Lattice& lattice, const QueryLayers& layers, const
   count_ = n;
 }
 
-void RowSamples::place(const Lattice& lattice, int level, std::span<const Run> runs, float band) {
+void RowSamples::place(const Lattice& lattice, int level, std::span<const Run> runs) {
   const float inv = 1.0F / static_cast<float>(lattice.cell_size(level));
   const std::size_t attributes = runs.empty() ? 0 : runs.front().from->attributes.size();
   // Longer than that they may stay: what lies behind the ranges is not looked at.
@@ -347,13 +346,13 @@ void RowSamples::place(const Lattice& lattice, int level, std::span<const Run> r
     samples_.nz[to] = from.nz[f.sample];
     samples_.support[to] = f.support;
     samples_.weight[to] = from.weight[f.sample];
-    samples_.inv_band2[to] = from.cell[f.sample];
+    samples_.inv_band2[to] = from.band[f.sample];
     for (std::size_t c = 0; c < attributes; ++c) samples_.attributes[c][to] = from.attributes[c][f.sample];
     max_support_ = std::max(max_support_, f.support);
   }
   samples_.banded = false;
   for (std::size_t k = 0; k < count_; ++k) {
-    const float limit = band * samples_.inv_band2[k] * inv;
+    const float limit = samples_.inv_band2[k] * inv;
     samples_.inv_support2[k] = 1.0F / (samples_.support[k] * samples_.support[k]);
     samples_.inv_band2[k] = 1.0F / (limit * limit);
     samples_.banded |= limit < samples_.support[k];

@@ -23,8 +23,7 @@ struct SampleCluster {
 struct ClusteredBucket {
   std::vector<std::int32_t> x, y, z;           ///< steps
   std::vector<float> nx, ny, nz;               ///< unit normals
-  std::vector<float> support, weight;          ///< as in ActiveBucket
-  std::vector<float> cell;                     ///< of the sample's level, steps
+  std::vector<float> support, weight, band;    ///< as in ActiveBucket
   std::vector<std::vector<float>> attributes;  ///< one array per attribute
   std::vector<SampleCluster> clusters;
 };
@@ -88,9 +87,8 @@ class RowSamples {
       -4;  ///< rows of cells kLow .. kLow + kRows - 1 relative to the tile; outer ones are clamped
   static constexpr int kRows = 16;
 
-  /// Takes the samples that can reach a point of the block. `band`: ProjectSettings::band.
-  void gather(const Lattice& lattice, const QueryLayers& layers, const Block& block, std::span<const Run> runs,
-              float band);
+  /// Takes the samples that can reach a point of the block.
+  void gather(const Lattice& lattice, const QueryLayers& layers, const Block& block, std::span<const Run> runs);
   /// The arrays may be longer than size().
   [[nodiscard]] const TileSamples& samples() const { return samples_; }
   [[nodiscard]] std::size_t size() const { return count_; }
@@ -105,7 +103,7 @@ class RowSamples {
     std::uint32_t run, sample;
   };
   void select(const Lattice& lattice, const QueryLayers& layers, const Block& block, std::span<const Run> runs);
-  void place(const Lattice& lattice, int level, std::span<const Run> runs, float band);
+  void place(const Lattice& lattice, int level, std::span<const Run> runs);
 
   TileSamples samples_;
   float max_support_ = 0;

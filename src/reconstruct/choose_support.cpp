@@ -35,7 +35,9 @@ void choose_for_noise(const CloudSurvey& survey, const SurfaceSettings& s, doubl
   plan.refit.support = static_cast<double>(plan.refit.per_blend) * plan.feed.blend;
   plan.feed.cell = {cell, Length::Unit::sample_radius};
   plan.trim = rim_overhang(plan.feed.blend);
-  if (!s.cell) plan.projection.band = static_cast<float>(kNoisyReach / cell);
+  if (s.cell && s.cell->unit != Length::Unit::sample_radius) return;
+  plan.feed.band_cells = kNoisyBand;
+  plan.feed.band_radii = kNoisyReach;
 }
 
 /// What an even, clean sampling allows: the narrowest support, and finer cells between sheets.
@@ -47,7 +49,7 @@ void choose_for_even(bool cell_given, double cell, ReconstructionPlan& plan) {
   plan.projection.height = kEvenHeight;
   if (cell_given) return;
   plan.feed.refine_sheets = true;
-  plan.projection.band = kSheetBand;
+  plan.feed.band_cells = kSheetBand;
 }
 
 /// What lines of samples far apart ask for: supports that reach from one to the next, and cells that are found in the
@@ -56,7 +58,8 @@ void choose_for_lines(const SupportSurvey& survey, ReconstructionPlan& plan) {
   plan.lines = true;
   if (plan.feed.support == nullptr) follow_places(survey, plan);
   plan.feed.cell = {kLinesCell, Length::Unit::influence_radius};
-  plan.projection.band = ProjectSettings{}.band;
+  plan.feed.band_cells = FeedSettings{}.band_cells;
+  plan.feed.band_radii = FeedSettings{}.band_radii;
   // Normals were found across lines, and a support may hold one alone.
   plan.refit.support = 0;
   plan.refit.by_place = nullptr;

@@ -43,10 +43,11 @@ inline constexpr double kThinnedCell = 0.84;
 /// normals follow.
 inline constexpr double kNoisyCell = 0.7;
 
-/// How far from its nearest sample a corner keeps a value: less on noise (radii), whose outermost samples would make
-/// sheets of their own; more where cells between two sheets are half as large (cells), so that values reach as far as
-/// before.
-inline constexpr double kNoisyReach = 1.05;
+/// How far from its nearest sample a corner keeps a value (cells): less on noise, whose outermost samples would make
+/// sheets of their own, but so many radii where cells are much smaller; more where cells between two sheets are half as
+/// large, so that values reach as far as before.
+inline constexpr float kNoisyBand = 1.5F;
+inline constexpr float kNoisyReach = 0.6F;
 inline constexpr float kSheetBand = 4;
 
 /// How far (cells) from the tangent planes of an even cloud's samples corners get values. Ends of edges that the

@@ -37,9 +37,6 @@ Pipeline::Pipeline(const ReconstructionPlan& plan, SampleFeed& feed, const SlabS
 
 void Pipeline::mark(const ActiveBucket& bucket) {
   constexpr std::size_t kPiece = 2048;
-  // Corners beyond the band keep no value. Samples mark up to two cells away: what a wider band holds beyond that,
-  // others have to mark for them.
-  const bool narrow = plan_.projection.band < 2;
   const std::size_t n = bucket.samples.size();
   const auto [low, high] = std::minmax_element(bucket.samples.z.begin(), bucket.samples.z.end());
   for (covered_ = std::min(covered_, plan_.lattice.slab_of(*low) - 1); covered_ <= plan_.lattice.slab_of(*high) + 2;
@@ -51,8 +48,11 @@ void Pipeline::mark(const ActiveBucket& bucket) {
     std::size_t count = 0;
     for (std::size_t i = piece * kPiece; i < std::min(n, (piece + 1) * kPiece); ++i) {
       if (bucket.support[i] <= 0) continue;
+      // Corners beyond the band keep no value. Samples mark up to two cells away: what a wider band holds beyond that,
+      // others have to mark for them.
       const auto cell = static_cast<float>(plan_.lattice.cell_size(bucket.level[i]));
-      const float reach = narrow ? std::min(bucket.support[i], plan_.projection.band * cell) : bucket.support[i];
+      const bool narrow = bucket.band[i] < 2 * cell;
+      const float reach = narrow ? std::min(bucket.support[i], bucket.band[i]) : bucket.support[i];
       const LocalSamples& s = bucket.samples;
       marks[count++] = {
           s.x[i], s.y[i], s.z[i], bucket.level[i], reach, {s.nx[i], s.ny[i], s.nz[i]}, plan_.projection.height};

@@ -87,7 +87,7 @@ namespace {
 constexpr std::size_t kSpares = 3;
 
 std::size_t bytes_of(const LocalSamples& s) {
-  constexpr std::size_t kAnnotation = 2 * sizeof(float) + 1;
+  constexpr std::size_t kAnnotation = 3 * sizeof(float) + 1;
   const std::size_t optional = (s.radius.empty() ? 0 : 1) + (s.quality.empty() ? 0 : 1) + s.attributes.size();
   return s.size() * ((6 + optional) * sizeof(float) + kAnnotation);
 }

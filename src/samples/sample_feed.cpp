@@ -226,6 +226,7 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
   const std::size_t n = out.samples.size();
   resize_anew(out.support, n);
   resize_anew(out.weight, n);
+  resize_anew(out.band, n);
   resize_anew(out.level, n);
   out.max_support = known.max_support;
   const auto finest = static_cast<float>(lattice_.cell);
@@ -251,6 +252,8 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
       out.level[i] = fixed ? std::uint8_t{0}
                            : level_for(static_cast<double>(r) * (cell_ratio * (follows ? blend : 1.0F)), lattice_);
       if (!known.finer.empty() && known.finer[i]) --out.level[i];
+      out.band[i] = std::max(settings_.band_cells * static_cast<float>(lattice_.cell_size(out.level[i])),
+                             settings_.band_radii * r);
     }
   });
 }

@@ -51,7 +51,10 @@ struct FeedSettings {
   std::shared_ptr<const SupportField> support;  ///< H by place; null: the same everywhere
   /// Largest leaf cell that a sample allows: a length, the same for all, or a multiple of its r_i or R_i.
   Length cell{0.9, Length::Unit::influence_radius};
-  bool refine_sheets = false;           ///< a level less where sheets lie close together (SheetRefinement)
+  bool refine_sheets = false;  ///< a level less where sheets lie close together (SheetRefinement)
+  /// A corner keeps a value only if a sample lies this near, in cells of the sample's level ...
+  float band_cells = 2.25F;
+  float band_radii = 0;                 ///< ... or in its r_i, whichever is more
   float max_radius = 0;                 ///< samples with a larger r_i are left out, steps; 0: none
   std::size_t cache_bytes = 64u << 20;  ///< memory for samples kept between uses
   /// Samples looked at together: large enough to keep every thread busy, small enough to stay in memory whatever H is.

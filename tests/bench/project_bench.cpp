@@ -122,7 +122,7 @@ void find_samples(benchmark::State& state, const Scene& scene, bool gather) {
           const QueryLayers layers{level, first, first + lattice.layers(level), 0, 0};
           const TileRuns bins = bin_clusters(lattice, layers, batch, blocks);
           for (std::size_t t = 0; t < tiles.size(); ++t) {
-            if (gather) rows.gather(lattice, layers, tiles[t].block, bins.of(t), ProjectSettings{}.band);
+            if (gather) rows.gather(lattice, layers, tiles[t].block, bins.of(t));
             found += gather ? rows.size() : bins.of(t).size();
           }
         }

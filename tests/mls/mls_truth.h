@@ -24,6 +24,7 @@ struct TruthSample {
   double support = 0;  ///< R, steps; 0: left out
   double weight = 0;   ///< q
   double cell = 0;     ///< steps
+  double band = 0;     ///< steps
   std::vector<double> attributes;
 };
 
@@ -196,7 +197,7 @@ class MlsTruth {
       if (std::abs(t) <= t_error) fit.undecided = true;
       if (t <= 0) continue;
       ++fit.seen;
-      const double band = settings_.band * s.cell / cell;
+      const double band = s.band / cell;
       const double nearest = d2 / (band * band);
       if (std::abs(nearest - 1) <= d2_error / (band * band) + 6 * kUnit) fit.undecided = true;
       fit.nearest = std::min(fit.nearest, nearest);
@@ -276,6 +277,7 @@ inline std::vector<TruthSample> truth_samples(const LocalSamples& s, const Latti
          ++level) {
       t.cell = lattice.cell_size(level);
     }
+    t.band = std::max(static_cast<double>(settings.band_cells) * t.cell, static_cast<double>(settings.band_radii) * r);
     for (const auto& a : s.attributes) t.attributes.push_back(a[i]);
     out.push_back(std::move(t));
   }

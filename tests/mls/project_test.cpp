@@ -206,6 +206,15 @@ std::vector<Scene> scenes() {
     s.lattice = {50, 2};
   }
   {
+    Scene& s = add("a band of radii where cells are small, of cells where they are not");
+    s.cloud = {Shape::sphere, 250, {10, 0, 0}, 350, 60, 160};
+    s.feed.blend = 1.5;
+    s.feed.cell = {0.7, Length::Unit::sample_radius};
+    s.feed.band_cells = 1.5F;
+    s.feed.band_radii = 0.8F;
+    s.lattice = {60, 3};
+  }
+  {
     Scene& s = add("fixed cell");
     s.cloud = {Shape::sphere, 250, {33, 44, 55}, 350, 100, 160};
     s.feed.cell = {1, Length::Unit::world};

@@ -28,6 +28,7 @@ Batch random_batch(std::uint64_t seed, const Lattice& lattice, int buckets, std:
       bucket->support.push_back(random() % 8 == 0 ? 0.0F : static_cast<float>(cells * lattice.cell));
       bucket->weight.push_back(static_cast<float>(random() % 100 + 1));
       bucket->level.push_back(static_cast<std::uint8_t>(random() % static_cast<unsigned>(lattice.levels)));
+      bucket->band.push_back(static_cast<float>(1 + random() % 200));
     }
     out.push_back(bucket);
   }
@@ -83,8 +84,7 @@ TEST(Clumps, HoldEverySampleOnceInsideTheirBox) {
         EXPECT_EQ(c.nz[i], bucket.samples.nz[s]);
         EXPECT_EQ(c.support[i], bucket.support[s]);
         EXPECT_EQ(c.weight[i], bucket.weight[s]);
-        EXPECT_EQ(c.cell[i], static_cast<float>(lattice.cell_size(bucket.level[s])));
-        EXPECT_EQ(c.cell[i], c.cell[k.begin]) << "one level";
+        EXPECT_EQ(c.band[i], bucket.band[s]);
         const std::array<std::int32_t, 3> p{c.x[i], c.y[i], c.z[i]};
         for (int a = 0; a < 3; ++a) {
           EXPECT_LE(k.low[a], static_cast<double>(p[a]) - static_cast<double>(c.support[i]));
@@ -109,6 +109,7 @@ TEST(Clumps, OfAbsurdExtentsAndCells) {
       for (auto* n : {&bucket.samples.nx, &bucket.samples.ny, &bucket.samples.nz}) n->push_back(1);
       bucket.support.push_back(i == 0 ? 3e9F : 10);
       bucket.weight.push_back(1);
+      bucket.band.push_back(10);
       bucket.level.push_back(static_cast<std::uint8_t>(i % lattice.levels));
     }
     const ClusteredBucket c = cluster_samples(bucket, lattice);
@@ -148,7 +149,7 @@ TEST(TileSamples, HoldWhatReachesTheTile) {
           ASSERT_TRUE(bins.of(t).empty());
           continue;
         }
-        rows.gather(lattice, layers, b, bins.of(t), 1.75F);
+        rows.gather(lattice, layers, b, bins.of(t));
         std::multiset<Name> in;
         for (std::size_t k = 0; k < rows.size(); ++k) in.insert(name_of(rows.samples().attributes, k));
         held += in.size();
@@ -223,7 +224,7 @@ TEST(TileSamples, RowsHoldSamplesInCells) {
       for (const SampleCluster& c : b->clusters) runs.push_back({b.get(), c.begin, c.end});
     }
     RowSamples rows;
-    rows.gather(lattice, layers, block, runs, 1.75F);
+    rows.gather(lattice, layers, block, runs);
     const TileSamples& t = rows.samples();
     ASSERT_GT(rows.size(), 20U);
     const double a = lattice.cell_size(level);
@@ -231,7 +232,7 @@ TEST(TileSamples, RowsHoldSamplesInCells) {
     for (std::size_t k = 0; k < rows.size(); ++k) {
       const auto& [bucket, i] = places.at(name_of(t.attributes, k));
       const double support = static_cast<double>(bucket->support[i]) / a;
-      const double band = 1.75 * lattice.cell_size(bucket->level[i]) / a;
+      const double band = static_cast<double>(bucket->band[i]) / a;
       largest = std::max(largest, support);
       EXPECT_NEAR(t.x[k], bucket->samples.x[i] / a - block.x * 8, 1e-5);
       EXPECT_NEAR(t.y[k], bucket->samples.y[i] / a - block.y * 8, 1e-5);

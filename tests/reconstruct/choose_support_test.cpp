@@ -119,9 +119,19 @@ TEST(ChooseSupport, CellsAreFineOnlyWhereFlatPartsAreThinnedOut) {
   const ReconstructionPlan fine = choice_of(by_noise(), survey(0.1F, 2));
   const ReconstructionPlan coarse = choice_of(all, survey(0.1F, 2));
   EXPECT_LT(fine.feed.cell.value, coarse.feed.cell.value);
-  EXPECT_NEAR(static_cast<double>(fine.projection.band) * fine.feed.cell.value,
-              static_cast<double>(coarse.projection.band) * coarse.feed.cell.value, 1e-6)
-      << "as far from the samples";
+  EXPECT_EQ(fine.feed.band_radii, coarse.feed.band_radii) << "as far from the samples";
+}
+
+TEST(ChooseSupport, CellsToldAsAnOptionGiveTheSameBand) {
+  const ReconstructionPlan chosen = choice_of(by_noise(), survey(0.1F, 2));
+  SurfaceSettings given = by_noise();
+  given.cell = chosen.feed.cell;
+  const ReconstructionPlan told = choice_of(given, survey(0.1F, 2));
+  EXPECT_EQ(told.feed.band_cells, chosen.feed.band_cells);
+  EXPECT_EQ(told.feed.band_radii, chosen.feed.band_radii);
+  // A cell that knows nothing of the samples has a band of cells.
+  given.cell = Length{0.5, Length::Unit::world};
+  EXPECT_EQ(choice_of(given, survey(0.1F, 2)).feed.band_cells, FeedSettings{}.band_cells);
 }
 
 TEST(ChooseSupport, GivenNumbersStand) {
