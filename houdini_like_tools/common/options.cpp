@@ -164,7 +164,8 @@ void add_align(CLI::App& tool, bool& align, const std::string& group) {
 void add_normals_choice(CLI::App& tool, std::optional<NormalsChoice>& normals, const std::string& group) {
   tool.add_option(
           "--normals", normals,
-          "Whose normals: the file's; auto: the file's, and found for the samples that have none; estimate: all found")
+          "Whose normals: the file's; auto: the file's, turned where they contradict each other, and found for the "
+          "samples that have none; estimate: all found")
       ->transform(words<NormalsChoice>(
           {{"file", NormalsChoice::file}, {"auto", NormalsChoice::automatic}, {"estimate", NormalsChoice::estimate}}))
       ->option_text("file|auto|estimate [auto]")

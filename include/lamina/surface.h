@@ -31,7 +31,8 @@ enum class FitMode { plane, sphere };
 /// Whose normals are used.
 enum class NormalsChoice {
   file,       ///< the input's; an input without any is refused
-  automatic,  ///< the input's where they are usable; the others are found (NormalsMode::complete)
+  automatic,  ///< the input's where they are usable; the others are found (NormalsMode::complete). Where its signs
+              ///< contradict each other they are found, too (NormalsMode::reorient); all, where they are of no surface
   estimate,   ///< all are found, whatever the input has
 };
 

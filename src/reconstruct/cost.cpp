@@ -258,7 +258,8 @@ std::string noise_text(const SurfacePlan& plan) {
 }
 
 std::string normals_text(const SurfaceStats& stats) {
-  std::string text = stats.normals ? "normals found" : "normals of the file";
+  std::string text = "normals of the file";
+  if (stats.normals) text = stats.normals->estimated > 0 ? "normals found" : "normals of the file, turned to agree";
   text += fmt::format(", {:.2g} degrees off the surface", stats.plan.normal_noise);
   if (stats.plan.sharpen)
     text += fmt::format(", {:.2g} % interpolated over sharp edges", 100 * stats.plan.blurred_normals);

@@ -23,46 +23,6 @@
 namespace lamina {
 namespace {
 
-constexpr std::size_t kRowsAtOnce = std::size_t{1} << 15;
-
-/// Normals that say nothing: what a plan comes to does not depend on them.
-class PlannedNormals final : public WithNormals {
- public:
-  using WithNormals::WithNormals;
-
- private:
-  void give_normals(SampleBatch& out) const override {
-    out.nx.assign(out.size(), 0);
-    out.ny.assign(out.size(), 0);
-    out.nz.assign(out.size(), 1);
-  }
-};
-
-/// How many of the rows looked at lack a usable normal.
-struct Lacking {
-  std::uint64_t rows = 0, missing = 0;
-};
-
-/// All rows, or a million of a large input, spread over it if it can be read anywhere.
-Lacking look_for_normals(PointSource& source, bool every_row, const RunContext& run) {
-  constexpr std::uint64_t kLooks = 32;
-  const PointSourceInfo& info = source.info();
-  const bool part = !every_row && info.count > kLooks * kRowsAtOnce;
-  const std::uint64_t end = part && !info.random_access ? kLooks * kRowsAtOnce : info.count;
-  const std::uint64_t step = part && info.random_access ? info.count / kLooks : kRowsAtOnce;
-  Lacking lacking;
-  SampleBatch batch;
-  for (std::uint64_t first = 0; first < end; first += step) {
-    if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
-    source.read(first, kRowsAtOnce, batch);
-    lacking.rows += batch.size();
-    for (std::size_t i = 0; i < batch.size(); ++i) lacking.missing += defect_of(batch, i) == Defect::normal ? 1 : 0;
-    const bool mixed = lacking.missing > 0 && lacking.missing < lacking.rows;
-    if (mixed && every_row) break;
-  }
-  return lacking;
-}
-
 /// Fills the store. A large input is read once, in a frame chosen by a part of its rows; twice where samples lie
 /// outside what these promised.
 StoredCloud ingest_all(PointSource& source, const SurfaceSettings& settings, const StorePlace& place, Job& job) {
@@ -187,34 +147,6 @@ std::unique_ptr<PointSource> open_inputs(const SurfaceSettings& settings, const 
   require_no_degrees(info);
   if (settings.guess_trade) run.info(describe(guess_trade(info)));
   return source;
-}
-
-std::unique_ptr<PointSource> choose_normals(std::unique_ptr<PointSource> source, const SurfaceSettings& settings,
-                                            const std::string& tmp_dir, Job& job) {
-  const NormalsChoice choice = settings.normals.value_or(NormalsChoice::automatic);
-  if (choice == NormalsChoice::file || source->info().count == 0) return source;
-  NormalsSettings search = settings.normal_search;
-  search.bad_samples = settings.bad_samples;
-  search.mode = NormalsMode::estimate;
-  if (settings.guess_trade) face_by_trade(guess_trade(source->info()).trade, search);
-  if (choice == NormalsChoice::automatic && source->info().has_normals) {
-    const bool asked = settings.normals.has_value();
-    const Lacking lacking = look_for_normals(*source, asked, job.run);
-    // Unasked, a few are not worth the search: they are dropped.
-    constexpr std::uint64_t kFew = 100;
-    if (lacking.missing <= (asked ? 0 : lacking.rows / kFew)) return source;
-    if (lacking.missing < lacking.rows) search.mode = NormalsMode::complete;
-  }
-  if (settings.dry_run) return std::make_unique<PlannedNormals>(std::move(source));
-  RunContext here = job.run;
-  here.tmp_dir = tmp_dir;
-  here.threads = 0;  // this runs on the caller's already
-  const std::string path = source->info().path == "-" ? "standard input" : source->info().path;
-  NormalsReport& report = job.stats.normals.emplace();
-  std::unique_ptr<PointSource> found = with_normals(std::move(source), search, report, here);
-  job.run.info(describe(report));
-  warn_of_conflicts(report, path, job.run);
-  return found;
 }
 
 std::unique_ptr<PointSource> choose_poses(std::unique_ptr<PointSource> source, const SurfaceSettings& settings,
