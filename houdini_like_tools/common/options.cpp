@@ -144,9 +144,10 @@ void add_clean_options(CLI::App& app, CleanSettings& s, const std::string& group
       ->type_name("N")
       ->capture_default_str()
       ->group(group);
-  app.add_flag("--strays,!--keep-strays", s.strays,
-               "Leave out samples that lie on no surface of their neighbours: flying pixels, dust, reflections; "
-               "--keep-strays: leave them in")
+  app.add_flag(
+         "--strays,!--keep-strays", s.strays,
+         "Leave out samples that lie on no surface of their neighbours: flying pixels, dust, reflections; and, where "
+         "there are many, those at the place of another; --keep-strays: leave them in")
       ->group(group);
   app.add_option("--spacing", s.spacing, "Thin out: no two samples nearer than LENGTH; 0: keep all")
       ->type_name("LENGTH")

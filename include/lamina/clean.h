@@ -24,7 +24,9 @@ struct CleanSettings {
   std::optional<double> merge;    ///< >= 0; 0: equal positions only (to 2^-30 of the cloud's diagonal)
   double sigma = 0;               ///< > 0; 0: outliers stay
   std::uint32_t neighbours = 16;  ///< 1..256, of the outlier test
-  bool strays = false;            ///< samples on no surface of their neighbours are left out, by a test local to them
+  /// Samples on no surface of their neighbours are left out, by a test local to them; before, without `merge`, those at
+  /// the place of another, where a look finds more than one in a hundred.
+  bool strays = false;
   double spacing = 0;             ///< > 0: least distance between samples; 0: none
   /// True when a step looks at other samples: then several passes are needed.
   [[nodiscard]] bool looks_around() const { return merge.has_value() || sigma > 0 || strays || spacing > 0; }

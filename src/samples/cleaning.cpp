@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <mutex>
+#include <optional>
 #include <utility>
 
 #include "base/descriptor.h"
@@ -151,6 +153,37 @@ std::uint64_t thin_store(const SlabStore& store, double distance, KeepMasks& mas
   return dropped;
 }
 
+/// Whether more than one sample in a hundred lies at the place of another: what counts samples, as radii do, takes them
+/// for twice as dense. Looks at some buckets.
+bool has_duplicates(const SlabStore& store) {
+  constexpr std::size_t kLooks = 8;
+  constexpr std::uint64_t kMostInLook = 1 << 14;
+  constexpr std::uint64_t kMostOfHundred = 1;
+  std::uint64_t looked_at = 0;
+  std::uint64_t duplicates = 0;
+  LocalSamples samples;
+  std::vector<std::uint64_t> places;
+  std::uint64_t passed = 0;
+  std::size_t looks = 0;
+  for (std::size_t b = 0; b < store.buckets() && looks < kLooks; ++b) {
+    passed += store.count(b);
+    if (store.count(b) == 0 || passed * 2 * kLooks < store.total() * (2 * looks + 1)) continue;
+    ++looks;
+    store.read(b, samples);
+    // Of many, by place: all that lie there or none.
+    const std::uint64_t every = store.count(b) / kMostInLook + 1;
+    places.clear();
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const std::uint64_t place = cell_hash(samples.x[i], samples.y[i], samples.z[i]);
+      if (scrambled(place) % every == 0) places.push_back(place);
+    }
+    std::sort(places.begin(), places.end());
+    looked_at += places.size();
+    duplicates += static_cast<std::uint64_t>(std::distance(std::unique(places.begin(), places.end()), places.end()));
+  }
+  return duplicates * 100 > kMostOfHundred * looked_at;
+}
+
 /// Notes the samples whose masks a step has cleared.
 class Noted {
  public:
@@ -206,7 +239,9 @@ KeepMasks choose_samples(const SlabStore& store, const Cleaning& cleaning, Clean
   KeepMasks masks(store.buckets());
   for (std::size_t b = 0; b < masks.size(); ++b) masks[b].assign(store.count(b), true);
   Noted noted(masks, static_cast<bool>(cleaning.rejected));
-  if (settings.merge) counts.merged = thin_store(store, *settings.merge / cleaning.step, masks, run);
+  std::optional<double> merge = settings.merge;
+  if (!merge && settings.strays && has_duplicates(store)) merge = 0;
+  if (merge) counts.merged = thin_store(store, *merge / cleaning.step, masks, run);
   noted.step(kReasonMerged);
   if (settings.sigma > 0) {
     const Outliers outliers =

@@ -56,6 +56,34 @@ class RejectedSamples : public ::testing::Test {
   SurfaceSettings settings_;
 };
 
+TEST(Duplicates, AreLeftOutWhereThereAreMany) {
+  // A file saved twice into one: every count of samples is twice what the surface shows.
+  const Cloud once = test::sphere_cloud(kSurface);
+  Cloud twice = once;
+  for (std::size_t i = 0; i < once.size(); ++i) twice.add(once.positions[i], once.normals[i]);
+  SurfaceSettings settings;
+  settings.clean.strays = true;
+  const test::Reconstruction alone = reconstruct(once, settings);
+  EXPECT_EQ(alone.stats.cleaned.merged, 0U);
+  const test::Reconstruction r = reconstruct(twice, settings);
+  EXPECT_EQ(r.stats.cleaned.merged, kSurface);
+  EXPECT_TRUE(r.facts.is_closed_manifold());
+  EXPECT_NEAR(static_cast<double>(r.mesh.triangles.size()), static_cast<double>(alone.mesh.triangles.size()),
+              0.02 * static_cast<double>(alone.mesh.triangles.size()));
+  // Both faces of a sheet without thickness are no duplicates.
+  Cloud sheet = test::plane_cloud(kSurface);
+  const std::size_t face = sheet.size();
+  for (std::size_t i = 0; i < face; ++i) {
+    const Point3& n = sheet.normals[i];
+    sheet.add(sheet.positions[i], {-n[0], -n[1], -n[2]});
+  }
+  SurfaceSettings believing = settings;
+  believing.normals = NormalsChoice::file;
+  EXPECT_EQ(reconstruct(sheet, believing).stats.cleaned.merged, 0U);
+  // Nor are samples left out that nobody wants cleaned.
+  EXPECT_EQ(reconstruct(twice, {}).stats.cleaned.merged, 0U);
+}
+
 TEST_F(RejectedSamples, AreThoseOfTheInput) {
   const SurfaceStats stats = reconstruct_surface(settings_, {});
   PointSourceInfo info;
