@@ -27,7 +27,7 @@ struct CleanSettings {
   /// Samples on no surface of their neighbours are left out, by a test local to them; before, without `merge`, those at
   /// the place of another, where a look finds more than one in a hundred.
   bool strays = false;
-  double spacing = 0;             ///< > 0: least distance between samples; 0: none
+  double spacing = 0;  ///< > 0: least distance between samples; 0: none
   /// True when a step looks at other samples: then several passes are needed.
   [[nodiscard]] bool looks_around() const { return merge.has_value() || sigma > 0 || strays || spacing > 0; }
 };
