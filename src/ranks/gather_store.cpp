@@ -144,12 +144,14 @@ CloudSurvey survey_together(Ranks& ranks, const SurfaceSettings& settings, const
   });
   Packer found;
   found.put(survey.radii);
+  found.put(survey.noisy);
   found.put(survey.support.places);
   found.put(survey.support.lines);
   Bytes bytes = found.take();
   ranks.broadcast(bytes);
   Unpacker in(bytes);
   survey.radii = in.get<RadiusSurvey>();
+  survey.noisy = in.get<bool>();
   survey.support.places = in.get_list<SupportPlace>();
   survey.support.lines = in.get<bool>();
   return survey;

@@ -67,6 +67,10 @@ void choose_for_lines(const SupportSurvey& survey, ReconstructionPlan& plan) {
 
 }  // namespace
 
+bool is_noisy(const RadiusSurvey& radii, const SupportSurvey& support) {
+  return radii.noise > kNoisy || (radii.noise > kPerhapsNoisy && support.median() > kNoiseSupport);
+}
+
 double choose_deviation(const RadiusSurvey& survey) {
   constexpr double kStep = 1e-4;  // so that what is told as an option gives the same mesh
   const double wanted = kCleanDeviation + kNoiseDeviation * static_cast<double>(survey.noise);
@@ -80,7 +84,7 @@ void choose_support(const SurfaceSettings& s, const CloudSurvey& survey, const P
   plan.feed.blend = kDefaultBlend;
   if (s.blend) {
     plan.feed.blend = *s.blend;
-  } else if (radii.noise > kNoisy) {
+  } else if (survey.noisy) {
     choose_for_noise(survey, s, thins ? kNoisyCell : kChosenCell, plan);
   } else if (radii.high < kEven * radii.low && !survey.support.lines) {
     choose_for_even(s.cell.has_value(), thins && radii.noise <= kSharp ? kThinnedCell : kChosenCell, plan);
@@ -89,16 +93,17 @@ void choose_support(const SurfaceSettings& s, const CloudSurvey& survey, const P
     plan.holes.watertight = info.found_normals ? Watertight::any_loops : Watertight::short_loops;
   }
   if (survey.support.lines) choose_for_lines(survey.support, plan);
-  if (!s.blend && radii.noise <= kNoisy) plan.trim = kCleanRimOverhang;
+  if (!s.blend && !survey.noisy) plan.trim = kCleanRimOverhang;
   if (s.trim) plan.trim = *s.trim;
   // Rims that are cut where the samples end may run on before.
-  if (plan.trim > 0 && radii.noise > kNoisy) plan.doubtful = DoubtfulPoints::as_extended;
+  if (plan.trim > 0 && survey.noisy) plan.doubtful = DoubtfulPoints::as_extended;
   if (s.cell) plan.feed.cell = *s.cell;
   if (s.refit) {
     plan.refit.support = *s.refit;
     plan.refit.by_place = nullptr;
   }
-  plan.projection.creases = s.features.value_or(!s.blend && radii.noise <= kSharp && !plan.lines) && !s.diffuse;
+  plan.projection.creases =
+      s.features.value_or(!s.blend && !survey.noisy && radii.noise <= kSharp && !plan.lines) && !s.diffuse;
   if (plan.projection.creases && !s.refit && radii.noise <= kExact && radii.blurred > kBlurred) {
     plan.refit.support = double{kConsensusReach};
     plan.refit.only_blurred = true;

@@ -11,6 +11,11 @@ inline constexpr double kDefaultBlend = 1.2;
 /// resolves looks the same up to 0.05; noise of half a spacing either way has 0.12, of a spacing 0.3.
 inline constexpr float kNoisy = 0.05F;
 
+/// From so little on such samples are noisy where the supports that their neighbours ask for are so wide (H) in the
+/// middle: detail asks for narrow ones, noise for wide ones.
+inline constexpr float kPerhapsNoisy = 0.025F;
+inline constexpr float kNoiseSupport = 1.5F;
+
 /// H of a noisy cloud in which no sample has enough neighbours to tell how wide supports should be.
 inline constexpr double kNoisyBlend = 1.75;
 

@@ -260,11 +260,15 @@ void check_settings(const SurfaceSettings& s) {
 CloudSurvey survey_cloud(const SurfaceSettings& s, const SlabStore& store, const ReadBucket& read) {
   CloudSurvey out;
   out.radii = survey_radii(store, read, kSurveySamples, s.density);
+  out.noisy = is_noisy(out.radii, out.support);
   if (s.blend) return out;
-  if (out.radii.noise > kNoisy)
+  if (out.radii.noise > kPerhapsNoisy) {
     out.support = survey_support(store, read, out.radii, SupportAim::noise);
-  else if (out.radii.lopsided > kLopsided)
-    out.support = survey_support(store, read, out.radii, SupportAim::all_round);
+    out.noisy = is_noisy(out.radii, out.support);
+    if (out.noisy) return out;
+    out.support = {};
+  }
+  if (out.radii.lopsided > kLopsided) out.support = survey_support(store, read, out.radii, SupportAim::all_round);
   return out;
 }
 

@@ -92,6 +92,9 @@ void check_settings(const SurfaceSettings& settings);
 /// Error(empty) where no sampling density can be estimated.
 ReconstructionPlan make_plan(const SurfaceSettings& settings, const StoredCloud& cloud, const CloudSurvey& survey);
 
+/// Whether supports are to average: noise beyond what detail looks like, or less that asks for wide supports.
+bool is_noisy(const RadiusSurvey& radii, const SupportSurvey& support);
+
 /// What make_plan() wants to know of a cloud: radii and noise, and where H is to be chosen and the cloud is noisy, H by
 /// place. `read`: as for survey_radii().
 CloudSurvey survey_cloud(const SurfaceSettings& settings, const SlabStore& store, const ReadBucket& read);

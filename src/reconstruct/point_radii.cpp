@@ -175,7 +175,7 @@ PointRadiiReport write_radii(PointSource& source, PointsWriter& writer, const Po
   as_reconstructed.input = source.info().path;
   as_reconstructed.density = settings.density;
   const RadiusSurvey surveyed = survey_radii(store, kSurveySamples, settings.density);
-  const ReconstructionPlan plan = make_plan(as_reconstructed, cloud, {surveyed, {}});
+  const ReconstructionPlan plan = make_plan(as_reconstructed, cloud, {surveyed, is_noisy(surveyed, {}), {}});
 
   const std::uint64_t whole = store.total() * kRecord;
   edit::RecordSorter by_row(sizeof(float), static_cast<std::size_t>(std::min<std::uint64_t>(memory, whole)), directory);

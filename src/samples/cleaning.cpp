@@ -251,7 +251,7 @@ KeepMasks choose_samples(const SlabStore& store, const Cleaning& cleaning, Clean
   }
   noted.step(kReasonOutlier);
   if (settings.strays) {
-    const StrayCounts strays = drop_strays(store, masks, run, noted.reasons());
+    const StrayCounts strays = drop_strays(store, masks, cleaning.normals, run, noted.reasons());
     counts.lonely = strays.lonely;
     counts.off_surface = strays.off_surface;
   }
@@ -308,7 +308,8 @@ std::vector<bool> rows_to_drop(PointSource& source, const CleanSettings& setting
   const Survey survey = survey_input(rows, bad, silent, settings.pick);
   const Frame frame = choose_frame(survey, FrameMode::pca);
   const Ingested in = ingest(rows, survey, frame, directory, run, {1, settings.pick});
-  const KeepMasks keep = choose_samples(in.store, {settings, frame.step, directory}, counts, run);
+  const SampleNormals normals = source.info().has_normals ? SampleNormals::given : SampleNormals::none;
+  const KeepMasks keep = choose_samples(in.store, {settings, frame.step, directory, normals}, counts, run);
   std::vector<bool> drop(source.info().count, false);
   LocalSamples samples;
   for (std::size_t b = 0; b < keep.size(); ++b) {

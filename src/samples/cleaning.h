@@ -101,10 +101,15 @@ struct StrayCounts {
   [[nodiscard]] std::uint64_t all() const { return lonely + off_surface; }
 };
 
-/// Clears the masks of stray samples; those they find cleared are not there. Where many go, those left are tested
-/// again. `reasons`: where wanted, is told of each. Depends on the cloud alone. Memory: some 60 bytes for each sample
-/// of twelve dozen spacings of the cloud's height.
-StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, const RunContext& run, Reasons* reasons = nullptr);
+/// Whether the store's normals say anything.
+enum class SampleNormals : std::uint8_t { given, none };
+
+/// Clears the masks of stray samples; those they find cleared are not there. Strays left over are judged without those
+/// found first, and samples too sparse to have a dozen neighbours by each other. `reasons`: where wanted, is told of
+/// each. Depends on the cloud alone. Memory: some 60 bytes for each sample of twelve dozen spacings of the cloud's
+/// height, and three bits for each of the cloud.
+StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, SampleNormals normals, const RunContext& run,
+                        Reasons* reasons = nullptr);
 
 // Thinning, and all steps in their order.
 
@@ -143,6 +148,7 @@ struct Cleaning {
   CleanSettings settings;
   double step = 1;        ///< input units per fixed-point step
   std::string directory;  ///< of temporary files
+  SampleNormals normals = SampleNormals::given;
   /// Where given, is told what is left out while the store still has it.
   std::function<void(const Reasons&)> rejected{};
 };

@@ -40,6 +40,12 @@ float typical_distance(const std::vector<SupportPlace>& places) {
 
 }  // namespace
 
+float SupportSurvey::median() const {
+  std::vector<float> supports;
+  for (const SupportPlace& p : places) supports.push_back(p.blend);
+  return supports.empty() ? 0 : median_of(supports);
+}
+
 SupportField::SupportField(const std::vector<SupportPlace>& places) {
   std::vector<float> sorted;
   sorted.reserve(places.size());

@@ -41,6 +41,8 @@ enum class SupportAim : std::uint8_t { all_round, noise };
 struct SupportSurvey {
   std::vector<SupportPlace> places;
   bool lines = false;  ///< at most places the least H does not reach neighbours on all sides
+  /// H in the middle of the places; 0 where there are none.
+  [[nodiscard]] float median() const;
 };
 
 /// H at some four thousand samples from all over the cloud, one in sixteen at the most; `survey` is of the same store.
@@ -53,6 +55,7 @@ SupportSurvey survey_support(const SlabStore& store, const ReadBucket& read, con
 /// What is seen of a cloud before it is streamed.
 struct CloudSurvey {
   RadiusSurvey radii;
+  bool noisy = false;     ///< supports are to average
   SupportSurvey support;  ///< without places where supports do not follow them
 };
 

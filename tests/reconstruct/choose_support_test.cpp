@@ -16,7 +16,8 @@ RadiusSurvey survey(float noise, float high) {
 ReconstructionPlan choice_of(const SurfaceSettings& settings, const RadiusSurvey& survey, const PointSourceInfo& info,
                              const std::vector<SupportPlace>& support = {}) {
   ReconstructionPlan plan;
-  choose_support(settings, {survey, {support, false}}, info, plan);
+  const SupportSurvey supports{support, false};
+  choose_support(settings, {survey, is_noisy(survey, supports), supports}, info, plan);
   return plan;
 }
 ReconstructionPlan choice_of(const SurfaceSettings& settings, const RadiusSurvey& survey, bool found_normals = false) {
@@ -37,6 +38,16 @@ TEST(ChooseSupport, NothingIsChosenUnlessAskedFor) {
   EXPECT_EQ(choice.feed.blend, 1.2);
   EXPECT_EQ(choice.refit.support, 0);
   EXPECT_EQ(choice.feed.cell, (Length{0.9, Length::Unit::influence_radius}));
+}
+
+TEST(ChooseSupport, LittleNoiseIsToldFromDetailByTheSupportsItAsksFor) {
+  const SupportSurvey wide{{{{0, 0, 0}, 1.3F}, {{900, 0, 0}, 1.7F}, {{0, 900, 0}, 3}}, false};
+  const SupportSurvey narrow{{{{0, 0, 0}, 1.2F}, {{900, 0, 0}, 1.25F}, {{0, 900, 0}, 3}}, false};
+  EXPECT_TRUE(is_noisy(survey(0.04F, 2), wide));
+  EXPECT_FALSE(is_noisy(survey(0.04F, 2), narrow));
+  EXPECT_FALSE(is_noisy(survey(0.04F, 2), {}));
+  EXPECT_FALSE(is_noisy(survey(0.02F, 2), wide)) << "a sharp part's scan";
+  EXPECT_TRUE(is_noisy(survey(0.06F, 2), narrow));
 }
 
 TEST(ChooseSupport, EvenCleanCloudsGetTheNarrowestSupport) {

@@ -50,12 +50,12 @@ struct Dropped {
   std::uint64_t high = 0, low = 0;  ///< above and below y = 3 spacings
 };
 
-Dropped drop(const LocalSamples& s, std::int32_t bucket_height) {
+Dropped drop(const LocalSamples& s, std::int32_t bucket_height, SampleNormals normals = SampleNormals::given) {
   const SlabStore store = make_store(s, bucket_height);
   KeepMasks masks(store.buckets());
   for (std::size_t b = 0; b < masks.size(); ++b) masks[b].assign(store.count(b), true);
   Dropped out;
-  out.counts = drop_strays(store, masks, {});
+  out.counts = drop_strays(store, masks, normals, {});
   LocalSamples read;
   for (std::size_t b = 0; b < masks.size(); ++b) {
     if (store.count(b) == 0) continue;
@@ -81,6 +81,28 @@ TEST(Strays, DustGoesAndTheSurfaceUnderItStays) {
   const Dropped dropped = drop(s, 1 << 16);
   EXPECT_GE(dropped.high, 80u) << "chance makes a tenth of them look like a surface";
   EXPECT_LE(dropped.low, 5u);
+}
+
+TEST(Strays, ManyOutliersFarFromEachOtherGo) {
+  LocalSamples s;
+  add_plane(s, 150, 0, kGap, 12);
+  add_dust(s, 2000, 150, 13);
+  const Dropped dropped = drop(s, 1 << 16);
+  EXPECT_GE(dropped.high, 1700u) << "nine in ten; chance has some on a plane";
+  EXPECT_LE(dropped.low, 5u);
+}
+
+TEST(Strays, AreToldByPositionsAloneWhereThereAreNoNormals) {
+  LocalSamples s;
+  add_plane(s, 100, 0, kGap, 14);
+  const std::size_t surface = s.size();
+  add_dust(s, 300, 100, 15);
+  s.nx.assign(s.size(), 0);
+  s.ny.assign(s.size(), 0);
+  s.nz.assign(s.size(), 1);
+  const Dropped dropped = drop(s, 1 << 16, SampleNormals::none);
+  EXPECT_LE(dropped.low, surface / 1000);
+  EXPECT_GE(dropped.high, 200u);
 }
 
 TEST(Strays, ASparseSurfaceBesideADenseOneIsNoStray) {
