@@ -28,7 +28,8 @@ struct CleanOptions {
 void run_clean(const CleanOptions& o) {
   require_sane(o.settings);
   if (!o.settings.looks_around() && o.settings.pick.takes_all())
-    throw Error(ExitCode::usage, "clean: nothing to do; give --clip, --every, --merge, --outliers or --spacing");
+    throw Error(ExitCode::usage,
+                "clean: nothing to do; give --clip, --every, --merge, --outliers, --strays or --spacing");
   const RunContext context = make_context(o.run, o.output);
   PointSettings reading = o.reading;
   const RowPick& pick = o.settings.pick;
@@ -62,7 +63,8 @@ void add_clean(CLI::App& app) {
   add_run_options(*tool, o->run);
   add_notes(
       *tool,
-      "Points are left out in this order: outside the box, by number, duplicates, outliers, more than wanted. Those "
+      "Points are left out in this order: outside the box, by number, duplicates, outliers, strays, more than wanted. "
+      "Those "
       "that stay keep their order and every value. lamina surface does the same while it reads, by the same options. "
       "Where merging and thinning may choose, the point that comes first along the cloud stays; of equal positions "
       "the first in the file. Memory: a bit for each point and 256 MB, the rest is on disk.");

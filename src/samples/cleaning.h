@@ -12,7 +12,7 @@
 
 namespace lamina {
 
-/// Which samples of each bucket stay.
+/// Which samples of each bucket stay. Where only some are meant, a bucket that has none of them may have no mask.
 using KeepMasks = std::vector<std::vector<bool>>;
 
 /// Why samples of each bucket do not stay: the number of a reason, 0 where they do. A bucket that loses none may have
@@ -107,7 +107,7 @@ enum class SampleNormals : std::uint8_t { given, none };
 /// Clears the masks of stray samples; those they find cleared are not there. Strays left over are judged without those
 /// found first, and samples too sparse to have a dozen neighbours by each other. `reasons`: where wanted, is told of
 /// each. Depends on the cloud alone. Memory: some 60 bytes for each sample of twelve dozen spacings of the cloud's
-/// height, and three bits for each of the cloud.
+/// height, a bit for each of the cloud, and of buckets with samples too sparse two more.
 StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, SampleNormals normals, const RunContext& run,
                         Reasons* reasons = nullptr);
 

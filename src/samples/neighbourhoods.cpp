@@ -238,6 +238,7 @@ std::optional<std::int64_t> Neighbourhoods::complete_layer_from(std::int64_t lay
 void Neighbourhoods::read_next() {
   const std::size_t bucket = next_filled();
   next_ = bucket + 1;
+  if (masks_[bucket].empty()) return;
   store_.read(bucket, local_);
   Layer* layer = nullptr;
   std::int32_t z = 0;  // of that layer

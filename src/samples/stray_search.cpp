@@ -74,6 +74,15 @@ float mean_distance(const Placed& s, std::size_t place, const Company& company, 
   return sum / static_cast<float>(kStrayNeighbours);
 }
 
+template <class Each>
+void Search::for_suspects(const Each& each) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, around_.samples().size(), 4096), [&](const auto& range) {
+    for (std::size_t p = range.begin(); p < range.end(); ++p) {
+      if (out_.suspect[p] != kClear) each(p);
+    }
+  });
+}
+
 void Search::search_wanted() {
   auto rows = static_cast<std::uint32_t>(out_.neighbours.size() / kLookedAt);
   for (std::size_t p = 0; p < out_.look.size(); ++p) {

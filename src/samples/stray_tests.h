@@ -17,10 +17,10 @@ bool is_off_surface(const Placed& s, std::size_t place, const Company& company, 
 /// The same by positions alone: its surface is the plane that its company lies along.
 bool is_off_plane(const Placed& s, std::size_t place, const Company& company, float least);
 
-/// The variance of a place and its company along the normal of their plane, as a share of that along their longest
-/// axis: 0 on a plane or a line, 0.3 in the middle for a dozen that fill a ball. Negative where these are fewer.
-float thickness_of(const Placed& s, std::size_t place, const Company& company);
-/// Whether samples fill the space around a place instead of lying on surfaces: their mean thickness, of those known.
+/// Of a place and its company; not known where these are fewer than kStrayNeighbours.
+Scatter scatter_of(const Placed& s, std::size_t place, const Company& company, SampleNormals normals);
+/// Whether samples fill the space around a place instead of lying on surfaces, by the means of what is known of it and
+/// its company.
 bool fills_space(const Surroundings& known, std::size_t place, const Company& company);
 
 }  // namespace lamina

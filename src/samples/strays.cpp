@@ -27,9 +27,9 @@ constexpr int kMostReaches = 4;
 /// As long as there are more of them than so many, and than one in so many of all: far ends of a scan.
 constexpr std::uint64_t kFewSparse = kStrayNeighbours;
 constexpr std::uint64_t kRarelySparse = 10000;
-/// Samples are sparse for their cloud where their neighbours lie so many median radii away in the mean, three times as
-/// far as usual: whether they fill space is asked there alone, since under noise those of a surface do.
-constexpr float kSparse = 2;
+/// Samples are sparse for their cloud where their neighbours lie so many median radii away in the mean, more than
+/// twice as far as usual: whether they fill space is asked there alone, since under noise those of a surface do.
+constexpr float kSparse = 1.5F;
 
 /// The median of the distances of its company; 0 where it has none.
 float usual_distance(const Surroundings& known, const Company& company) {
@@ -47,8 +47,8 @@ float usual_distance(const Surroundings& known, const Company& company) {
 
 /// What samples are judged by.
 struct Measures {
-  float reach = 1;  ///< neighbours are looked for as far
-  float sparse;     ///< mean distance to a dozen neighbours from which on samples are sparse for their cloud
+  float reach = 1;   ///< neighbours are looked for as far
+  float sparse = 0;  ///< mean distance to a dozen neighbours from which on samples are sparse for their cloud
   SampleNormals normals = SampleNormals::given;
 };
 
@@ -66,9 +66,9 @@ void judge_places(const Neighbourhoods& around, const Measures& by, float margin
   for_places([&](std::size_t p) {
     if (known.count[p] > 0) known.distance[p] = mean_distance(samples, p, company_of(known, p), by.reach);
   });
-  known.thickness.assign(samples.size(), -1);
+  known.scatter.assign(samples.size(), {});
   for_places([&](std::size_t p) {
-    if (known.distance[p] > by.sparse) known.thickness[p] = thickness_of(samples, p, company_of(known, p));
+    if (known.distance[p] > by.sparse) known.scatter[p] = scatter_of(samples, p, company_of(known, p), by.normals);
   });
   const auto is_off = [&](std::size_t p, const Company& company, float least) {
     return by.normals == SampleNormals::given ? is_off_surface(samples, p, company, least)
@@ -118,7 +118,6 @@ class StraySweep {
 
 KeepMasks StraySweep::judge(const KeepMasks& among, const Measures& by, const RunContext& run) {
   KeepMasks sparse(among.size());
-  for (std::size_t b = 0; b < among.size(); ++b) sparse[b].assign(among[b].size(), false);
   sparse_ = 0;
   Neighbourhoods around(store_, among, by.reach, by.normals == SampleNormals::given ? find_doubtful : doubt_all);
   Surroundings known;
@@ -136,7 +135,9 @@ KeepMasks StraySweep::judge(const KeepMasks& among, const Measures& by, const Ru
       if (known.stray[p] != kStays) {
         drop(samples.bucket[p], samples.number[p], known.stray[p]);
       } else if (company_of(known, p).count < kStrayNeighbours) {
-        sparse[samples.bucket[p]][samples.number[p]] = true;
+        std::vector<bool>& bucket = sparse[samples.bucket[p]];
+        bucket.resize(store_.count(samples.bucket[p]), false);
+        bucket[samples.number[p]] = true;
         ++sparse_;
       }
     }

@@ -95,6 +95,22 @@ TEST_F(CleanTool, StrayPointsGoAndTheSurfaceStays) {
   EXPECT_GT(left.size(), 0.995 * static_cast<double>(rows_.size()));
 }
 
+TEST_F(CleanTool, StraysAreToldWithoutNormals) {
+  PointColumns columns = sphere_columns();
+  columns.normals = false;
+  SampleBatch rows = rows_;
+  for (const double far : {1.3, 1.4, 1.5, 1.6}) {
+    append_row(rows, rows_, 0);
+    rows.x.back() *= far, rows.y.back() *= far, rows.z.back() *= far;
+  }
+  write_points(cloud_, rows, columns);
+  const auto outcome = run_lamina({"clean", cloud_, "-o", out_, "--strays"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const SampleBatch left = read_points(out_);
+  EXPECT_GT(left.size(), 0.99 * static_cast<double>(rows_.size())) << "a sphere, seen from all sides";
+  for (std::size_t i = 0; i < left.size(); ++i) EXPECT_LT(std::hypot(left.x[i], left.y[i], left.z[i]), 1.01);
+}
+
 TEST_F(CleanTool, SpacingLeavesNoPairNearerAndNoGapWider) {
   const double spacing = 0.1;
   ASSERT_EQ(clean(rows_, {"--spacing", "0.1"}).code, 0);
