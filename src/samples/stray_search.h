@@ -18,16 +18,6 @@ enum Suspicion : std::uint8_t {
   kToCompare,  ///< perhaps either: its neighbours' own have to be known
 };
 
-/// How little a dozen samples look like those of a surface.
-struct Scatter {
-  /// Variance along the normal of their plane, as a share of that along their longest axis: 0 on a plane or a line, 0.3
-  /// in the middle for a dozen that fill a ball. Negative: not known.
-  float thickness = -1;
-  /// How far their normals lie along one axis, whichever way: the largest eigenvalue of their mean product with
-  /// themselves. 1: all do; 0.5 in the middle for a dozen that face anywhere; 1 where there are no normals.
-  float order = 1;
-};
-
 /// What is known of the places of a slab.
 struct Surroundings {
   /// Neighbours looked for, so that enough are left when some of them are strays.
@@ -41,7 +31,7 @@ struct Surroundings {
   std::vector<std::uint8_t> suspect;      ///< Suspicion
   std::vector<std::uint8_t> look;         ///< Search's
   std::vector<std::uint8_t> beside;       ///< 1: few neighbours, but many samples not much farther away
-  std::vector<Scatter> scatter;           ///< scatter_of() where samples are sparse
+  std::vector<float> scatter;             ///< scatter_of() where samples are sparse, else negative
 
   /// Of a place that has been searched around: `count` of them.
   [[nodiscard]] const std::uint32_t* neighbours_of(std::size_t place) const {

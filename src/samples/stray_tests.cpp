@@ -18,12 +18,13 @@ constexpr float kPlainThickness = 0.25F;
 /// Fewer lie on one plane by chance.
 constexpr std::size_t kLeastPlain = 6;
 
-/// Mean thickness from which on samples fill space. A dozen by chance have 0.3 (one such mean in a hundred less than
-/// 0.25), those along a right edge 0.1, those of a surface under noise of a third of the spacing 0.06, of half 0.14.
-constexpr float kFillsSpace = 0.28F;
-/// Mean order below which sparse samples fill space, too. Of outliers all over a box one mean in a hundred is above
-/// 0.57, whatever a choice among them has left; of the sparse samples of scans one in a hundred is below 0.57 to 0.77.
-constexpr float kLeastOrder = 0.58F;
+/// Mean scatter from which on samples fill space.
+/// With normals: of outliers all over a box one mean in a hundred is less than 0.43, whatever a choice among them has
+/// left; of the sparse samples of scans one in a hundred is more than 0.23 to 0.43.
+constexpr float kDisordered = 0.42F;
+/// Without: a dozen by chance have 0.3 (one such mean in a hundred less than 0.25), those along a right edge 0.1, those
+/// of a surface under noise of a third of the spacing 0.06, of half 0.14.
+constexpr float kThick = 0.22F;
 
 /// A place and its company, from their middle.
 using Around = Eigen::Matrix<float, 3, kStrayNeighbours + 1>;
@@ -99,15 +100,15 @@ bool is_off_plane(const Placed& s, std::size_t place, const Company& company, fl
   return within(kNearPlane) < least * found && within(kOnPlane) < kLeastExact * found;
 }
 
-Scatter scatter_of(const Placed& s, std::size_t place, const Company& company, SampleNormals normals) {
-  if (company.count < kStrayNeighbours) return {};
-  Scatter out;
-  const Around at = around_of(s, place, company);
+float scatter_of(const Placed& s, std::size_t place, const Company& company, SampleNormals normals) {
+  if (company.count < kStrayNeighbours) return -1;
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
-  solver.computeDirect(at * at.transpose(), Eigen::EigenvaluesOnly);
-  const Eigen::Vector3f along = solver.eigenvalues();
-  out.thickness = along[2] > 0 ? std::max(along[0], 0.0F) / along[2] : 0;
-  if (normals == SampleNormals::none) return out;
+  if (normals == SampleNormals::none) {
+    const Around at = around_of(s, place, company);
+    solver.computeDirect(at * at.transpose(), Eigen::EigenvaluesOnly);
+    const Eigen::Vector3f along = solver.eigenvalues();
+    return along[2] > 0 ? std::max(along[0], 0.0F) / along[2] : 0;
+  }
   Around facing;
   facing.col(0) << s.nx[place], s.ny[place], s.nz[place];
   for (std::size_t k = 0; k < company.count; ++k) {
@@ -115,22 +116,20 @@ Scatter scatter_of(const Placed& s, std::size_t place, const Company& company, S
     facing.col(static_cast<Eigen::Index>(k) + 1) << s.nx[n], s.ny[n], s.nz[n];
   }
   solver.computeDirect(facing * facing.transpose(), Eigen::EigenvaluesOnly);
-  out.order = solver.eigenvalues()[2] / static_cast<float>(facing.cols());
-  return out;
+  return 1 - solver.eigenvalues()[2] / static_cast<float>(facing.cols());
 }
 
-bool fills_space(const Surroundings& known, std::size_t place, const Company& company) {
-  if (known.scatter[place].thickness < 0) return false;
-  Scatter sum = known.scatter[place];
+bool fills_space(const Surroundings& known, std::size_t place, const Company& company, SampleNormals normals) {
+  float sum = known.scatter[place];
+  if (sum < 0) return false;
   float count = 1;
   for (std::size_t k = 0; k < company.count; ++k) {
-    const Scatter& its = known.scatter[company.places[k]];
-    if (its.thickness < 0) continue;
-    sum.thickness += its.thickness;
-    sum.order += its.order;
+    const float its = known.scatter[company.places[k]];
+    if (its < 0) continue;
+    sum += its;
     ++count;
   }
-  return sum.thickness > kFillsSpace * count || sum.order < kLeastOrder * count;
+  return sum > (normals == SampleNormals::given ? kDisordered : kThick) * count;
 }
 
 void find_doubtful(const Placed& s, const SampleLeaf& leaf, std::uint8_t* doubtful) {

@@ -17,10 +17,14 @@ bool is_off_surface(const Placed& s, std::size_t place, const Company& company, 
 /// The same by positions alone: its surface is the plane that its company lies along.
 bool is_off_plane(const Placed& s, std::size_t place, const Company& company, float least);
 
-/// Of a place and its company; not known where these are fewer than kStrayNeighbours.
-Scatter scatter_of(const Placed& s, std::size_t place, const Company& company, SampleNormals normals);
-/// Whether samples fill the space around a place instead of lying on surfaces, by the means of what is known of it and
+/// How little a place and its company look like samples of a surface; negative where these are fewer than
+/// kStrayNeighbours. With normals, by how much they do not lie along one axis, whichever way: 1 - the largest
+/// eigenvalue of their mean product with themselves, 0 where all do, 0.5 in the middle where they face anywhere.
+/// Without, the variance of the places along the normal of their plane as a share of that along their longest axis: 0
+/// on a plane or a line, 0.3 in the middle for a dozen that fill a ball.
+float scatter_of(const Placed& s, std::size_t place, const Company& company, SampleNormals normals);
+/// Whether samples fill the space around a place instead of lying on surfaces, by the mean of what is known of it and
 /// its company.
-bool fills_space(const Surroundings& known, std::size_t place, const Company& company);
+bool fills_space(const Surroundings& known, std::size_t place, const Company& company, SampleNormals normals);
 
 }  // namespace lamina

@@ -66,7 +66,7 @@ void judge_places(const Neighbourhoods& around, const Measures& by, float margin
   for_places([&](std::size_t p) {
     if (known.count[p] > 0) known.distance[p] = mean_distance(samples, p, company_of(known, p), by.reach);
   });
-  known.scatter.assign(samples.size(), {});
+  known.scatter.assign(samples.size(), -1);
   for_places([&](std::size_t p) {
     if (known.distance[p] > by.sparse) known.scatter[p] = scatter_of(samples, p, company_of(known, p), by.normals);
   });
@@ -83,7 +83,7 @@ void judge_places(const Neighbourhoods& around, const Measures& by, float margin
       verdicts[p] = kIsLonely;
     } else if (known.beside[p] != 0 && company.count < kStrayNeighbours) {
       if (company.count < kLeastCompany || is_off(p, company, kLeastOnSparseSurface)) verdicts[p] = kIsOffSurface;
-    } else if (fills_space(known, p, company) || is_off(p, company, kLeastOnSurface)) {
+    } else if (fills_space(known, p, company, by.normals) || is_off(p, company, kLeastOnSurface)) {
       verdicts[p] = kIsOffSurface;
     }
   });
@@ -164,8 +164,10 @@ StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, SampleNormals 
   StraySweep sweep(store, masks, reasons);
   KeepMasks among = masks;
   for (int pass = 0; pass < kMostReaches; ++pass, reach *= kNextReach) {
-    const Measures by{static_cast<float>(std::clamp(reach, 1.0, kMostReach)), kSparse * static_cast<float>(radius),
-                      normals};
+    Measures by;
+    by.reach = static_cast<float>(std::clamp(reach, 1.0, kMostReach));
+    by.sparse = kSparse * static_cast<float>(radius);
+    by.normals = normals;
     among = sweep.judge(among, by, run);
     if (sweep.sparse() <= std::max(kFewSparse, store.total() / kRarelySparse)) break;
   }
