@@ -1,6 +1,6 @@
 // Whether normals that came with a cloud can be believed. Those from plane fits have no sign of their own: many
 // programs leave them as they fall, turn all of them to one side of a plane, or spread them with gaps. Others write the
-// same normal for every sample.
+// same normal for every sample, and those from the differences of a noisy range image face anywhere.
 #pragma once
 #include <Eigen/Core>
 #include <cstdint>
@@ -19,6 +19,9 @@ struct GivenNormals {
   double apart = 0;
   std::uint64_t in_planes = 0;  ///< neighbours, of those samples whose neighbours lie in a plane
   std::uint64_t leaning = 0;    ///< of these, with a normal that leans more than 45 degrees from the plane's
+  /// How little the normals of a sample and its neighbours lie along one axis, whichever way, in the middle: 1 - the
+  /// largest eigenvalue of their mean product with themselves. 0 where all do, 0.52 where they face anywhere.
+  double disorder = 0;
 
   [[nodiscard]] double share() const { return pairs == 0 ? 0 : static_cast<double>(odd) / static_cast<double>(pairs); }
   [[nodiscard]] double flat_share() const {
@@ -28,6 +31,8 @@ struct GivenNormals {
   [[nodiscard]] bool contradict() const;
   /// Whether they are of another surface, so that all of them are to be found again.
   [[nodiscard]] bool lean() const;
+  /// Whether they face nearly anywhere, so that the samples' places tell more of the surface.
+  [[nodiscard]] bool scatter() const;
 };
 
 /// Looks at some four thousand of the samples. Normals of any length; samples without one (zero, not finite), or whose

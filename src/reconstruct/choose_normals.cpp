@@ -83,6 +83,13 @@ std::optional<NormalsMode> mode_for(PointSource& source, const SurfaceSettings& 
                          input_name(settings)));
     return NormalsMode::estimate;
   }
+  if (rows.given.scatter()) {
+    run.info(
+        fmt::format("{}: normals scatter so much that the samples' places tell more: all are found again "
+                    "(--normals file keeps them)",
+                    input_name(settings)));
+    return NormalsMode::estimate;
+  }
   if (rows.given.contradict()) {
     run.info(
         fmt::format("{}: normals contradict each other, {:.2g} % of neighbours: their signs are found again "

@@ -32,7 +32,7 @@ struct SupportPlace {
 
 /// The least H that is chosen, the most for noise, and the most to reach the next line.
 inline constexpr float kLeastSupport = 1.2F;
-inline constexpr float kMostSupport = 3;
+inline constexpr float kMostSupport = 6;
 inline constexpr float kMostAllRound = 4;
 
 /// Supports are to hold samples on all sides, or to be as wide as noise asks for as well.

@@ -43,9 +43,14 @@ constexpr float kMostError = 3;
 /// H for a radius of the best disk. The fit of the projection knows normals as well, so it is as sure in a narrower
 /// one.
 constexpr double kSupportPerDisk = 0.65;
+constexpr float kMostByDisk = 3;  ///< H: in plain parts wider ones gain nothing
 /// H is at least so much, and so much more for each radius of error: fits to few very noisy samples go astray.
 constexpr double kLeastBlend = 1.1;
 constexpr double kBlendPerError = 3.5;
+/// And for each radius by which the error is more than this so much more: noise that fills a disk looks smaller than it
+/// is, since what lies as far off as the disk is wide counts as another sheet.
+constexpr double kLargeError = 0.25;
+constexpr double kBlendPerLargeError = 6;
 /// A support reaches so much less than the neighbours that lie on all sides: between two lines of samples it has to
 /// hold some of both.
 constexpr float kAllRoundPerSupport = 1.25F;
@@ -320,8 +325,10 @@ float blend_of(Pool& pool, SupportAim aim) {
   const float sides = std::clamp(blend_all_round(pool.all_round), kLeastSupport, kMostAllRound);
   if (aim == SupportAim::all_round) return sides;
   const BestDisk best = best_of(pool.squares);
-  const double wanted = std::max(kSupportPerDisk * best.radius, kLeastBlend + kBlendPerError * best.error);
-  return std::max(sides, std::clamp(static_cast<float>(wanted), kLeastSupport, kMostSupport));
+  const double by_disk = std::min(kSupportPerDisk * best.radius, double{kMostByDisk});
+  const double by_error =
+      kLeastBlend + kBlendPerError * best.error + kBlendPerLargeError * std::max(0.0, best.error - kLargeError);
+  return std::max(sides, std::clamp(static_cast<float>(std::max(by_disk, by_error)), kLeastSupport, kMostSupport));
 }
 
 SupportSurvey pooled(const std::vector<Place>& places, SupportAim aim) {

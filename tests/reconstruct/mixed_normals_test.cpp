@@ -53,6 +53,15 @@ Cloud plate(double thickness, double noise) {
   return cloud;
 }
 
+/// Normals as the differences of noisy samples give them: `share` of a vector that faces anywhere is added to each.
+Cloud scattered(Cloud cloud, double share) {
+  std::mt19937 random(3);
+  std::normal_distribution<> error(0, share);
+  for (Point3& n : cloud.normals)
+    for (double& v : n) v += error(random);
+  return cloud;
+}
+
 GivenNormals look(const Cloud& cloud) {
   std::vector<Eigen::Vector3d> at;
   std::vector<Eigen::Vector3f> normals;
@@ -130,6 +139,20 @@ TEST(MixedNormals, OfNoUseAreFoundAgain) {
   ASSERT_TRUE(r.stats.normals.has_value());
   EXPECT_EQ(r.stats.normals->estimated, 20'000U);
   EXPECT_TRUE(r.facts.is_closed_manifold());
+}
+
+TEST(MixedNormals, ThatScatterAreFoundAgain) {
+  const Cloud sphere = test::sphere_cloud(20'000);
+  EXPECT_LT(look(sphere).disorder, 0.01);
+  EXPECT_FALSE(look(scattered(sphere, 0.4)).scatter()) << "noise that is left to later stages";
+  EXPECT_FALSE(look(turned(sphere, by_chance(0.5))).scatter()) << "signs do not matter";
+  const Cloud noisy = scattered(sphere, 1);
+  EXPECT_TRUE(look(noisy).scatter());
+  const test::Reconstruction r = reconstruct(noisy, believing_nothing());
+  ASSERT_TRUE(r.stats.normals.has_value());
+  EXPECT_EQ(r.stats.normals->estimated, 20'000U);
+  EXPECT_TRUE(r.facts.is_closed_manifold());
+  EXPECT_NEAR(test::area(r.mesh), test::area(reconstruct(sphere, believing_nothing()).mesh), 1e-3);
 }
 
 TEST(MixedNormals, StayWhereTheFilesAreAskedFor) {
