@@ -19,9 +19,10 @@ namespace {
 
 using Vector3f = std::array<float, 3>;
 
-/// Strong links join first; weak ones are left to the graph of patches, which has more to go by.
+/// Strong links join first; weak ones are left to the graph of patches, which has more to go by. Among noise a link of
+/// half an agreement may well be wrong, and in a patch nothing outvotes it.
 constexpr int kStrengths = 32;
-constexpr float kWeakest = 0.5F;
+constexpr float kWeakest = 0.75F;
 
 Vector3f normal_of(const WindowSamples& s, std::uint32_t i) {
   return {s.nx[i], s.ny[i], s.nz[i]};

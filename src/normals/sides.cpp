@@ -156,7 +156,7 @@ std::optional<std::uint32_t> Sides::find_room(const std::vector<Body>& bodies, c
     if (own || root[i] == kFixed || (bodies[root[i]].encloses() && bodies[root[i]].openness() < kSealed)) continue;
     if (sights_[i].front.is_closed() && sights_[i].back.is_closed()) hidden += here;
   }
-  constexpr double kMuch = 0.025;
+  constexpr double kMuch = 0.0125;
   if (hidden < kMuch * area) return {};
   constexpr double kSeen = 0.95;
   std::vector<Wall> walls = walls_of(*widest, root, sign);

@@ -271,6 +271,21 @@ TEST(WithNormals, OfANoisyThinWallFaceOut) {
   EXPECT_EQ(found.report.unsure, 0);
 }
 
+// Noise of several spacings: neighbours lie one behind the other, and their links say that one of them must turn. Where
+// links of half an agreement make patches, four samples of a thousand face in.
+TEST(WithNormals, OfAVeryNoisyTorusFaceOut) {
+  std::mt19937 random(6);
+  std::normal_distribution<> noise(0, 0.06);
+  Oriented cloud;
+  test::add_torus(cloud, 40000);
+  for (std::size_t i = 0; i < cloud.size(); ++i) {
+    const double d = noise(random);
+    for (std::size_t a = 0; a < 3; ++a) cloud.positions[i][a] += d * cloud.normals[i][a];
+  }
+  const Found found = find_normals(cloud);
+  EXPECT_GT(compare(cloud, found.normals).right_side, 0.998);
+}
+
 TEST(WithNormals, OfARealGroundFaceUp) {
   const std::string file = LAMINA_SOURCE_DIR "/../shared/data/las/autzen_trim_7.las";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << "no " << file;
