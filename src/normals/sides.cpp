@@ -158,26 +158,52 @@ std::optional<std::uint32_t> Sides::find_room(const std::vector<Body>& bodies, c
   }
   constexpr double kMuch = 0.0125;
   if (hidden < kMuch * area) return {};
-  constexpr double kSeen = 0.95;
-  std::vector<Wall> walls = walls_of(*widest, root, sign);
-  if (!is_inside_out(body)) {
-    for (Wall& wall : walls) wall.facing = -1.0 * wall.facing;
-  }
-  return share_seen_within(around_, walls) > kSeen ? widest : std::nullopt;
+  constexpr double kSeen = 0.89;
+  return share_seen_within(around_, walls_of(body, *widest, root, sign)) > kSeen ? widest : std::nullopt;
 }
 
-std::vector<Wall> Sides::walls_of(std::uint32_t body, const std::vector<std::uint32_t>& root,
-                                  const std::vector<std::int8_t>& sign) const {
+std::optional<Wall> Sides::wall_of(std::uint32_t patch) const {
   constexpr double kFlat = 0.5;  // of its area
+  const PatchNode& node = graph_.nodes[patch];
+  const Vec3 outward = to_double(node.outward);
+  const double length = norm(outward);
+  if (!(length > kFlat * double{node.area})) return {};
+  return Wall{around_.place(node), (1 / length) * outward,
+              area_of(node, graph_.cell) / (around_.side() * around_.side())};
+}
+
+std::vector<Wall> Sides::walls_of(const Body& body, std::uint32_t body_root, const std::vector<std::uint32_t>& root,
+                                  const std::vector<std::int8_t>& sign) const {
+  const double inward = is_inside_out(body) ? 1 : -1;
   std::vector<Wall> walls;
   for (std::uint32_t i = 1; i < root.size(); ++i) {
-    const PatchNode& node = graph_.nodes[i];
-    const Vec3 outward = to_double(node.outward);
-    const double length = norm(outward);
-    if (root[i] == body && length > kFlat * double{node.area})
-      walls.push_back({around_.place(node), (sign[i] / length) * outward, area_of(node, graph_.cell)});
+    if (root[i] != body_root) continue;
+    std::optional<Wall> wall = wall_of(i);
+    if (!wall) continue;
+    wall->facing = inward * sign[i] * wall->facing;
+    walls.push_back(*wall);
   }
   return walls;
+}
+
+std::vector<float> Sides::votes_from_within(const Body& room, std::uint32_t room_root,
+                                            const std::vector<std::uint32_t>& root,
+                                            const std::vector<std::int8_t>& sign) const {
+  std::vector<Wall> walls;
+  std::vector<std::uint32_t> patches;
+  for (std::uint32_t i = 1; i < root.size(); ++i) {
+    if (root[i] == kFixed) continue;
+    if (const std::optional<Wall> wall = wall_of(i)) {
+      walls.push_back(*wall);
+      patches.push_back(i);
+    }
+  }
+  const std::vector<Vec3> places = places_within(around_, walls_of(room, room_root, root, sign));
+  const std::vector<double> seen_from = normals::votes_from_within(around_, places, walls);
+  std::vector<float> votes(root.size(), 0);
+  for (std::size_t w = 0; w < walls.size(); ++w)
+    votes[patches[w]] = static_cast<float>(seen_from[w] * graph_.nodes[patches[w]].count);
+  return votes;
 }
 
 Side Sides::choose(const Body& body) const {
@@ -234,15 +260,14 @@ void add_up(std::vector<Evidence>& evidence) {
   evidence.resize(n);
 }
 
-std::vector<Evidence> evidence_of(const PatchGraph& graph) {
+/// With the votes of places inside a room, by node, if there are any.
+std::vector<Evidence> evidence_of(const PatchGraph& graph, const std::vector<float>& from_within = {}) {
   std::vector<Evidence> evidence;
   evidence.reserve(graph.edges.size());
   for (const PatchEdge& e : graph.edges) evidence.push_back({e.a, e.b, e.agreement, std::abs(e.agreement)});
   for (std::uint32_t i = 1; i < graph.nodes.size(); ++i) {
-    if (graph.nodes[i].vote != 0) {
-      const float vote = graph.nodes[i].vote;
-      evidence.push_back({kFixed, i, vote, std::abs(vote)});
-    }
+    const float vote = graph.nodes[i].vote + (from_within.empty() ? 0 : from_within[i]);
+    if (vote != 0) evidence.push_back({kFixed, i, vote, std::abs(vote)});
   }
   add_up(evidence);
   return evidence;
@@ -310,10 +335,16 @@ PatchSigns find_signs(const PatchGraph& graph, const InputAxes& axes) {
   for (std::uint32_t i = 1; i < n; ++i) open[i] = root[i] != kFixed ? 1 : 0;
   const Sides sides(graph, axes, open);
   std::vector<Body> bodies = sides.bodies(root, signs.sign);
-  const std::optional<std::uint32_t> room = sides.find_room(bodies, root, signs.sign);
+  if (const auto room = sides.find_room(bodies, root, signs.sign)) {
+    evidence = evidence_of(graph, sides.votes_from_within(bodies[*room], *room, root, signs.sign));
+    forest = SignedUnionFind(n);
+    grow_forest(evidence, kAgreed, forest, n);
+    read_forest(forest, root, signs);
+    bodies = sides.bodies(root, signs.sign);
+  }
   for (std::uint32_t i = 1; i < n; ++i) {
-    if (root[i] == kFixed) continue;
-    signs.source[i] = root[i] == room ? SignSource::inside : sides.choose(bodies[root[i]]).source;
+    if (open[i] == 0) continue;
+    signs.source[i] = root[i] == kFixed ? SignSource::inside : sides.choose(bodies[root[i]]).source;
   }
   // Bodies that pass through each other, as a handle through a wall, say nothing of each other: each has its own side.
   // Scraps that noise has cut off are none.
@@ -322,7 +353,7 @@ PatchSigns find_signs(const PatchGraph& graph, const InputAxes& axes) {
   for (const PatchNode& node : graph.nodes) samples += node.count;
   for (std::uint32_t i = 1; i < n; ++i) {
     if (root[i] != i || i == kFixed || bodies[i].samples < samples / kShare) continue;
-    const Side side = i == room ? Side{!is_inside_out(bodies[i]), SignSource::inside} : sides.choose(bodies[i]);
+    const Side side = sides.choose(bodies[i]);
     if (side.source == SignSource::unsure) continue;
     ++signs.components;
     forest.unite(kFixed, i, static_cast<std::int8_t>(side.turn ? -1 : 1));

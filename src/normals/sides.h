@@ -121,6 +121,7 @@ class Occupancy {
   explicit Occupancy(const PatchGraph& graph);
 
   [[nodiscard]] bool empty() const { return taken_.empty(); }
+  [[nodiscard]] double side() const { return side_; }          ///< of a cube, kUnit steps
   [[nodiscard]] double diagonal() const { return diagonal_; }  ///< of the cloud, cubes
   /// In cubes from the corner.
   [[nodiscard]] meshes::Vec3 place(const PatchNode& node) const;
@@ -166,11 +167,20 @@ std::vector<Sight> look_around(const PatchGraph& graph, const Occupancy& around,
 struct Wall {
   meshes::Vec3 at{};  ///< Occupancy::place()
   meshes::Vec3 facing{};
-  double area = 0;
+  double area = 0;  ///< square cubes
 };
 
 /// The share of the area that four places see together. 0 for so few walls that cubes are too coarse a picture.
 double share_seen_within(const Occupancy& around, const std::vector<Wall>& walls);
+
+/// Places half way between opposite walls, some hundred all over the room.
+std::vector<meshes::Vec3> places_within(const Occupancy& around, const std::vector<Wall>& walls);
+
+/// For each patch, whichever way it faces, from which side the places see it, -1..1 (below 0: from behind); 0 where
+/// many see it from either side, as the back of a chair, and where none sees it. What another stands close before is
+/// not seen, so that each face of a board is seen from its own side.
+std::vector<double> votes_from_within(const Occupancy& around, const std::vector<meshes::Vec3>& places,
+                                      const std::vector<Wall>& patches);
 
 // Which side of a surface is outside, or was seen, where neither a scanner nor given normals say it.
 
@@ -212,13 +222,19 @@ class Sides {
   [[nodiscard]] std::optional<std::uint32_t> find_room(const std::vector<Body>& bodies,
                                                        const std::vector<std::uint32_t>& root,
                                                        const std::vector<std::int8_t>& sign) const;
+  /// What places inside the room say of each patch that is not fixed, in the unit of PatchNode::vote.
+  [[nodiscard]] std::vector<float> votes_from_within(const Body& room, std::uint32_t room_root,
+                                                     const std::vector<std::uint32_t>& root,
+                                                     const std::vector<std::int8_t>& sign) const;
   /// Of a body that no link joins to a side.
   [[nodiscard]] Side choose(const Body& body) const;
 
  private:
-  /// Patches as they are signed.
-  [[nodiscard]] std::vector<Wall> walls_of(std::uint32_t body, const std::vector<std::uint32_t>& root,
+  /// Patches of a closed body, facing what it encloses.
+  [[nodiscard]] std::vector<Wall> walls_of(const Body& body, std::uint32_t body_root,
+                                           const std::vector<std::uint32_t>& root,
                                            const std::vector<std::int8_t>& sign) const;
+  [[nodiscard]] std::optional<Wall> wall_of(std::uint32_t patch) const;
 
   const PatchGraph& graph_;
   Occupancy around_;

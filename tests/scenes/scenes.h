@@ -41,7 +41,7 @@ inline std::vector<ScannerView> views_from_above(int resolution) {
 }
 
 constexpr ScannerErrors kSlight{0.2, 0.2, 0, 0, 1}, kMild{0.3, 0.3, 0, 0, 1}, kStray{0.3, 0.2, 0.1, 0, 1},
-    kBad{1, 1, 0.5, 0.005, 2}, kDusty{0.3, 0.3, 0, 0.08, 1}, kNoisy{3, 0.3, 0, 0, 1};
+    kBad{1, 1, 0.5, 0.005, 2}, kDusty{0.3, 0.3, 0, 0.08, 1}, kNoisy{3, 0.3, 0, 0, 1}, kUnsteady{1, 0.3, 0.1, 0, 1};
 
 /// `resolution` multiplies the columns and rows of all images. The plate is two spacings thick at any.
 inline std::vector<Scene> all_scenes(int resolution) {
@@ -58,6 +58,7 @@ inline std::vector<Scene> all_scenes(int resolution) {
       {"KnotFromOneSide", knot_truth, {ball[2]}, kStray},
       {"Facade", facade_truth, street_views(resolution), kStray},
       {"Room", room_truth, inside, kStray},
+      {"RoomNoisyWithoutNormals", room_truth, inside, kUnsteady, true},
       {"ThinPlate", plate, views_around({}, 0.65, 6, 110 * resolution), kSlight},
       {"Terraces", terrain_truth, views_from_above(resolution), kMild},
   };
