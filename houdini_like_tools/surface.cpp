@@ -290,9 +290,8 @@ void add_surface_options(CLI::App& tool, SurfaceOptions& o) {
 
   add_hole_options(tool, s, mesh);
   add_number_or_auto(tool, "--prune", "auto",
-                     "Leave out connected parts of fewer than N triangles; 0: none; auto: than a two-thousandth of the "
-                     "samples, at most 500, or with samples for less than a fifth of as many, and none where the mesh "
-                     "is made in parts",
+                     "Leave out connected parts of fewer than N triangles; 0: none; auto: those under which fewer than "
+                     "60 samples lie, or than one in 5000 of a small cloud, and none where the mesh is made in parts",
                      [&s](const std::optional<double>& number) { s.prune_triangles = triangles_of(number); })
       ->option_text("N|auto [auto]")
       ->group(mesh);

@@ -108,8 +108,8 @@ struct SurfaceSettings {
   /// are found again. Where the data show none nothing changes. Unset: where `blend` is and the cloud is
   /// clean.
   std::optional<bool> features;
-  /// Connected parts of the mesh with fewer triangles are dropped. Unset: a two-thousandth of the samples' number, at
-  /// most 500; in jobs of several runs, which write no whole mesh, none.
+  /// Connected parts of the mesh with fewer triangles are dropped. Unset: those under which fewer than sixty samples
+  /// lie, or than one in 5000 of a small cloud; in jobs of several runs, which write no whole mesh, none.
   std::optional<std::uint64_t> prune_triangles = 0;
   Length prune_size;   ///< so are parts whose box has a shorter diagonal; `r`, `R`: of the median sample; 0: none
   bool local = false;  ///< subtract a shift (SurfaceStats::shift) from coordinates, so that floats hold them

@@ -77,14 +77,13 @@ inline constexpr double kCleanRimOverhang = 0.35;
 /// radii wide, as dark, shiny or hidden places leave. The bound keeps what a run remembers of rims small.
 inline constexpr double kLongestRim = 300;
 
-/// Connected parts of fewer triangles are left out where nobody says otherwise: one in so many of the samples, at most
-/// so many. A scan's samples carry about as many triangles.
-inline constexpr std::uint64_t kSpeckShare = 2000;
-inline constexpr std::uint64_t kMostSpeck = 500;
-/// And those with fewer samples than this share of as many, however many triangles they have: sheets of stray samples,
-/// each of which makes a disc of its own. A surface has as many samples as triangles, and a quarter where cells between
-/// two sheets are halved.
-inline constexpr double kSpeckSamples = 0.2;
+/// Connected parts under which fewer samples lie are left out where nobody says otherwise, however many triangles they
+/// have: sheets of stray samples, each of which makes a disc of its own, and what noise leaves over. What a scan really
+/// saw has more, be it a bar of a window or the leg of a chair.
+inline constexpr std::uint64_t kSpeckSamples = 60;
+/// Of small clouds fewer: one in so many of all. A part of a single triangle goes even so.
+inline constexpr std::uint64_t kSpeckShare = 5000;
+inline constexpr std::uint64_t kSpeckTriangles = 2;
 
 /// How far the mesh may be off its planes where triangles go (SimplifySettings::deviation): of clean samples, what each
 /// radius of median residual adds, and the most.

@@ -37,17 +37,6 @@ void require(bool ok, const char* option, const char* range) {
   if (!ok) usage(fmt::format("{} must be {}", option, range));
 }
 
-/// Parts of fewer triangles, of which there are about as many as samples, are taken for specks.
-std::uint64_t largest_speck(std::uint64_t samples) {
-  return std::min(kMostSpeck, samples / kSpeckShare);
-}
-/// As many triangles cover what one would in cells of the usual size, where those are finer: a speck is as large
-/// either way.
-double triangles_per_usual(const FeedSettings& feed) {
-  if (feed.cell.unit != Length::Unit::sample_radius || feed.cell.value >= kChosenCell) return 1;
-  return (kChosenCell / feed.cell.value) * (kChosenCell / feed.cell.value);
-}
-
 /// The largest leaf cell for a sample of radius 1 where cells follow the samples.
 double cell_per_radius(const FeedSettings& feed) {
   return feed.cell.value * (feed.cell.unit == Length::Unit::influence_radius ? feed.blend : 1.0);
@@ -199,10 +188,8 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
   // between sheets tell nothing.
   plan.vertex_radii = {influence / static_cast<double>(plan.lattice.cell_size(plan.main_level)),
                        plan.feed.refine_sheets ? influence : 0};
-  const std::uint64_t specks = s.prune_triangles ? 0 : largest_speck(plan.samples);
-  const auto least_samples = static_cast<std::uint64_t>(kSpeckSamples * static_cast<double>(specks));
-  const auto triangles = static_cast<std::uint64_t>(static_cast<double>(specks) * triangles_per_usual(plan.feed));
-  plan.pruning = {s.prune_triangles.value_or(triangles), least_samples, resolve(s.prune_size, median, plan.feed.blend)};
+  const std::uint64_t specks = s.prune_triangles ? 0 : std::min(kSpeckSamples, plan.samples / kSpeckShare);
+  plan.pruning = {s.prune_triangles.value_or(kSpeckTriangles), specks, resolve(s.prune_size, median, plan.feed.blend)};
   plan.mesh_attributes = plan.attributes;
   if (s.vertex_levels) plan.mesh_attributes.push_back({"level", ScalarType::uint8});
   if (s.vertex_curvature) plan.mesh_attributes.push_back({"curvature", ScalarType::float32});

@@ -19,6 +19,8 @@ struct PruneRule {
   std::uint64_t triangles = 0;  ///< fewer than this; 0: any number will do
   std::uint64_t samples = 0;    ///< fewer than this lie under it, by VertexBatch::density; 0: any number will do
   double size = 0;              ///< the diagonal of its box, input axes, is shorter than this; 0: any size will do
+
+  [[nodiscard]] bool wanted() const { return triangles > 0 || samples > 0 || size > 0; }
 };
 
 /// Takes a mesh slab by slab and passes on to a sink what stays, vertices and triangles in the order in which they came

@@ -98,7 +98,7 @@ void write_surface(const ReconstructionPlan& plan, StoredCloud& cloud, const Mes
   ClosingSlabs closing(plan.holes, layout, *whole);
   Pruner pruner(plan.pruning, layout.tmp_dir, closing);
   PrunedSlabs pruned(pruner);
-  const bool prunes = plan.pruning.triangles > 0 || plan.pruning.size > 0;
+  const bool prunes = plan.pruning.wanted();
   SlabSink& mesh = prunes ? static_cast<SlabSink&>(pruned) : closing;
   sweep(plan, cloud, plan.slabs, {mesh, volume ? &*volume : nullptr}, job);
   if (prunes) {
