@@ -123,14 +123,17 @@ double mesh_memory(const ReconstructionPlan& plan, const SlabStore& store, doubl
   const double cells = cells_per_sample(plan.feed);
   const double corner_bytes = 4.5 * cells * (4.0 * (static_cast<double>(kFirstAttribute) + attributes) + 12);
   const double surface_bytes = 1.5 * cells * (56 + 4.0 * attributes + 2 * 12 + 1.5 * 16);
-  const double window = per_slab * (slabs_with_values(plan) * corner_bytes + slabs_with_surface(plan) * surface_bytes);
+  const double per_sample = slabs_with_values(plan) * corner_bytes + slabs_with_surface(plan) * surface_bytes;
   const double cached = std::min(static_cast<double>(plan.feed.cache_bytes),
                                  static_cast<double>(store.total()) * (37 + 4.0 * attributes));
   constexpr double kProgram = 60e6;
   // What the window's count leaves out - counting cells, clustering, bins, and the allocator's gaps - grows with it,
-  // and faster.
-  constexpr double kPart = 0.158, kGrowth = 1.58;
-  const double rest = 1e6 * kPart * std::pow(1e-6 * window, kGrowth);
+  // and with the samples within reach, however low slabs are. Where thin sheets are looked for cells' normals come to
+  // it, and more leaves.
+  constexpr double kWindow = 0.9, kReach = 0.42, kReachRadii = 4.5, kSheets = 1.5;
+  const double in_reach = densest_layer(store, static_cast<std::int32_t>(kReachRadii * plan.radius.median));
+  const double sheets = plan.feed.refine_sheets ? kSheets : 1;
+  const double rest = sheets * per_sample * (kWindow * per_slab + kReach * in_reach);
   return kProgram + cached + rest + refit_memory(plan, per_slab / plan.lattice.slab_height());
 }
 

@@ -24,6 +24,9 @@ constexpr int kDefaultLevels = 4;
 /// twice as high would take a third more memory for next to no time. Where density varies, coarse levels serve the few
 /// samples that are sparser than the survey's 99 %.
 constexpr double kSlabRadii = 4.5;
+/// Nor do such levels make slabs that hold more samples on average: with as many, slabs half as high take a quarter
+/// less memory and a fiftieth more time; with half as many, a twentieth.
+constexpr double kSlabSamples = 40000;
 constexpr int kMaxLevels = 12;
 constexpr std::int32_t kMinSteps = 64;  ///< fixed-point steps a finest cell must have for exact enough positions
 constexpr double kMaxCells = 1 << 20;   ///< finest cells from the origin, the limit of the lattice's keys
@@ -52,17 +55,34 @@ int levels_in_slab(double main, int finer) {
   return std::clamp(1 + finer + static_cast<int>(std::floor(std::log2(kSlabRadii / main))), 1, kDefaultLevels);
 }
 
+/// The levels that leave slabs few enough samples; `asked_for` by the radii. `in_cell`: samples in a layer of finest
+/// cells, on average.
+int without_spare_levels(int levels, int asked_for, double in_cell) {
+  while (levels > asked_for && std::ldexp(in_cell, levels - 1) > kSlabSamples) --levels;
+  return levels;
+}
+
+/// Samples in a layer of the cloud one step high, on average.
+double samples_in_step(const ReconstructionPlan& plan) {
+  return static_cast<double>(plan.samples) / (1.0 + plan.extent.z_max - plan.extent.z_min);
+}
+
 /// Main cells follow the median radius; levels are added below for the 1 % smallest and for sheets, and above for the
 /// 1 % largest.
-Levels choose_levels(int asked, const FeedSettings& feed, const RadiusSurvey& radii) {
+Levels choose_levels(int asked, const ReconstructionPlan& plan) {
+  const FeedSettings& feed = plan.feed;
+  const RadiusSurvey& radii = plan.radius;
   const double ratio = cell_per_radius(feed);
   const double main = kMainCell * ratio * radii.median;
   const int finer = std::max(0, static_cast<int>(std::ceil(std::log2(main / (ratio * radii.low)) - 1e-9))) +
                     (feed.refine_sheets ? 1 : 0);
   const int coarser = std::max(0, static_cast<int>(std::floor(std::log2(ratio * radii.high / main))));
+  const int by_radii = finer + coarser + 1;
   const bool even = radii.high < kEven * radii.low;
-  const int least = even ? levels_in_slab(kMainCell * ratio, finer) : kDefaultLevels;
-  const int count = asked > 0 ? asked : std::clamp(finer + coarser + 1, least, kMaxLevels);
+  const int least = even ? without_spare_levels(levels_in_slab(kMainCell * ratio, finer), by_radii,
+                                                std::ldexp(main, -finer) * samples_in_step(plan))
+                         : kDefaultLevels;
+  const int count = asked > 0 ? asked : std::clamp(by_radii, least, kMaxLevels);
   return {std::ldexp(main, -std::min(finer, count - 1)), count};
 }
 
@@ -131,14 +151,15 @@ RadiusSurvey scaled_radii(const SurfaceSettings& s, RadiusSurvey survey, const R
 }
 
 /// One level in use, whatever the radii.
-Levels fixed_levels(int asked, double cell, double median_radius) {
-  return {cell, asked > 0 ? asked : levels_in_slab(cell / median_radius, 0)};
+Levels fixed_levels(int asked, double cell, const ReconstructionPlan& plan) {
+  if (asked > 0) return {cell, asked};
+  return {cell, without_spare_levels(levels_in_slab(cell / plan.radius.median, 0), 1, cell * samples_in_step(plan))};
 }
 
 void plan_lattice(const SurfaceSettings& s, ReconstructionPlan& plan) {
   const bool fixed = plan.feed.fixed_cell();
-  const Levels wanted = fixed ? fixed_levels(s.levels, plan.feed.cell.value / plan.frame.step, plan.radius.median)
-                              : choose_levels(s.levels, plan.feed, plan.radius);
+  const Levels wanted =
+      fixed ? fixed_levels(s.levels, plan.feed.cell.value / plan.frame.step, plan) : choose_levels(s.levels, plan);
   const Levels levels = addressable(wanted, s.levels, plan.feed, plan.extent, plan.frame.step);
   plan.lattice.cell = static_cast<std::int32_t>(std::lrint(levels.finest));
   plan.lattice.levels = levels.count;

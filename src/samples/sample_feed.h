@@ -57,8 +57,9 @@ struct FeedSettings {
   float band_radii = 0;                 ///< ... or in its r_i, whichever is more
   float max_radius = 0;                 ///< samples with a larger r_i are left out, steps; 0: none
   std::size_t cache_bytes = 64u << 20;  ///< memory for samples kept between uses
-  /// Samples looked at together: large enough to keep every thread busy, small enough to stay in memory whatever H is.
-  std::uint64_t batch_samples = 1u << 18;
+  /// Samples looked at together: all that act on a slab of 10^9 samples, since sums that wait for the next batch double
+  /// the cost; few enough to stay in memory whatever H is.
+  std::uint64_t batch_samples = 1u << 20;
 
   /// Every sample asks for the finest level.
   [[nodiscard]] bool fixed_cell() const { return cell.unit == Length::Unit::world; }

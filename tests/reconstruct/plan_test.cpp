@@ -117,6 +117,20 @@ TEST(SurfacePlan, ExpectsTheDiskItTakes) {
   }
 }
 
+// Of large clouds they are lower: the radii are given here, so that few samples fill a slab.
+TEST(SurfacePlan, SlabsHoldOnlySoManySamples) {
+  const auto plan = [](std::size_t samples) {
+    Cloud cloud = test::sphere_cloud(samples);
+    cloud.add_property("radius", ScalarType::float32, [](const Point3&) { return 0.25; });
+    return plan_of(cloud);
+  };
+  const SurfacePlan few = plan(50'000);
+  const SurfacePlan many = plan(200'000);
+  EXPECT_EQ(many.levels, few.levels - 1);
+  EXPECT_NEAR(many.finest_cell, few.finest_cell, 0.01 * few.finest_cell);
+  EXPECT_NEAR(many.slab_height, few.slab_height / 2, 0.01 * few.slab_height);
+}
+
 TEST(SurfacePlan, MemoryGrowsWithTheWindowAndShrinksWithTheCells) {
   const Cloud cloud = test::sphere_cloud(30000);
   const auto memory = [&](int window, double blend) {
@@ -139,7 +153,7 @@ TEST(SurfacePlan, CountsTheVolume) {
   EXPECT_GT(memory("out.vdb"), memory("") + 1'000'000);
 }
 
-// Fewer levels are chosen where memory is short: the volume's must not count, or the mesh would differ with one.
+// The mesh would differ with one.
 TEST(SurfacePlan, TheVolumeDoesNotChooseTheLevels) {
   Cloud cloud = test::sphere_cloud(20000);
   cloud.add_property("heat", ScalarType::float32, [](const Point3& p) { return p[2]; });
