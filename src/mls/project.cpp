@@ -50,7 +50,7 @@ struct Projector::Scratch {
 };
 
 ClusteredBatch Projector::Scratch::load(const NumberedBuckets& batch, SampleFeed& feed, const Lattice& lattice) {
-  constexpr std::size_t kKeep = std::size_t{1} << 20;  // samples
+  constexpr std::size_t kKeep = std::size_t{1} << 20;  // samples: a batch, or other levels would cluster it anew
   std::vector<std::shared_ptr<ClusteredBucket>> out(batch.size());
   std::vector<std::size_t> missing;
   std::size_t kept = 0;

@@ -46,7 +46,7 @@ std::uint64_t expected_disk(const SlabStore& store, std::uint64_t faces) {
 }
 
 /// Samples in the densest layer of a height, from the store's own counts: each bucket's lie evenly between its ends.
-double densest_layer(const SlabStore& store, std::int32_t height) {
+double densest_layer(const SlabStore& store, double height) {
   double most = 0;
   std::size_t first = 0;
   for (std::size_t last = 0; last < store.buckets(); ++last) {
@@ -131,8 +131,8 @@ double mesh_memory(const ReconstructionPlan& plan, const SlabStore& store, doubl
   // and with the samples within reach, however low slabs are. Where thin sheets are looked for cells' normals come to
   // it, and more leaves.
   constexpr double kWindow = 0.9, kReach = 0.42, kReachRadii = 4.5, kSheets = 1.5;
-  const double in_reach = densest_layer(store, static_cast<std::int32_t>(kReachRadii * plan.radius.median));
-  const double sheets = plan.feed.refine_sheets ? kSheets : 1;
+  const double in_reach = densest_layer(store, kReachRadii * double{plan.radius.median});
+  const double sheets = plan.feed.refines_sheets() ? kSheets : 1;
   const double rest = sheets * per_sample * (kWindow * per_slab + kReach * in_reach);
   return kProgram + cached + rest + refit_memory(plan, per_slab / plan.lattice.slab_height());
 }

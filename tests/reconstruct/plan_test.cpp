@@ -153,7 +153,7 @@ TEST(SurfacePlan, CountsTheVolume) {
   EXPECT_GT(memory("out.vdb"), memory("") + 1'000'000);
 }
 
-// The mesh would differ with one.
+// Or the mesh would differ with a volume beside it.
 TEST(SurfacePlan, TheVolumeDoesNotChooseTheLevels) {
   Cloud cloud = test::sphere_cloud(20000);
   cloud.add_property("heat", ScalarType::float32, [](const Point3& p) { return p[2]; });
