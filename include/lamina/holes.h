@@ -22,8 +22,8 @@ struct OpenLoop {
 enum class Watertight : std::uint8_t {
   no,           ///< nothing does
   short_loops,  ///< that no loop longer than HoleSettings::kWatertight is left
-  any_loops,    ///< also that the surface around every longer one leads into it, and not away from it as at the outer
-                ///< boundary of a sheet
+  any_loops,    ///< also that the surface leads into longer ones, by most of their length, and not away from them as at
+                ///< the outer boundary of a sheet
 };
 
 /// Which boundary loops to close.

@@ -228,8 +228,13 @@ bool HoleCloser::close_wide(std::vector<Closing>& closings) const {
   std::vector<Closure> closures(wide.size());
   tbb::parallel_for(std::size_t{0}, wide.size(),
                     [&](std::size_t i) { closures[i] = close_loop(loops_[wide[i]].first); });
-  if (!std::all_of(closures.begin(), closures.end(), [](const Closure& c) { return c.leads_in >= kLeadsIn; }))
-    return false;
+  double all = 0, away = 0;
+  for (std::size_t i = 0; i < wide.size(); ++i) {
+    const double length = loops_[wide[i]].second.radii;
+    all += length;
+    away += closures[i].leads_in >= kLeadsIn ? 0 : length;
+  }
+  if (away > kMostLeadsAway * all) return false;
   for (std::size_t i = 0; i < wide.size(); ++i) {
     Filling& filling = closings[wide[i]].filling;
     filling = std::move(closures[i].filling);

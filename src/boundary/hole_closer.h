@@ -14,11 +14,15 @@
 namespace lamina::boundary {
 
 /// A mesh is taken for that of a closed thing while its boundary has at most one edge for so many vertices: an open
-/// surface has one long boundary loop at least, unless it is so small that the loop is a good part of it. The dragon's,
-/// whose whiskers leave many loops, has one for four hundred.
-inline constexpr std::uint64_t kLeastVerticesPerEdge = 100;
+/// surface has one long boundary loop at least, unless it is so small that the loop is a good part of it (no more than
+/// fifteen vertices an edge). The dragon's, whose whiskers leave many loops, has four hundred; a small scan of a part
+/// with some holes 75.
+inline constexpr std::uint64_t kLeastVerticesPerEdge = 40;
 /// The surface leads into a loop where Closure::leads_in is at least this (84 degrees).
 inline constexpr double kLeadsIn = 0.1;
+/// Of the length of the wide loops of a closed thing the surface leads away from no more: what is missing of it is
+/// wider than the places where its rim happens to turn off.
+inline constexpr double kMostLeadsAway = 0.2;
 /// A gap is bridged where Closure::leads_in is at least this much, and so much more for each influence radius of its
 /// rim: at rims of 10 radii 70 degrees on the average, of 25 60, of 50 41. What a wide gap hides may look otherwise.
 inline constexpr double kBridgeLeadsIn = 0.25;
@@ -74,7 +78,7 @@ class HoleCloser {
   [[nodiscard]] bool is_wide(std::size_t l) const { return loops_[l].second.radii > HoleSettings::kWatertight; }
   /// Whether the short loops that are left look like those of a closed thing.
   [[nodiscard]] bool may_be_closed_thing(std::uint64_t vertices, const std::vector<Closing>& closings) const;
-  /// Closes the longer ones that are left, all or none; whether none remains.
+  /// Closes the longer ones that are left, all or none, as most of their length says; whether none remains.
   bool close_wide(std::vector<Closing>& closings) const;
   void fill_rest(std::vector<Closing>& closings) const;
   void append(std::size_t l, const Closing& closing, std::uint64_t vertices, Addition& out);

@@ -60,7 +60,7 @@ inline constexpr float kSheetBand = 4;
 inline constexpr float kEvenHeight = 1.15F;
 
 /// How far (support radii) a corner's projection may lie from its samples' mean, and how many must act, to be trusted.
-inline constexpr float kEvenTrust = 0.25F;
+inline constexpr float kEvenTrust = 0.3F;
 inline constexpr int kEvenTrustedSamples = 4;
 
 /// Overhang (support radii) along which rims are cut. The straight edge of evenly spread samples has 0.235; a wide

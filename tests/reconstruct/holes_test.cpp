@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <numbers>
+#include <random>
 
 #include "lamina/chunk.h"
 #include "lamina/error.h"
@@ -149,6 +151,34 @@ TEST(Holes, WideOnesOfAClosedThingAreClosedWhereTheSurfaceLeadsIntoThem) {
 
   const auto open_above = [](const Point3& p) { return p[2] < 1; };
   EXPECT_EQ(test::reconstruct(cube_cloud(20000, open_above), s).stats.holes.open, 1U) << "a box without its lid";
+}
+
+/// The unit sphere with a wide gap below, and a tube with an open end on one side.
+Cloud sphere_with_tube(std::size_t count, double gap_angle, double tube_radius) {
+  Cloud cloud = test::sphere_cloud(count, [&](const Point3& p) {
+    const bool in_tube = p[0] > 0 && std::hypot(p[1], p[2]) < tube_radius;
+    return in_tube || angle_to(p, {0, 0, -1}) < gap_angle ? 0.0 : 1.0;
+  });
+  const double begin = std::sqrt(1 - tube_radius * tube_radius);
+  const double end = begin + 0.4;
+  std::mt19937 random(7);
+  std::uniform_real_distribution<> along(begin, end), around(0, 2 * std::numbers::pi);
+  const auto samples = static_cast<std::size_t>(static_cast<double>(count) * tube_radius * (end - begin) / 2);
+  for (std::size_t i = 0; i < samples; ++i) {
+    const double angle = around(random), y = std::cos(angle), z = std::sin(angle);
+    cloud.add({along(random), tube_radius * y, tube_radius * z}, {0, y, z});
+  }
+  return cloud;
+}
+
+TEST(Holes, WideOnesAreClosedAsMostOfTheirLengthSays) {
+  SurfaceSettings s = closing(300);
+  s.watertight = true;
+  const Reconstruction closed = test::reconstruct(sphere_with_tube(30000, 1.2, 0.2), s);
+  EXPECT_TRUE(closed.facts.is_closed_manifold()) << "the tube's end is a sixth of what is open";
+  const Reconstruction open = test::reconstruct(sphere_with_tube(30000, 1.2, 0.45), s);
+  EXPECT_EQ(open.stats.holes.open, 2U) << "the tube's end is a third of it";
+  for (const OpenLoop& loop : open.stats.holes.longest) EXPECT_GT(loop.radii, HoleSettings::kWatertight);
 }
 
 TEST(Holes, OfPositionsAloneAreClosedUnasked) {
