@@ -11,13 +11,14 @@ from plotter import plotter, save  # noqa: E402  (in scripts)
 UNIT = 1e5
 MODEL = "dragon"
 UNIFORM, FLAT, OURS = "uniform cells", "thinned out where flat", "simplified"
-FINE, MESHLAB = "cells of 0.55 r, simplified", "simplified by MeshLab"
+FINE, MESHLAB = "cells of 0.6 r, simplified", "simplified by MeshLab"
 STYLES = {UNIFORM: ("o--", "#808080"), FLAT: ("D-", "#803080"), OURS: ("s-", "#1f5fa8"), FINE: ("^-", "#308040"),
           MESHLAB: ("x:", "#c06020")}
 NAMES = tuple(STYLES)
 CELLS = ("0.9r", "1.15r", "1.5r", "2r", "2.7r", "3.6r")
 DEVIATIONS = ("default", "0.02", "0.03", "0.05", "0.1")
 COUNTS = (850_000, 500_000, 300_000, 200_000, 100_000, 50_000)
+FINE_COUNTS = (1_300_000, *COUNTS)
 KEEP = ["--prune", "0"]  # the truth has small parts
 ALL = [*KEEP, "--deviation", "0"]  # with all triangles
 
@@ -33,11 +34,11 @@ def measured(program, cloud, truth, folder, limit, wanted):
         cost = runs.chosen(program, cloud, mesh, options)
         yield {"name": FLAT, "wanted": deviation, "cost": cost} | runs.judge(program, mesh, truth)
     meshlab = shutil.which("meshlabserver") and shutil.which("xvfb-run")
-    for name, options in ((OURS, []), (MESHLAB, []), (FINE, ["--cell", "0.55r"])):
+    for name, options in ((OURS, []), (MESHLAB, []), (FINE, ["--cell", "0.6r"])):
         if not wanted(name) or (name == MESHLAB and not meshlab):
             continue
         runs.chosen(program, cloud, mesh, [*ALL, *options])
-        for count in COUNTS:
+        for count in FINE_COUNTS if name == FINE else COUNTS:
             print(f"  {name}, {count}", flush=True)
             row = {"name": name, "wanted": count}
             try:
@@ -56,7 +57,7 @@ def draw(results, folder):
     figure, panels = plt.subplots(1, 2, figsize=(9, 4), sharey=True, constrained_layout=True)
     for axes, way, title in zip(panels, ("to_truth", "from_truth"), ("mesh to truth", "truth to mesh")):
         for name, (style, colour) in STYLES.items():
-            rows = [c for c in results if c["name"] == name and "cost" in c]
+            rows = sorted((c for c in results if c["name"] == name and "cost" in c), key=lambda c: c["triangles"])
             axes.loglog([c["triangles"] for c in rows], [c[way] * UNIT for c in rows], style, color=colour, label=name,
                         markersize=5)
         ticks = [5e4, 1e5, 2e5, 5e5, 1e6]
