@@ -53,8 +53,16 @@ std::vector<Placed> place(const LocalSamples& s, std::int32_t cell) {
   return out;
 }
 
+/// Of the sphere around a sample, or its own where there is none.
+struct FittedNormal {
+  std::array<float, 3> normal{};
+  float variance = 0;  ///< of the normals around, of length one
+  bool fitted = false;
+};
+
 struct Scratch {
   RowSamples rows;
+  std::vector<FittedNormal> wide;  ///< of a tile
   std::array<SampleRange, RowSamples::kRows> ranges{};
   ConsensusPlane plane;
 };
@@ -73,7 +81,7 @@ class TileRefit {
             UnitNormals& out)
       : kernel_(kernel),
         only_blurred_(settings.only_blurred),
-        noise_variance_(std::max(kNoiseVariance, 2 * variance_of(settings.noise))),
+        noise_variance_(2 * variance_of(settings.noise)),
         s_(bucket.samples),
         support_(bucket.support),
         scratch_(scratch),
@@ -85,63 +93,108 @@ class TileRefit {
     origin_ = {static_cast<std::uint32_t>(block.x) * edge, static_cast<std::uint32_t>(block.y) * edge,
                static_cast<std::uint32_t>(block.z) * edge};
     inv_ = 1.0F / static_cast<float>(cell);
-    for (std::size_t i = 0; i < placed.size(); i += kLanes)
-      fit_eight(placed.subspan(i, std::min<std::size_t>(kLanes, placed.size() - i)));
+    const auto in_eights = [&](auto one) {
+      for (std::size_t i = 0; i < placed.size(); i += kLanes)
+        (this->*one)(placed.subspan(i, std::min<std::size_t>(kLanes, placed.size() - i)), i);
+    };
+    if (only_blurred_) {
+      in_eights(&TileRefit::sharpen_eight);
+      return;
+    }
+    scratch_.wide.resize(placed.size());
+    in_eights(&TileRefit::fit_wide);
+    scratch_.rows.scale_supports(kNarrow);
+    in_eights(&TileRefit::fit_narrow);
   }
 
  private:
-  /// Up to eight samples' normals; those without a fit keep their own.
-  void fit_eight(std::span<const Placed> placed) {
-    Queries at{};
-    Queries facing{};
+  using Point = std::array<float, 3>;
+
+  /// Up to eight samples' places and normals, and the ranges of samples around them.
+  struct Eight {
+    Queries at{}, facing{};
+    int ranges = 0;
+    std::array<Lanes, kSums> sums{};
+  };
+  Eight eight(std::span<const Placed> placed) {
+    Eight e;
     for (int l = 0; l < kLanes; ++l) {
       const std::uint32_t i = placed[std::min(static_cast<std::size_t>(l), placed.size() - 1)].sample;
-      at.x[l] = relative(s_.x[i], 0);
-      at.y[l] = relative(s_.y[i], 1);
-      at.z[l] = relative(s_.z[i], 2);
-      facing.x[l] = s_.nx[i];
-      facing.y[l] = s_.ny[i];
-      facing.z[l] = s_.nz[i];
+      e.at.x[l] = relative(s_.x[i], 0);
+      e.at.y[l] = relative(s_.y[i], 1);
+      e.at.z[l] = relative(s_.z[i], 2);
+      e.facing.x[l] = s_.nx[i];
+      e.facing.y[l] = s_.ny[i];
+      e.facing.z[l] = s_.nz[i];
     }
-    const auto [y_lo, y_hi] = std::minmax_element(at.y.v.begin(), at.y.v.end());
-    const auto [z_lo, z_hi] = std::minmax_element(at.z.v.begin(), at.z.v.end());
-    const int n = scratch_.rows.ranges(*y_lo, *y_hi, *z_lo, *z_hi, scratch_.ranges.data());
-    std::array<Lanes, kSums> sums{};
-    sums[kNearest].v.fill(1e30F);
-    const TileSamples& around = scratch_.rows.samples();
-    if (only_blurred_) {
-      kernel_.accumulate(around, scratch_.ranges.data(), n, at, sums.data());
-      for (std::size_t k = 0; k < placed.size(); ++k) {
-        const int l = static_cast<int>(k);
-        sharpen(placed[k].sample, {at.x[l], at.y[l], at.z[l]}, n, mean_of_normals(sums.data(), l));
-      }
-      return;
-    }
-    kernel_.accumulate_facing(around, scratch_.ranges.data(), n, at, facing, sums.data());
-    FitOutput fit{};
-    kernel_.fit(sums.data(), FitInput{}, fit);
+    const auto [y_lo, y_hi] = std::minmax_element(e.at.y.v.begin(), e.at.y.v.end());
+    const auto [z_lo, z_hi] = std::minmax_element(e.at.z.v.begin(), e.at.z.v.end());
+    e.ranges = scratch_.rows.ranges(*y_lo, *y_hi, *z_lo, *z_hi, scratch_.ranges.data());
+    e.sums[kNearest].v.fill(1e30F);
+    return e;
+  }
+  void sharpen_eight(std::span<const Placed> placed, std::size_t /*first*/) {
+    Eight e = eight(placed);
+    kernel_.accumulate(scratch_.rows.samples(), scratch_.ranges.data(), e.ranges, e.at, e.sums.data());
     for (std::size_t k = 0; k < placed.size(); ++k) {
-      const std::uint32_t i = placed[k].sample;
       const int l = static_cast<int>(k);
-      const float along = fit.nx[l] * s_.nx[i] + fit.ny[l] * s_.ny[i] + fit.nz[l] * s_.nz[i];
-      const bool keep = !(along > 0) || sums[kSeen][l] < kLeastRefitSamples;
-      put(i, keep ? normal_of(i)
-                  : mixed({fit.nx[l], fit.ny[l], fit.nz[l]}, normal_of(i), 1 - mean_of_normals(sums.data(), l)));
+      sharpen(placed[k].sample, {e.at.x[l], e.at.y[l], e.at.z[l]}, e.ranges, mean_of_normals(e.sums.data(), l));
     }
   }
-  using Point = std::array<float, 3>;
+  /// The spheres' normals; those without a fit keep their own.
+  template <typename Take>
+  void fit_eight(std::span<const Placed> placed, const Take& take) {
+    Eight e = eight(placed);
+    kernel_.accumulate_facing(scratch_.rows.samples(), scratch_.ranges.data(), e.ranges, e.at, e.facing, e.sums.data());
+    FitOutput fit{};
+    kernel_.fit(e.sums.data(), FitInput{}, fit);
+    for (std::size_t k = 0; k < placed.size(); ++k) {
+      const int l = static_cast<int>(k);
+      const Point own = normal_of(placed[k].sample);
+      const Point found{fit.nx[l], fit.ny[l], fit.nz[l]};
+      const float along = found[0] * own[0] + found[1] * own[1] + found[2] * own[2];
+      const bool keep = !(along > 0) || e.sums[kSeen][l] < kLeastRefitSamples;
+      take(k, FittedNormal{keep ? own : found, 1 - mean_of_normals(e.sums.data(), l), !keep});
+    }
+  }
+  void fit_wide(std::span<const Placed> placed, std::size_t first) {
+    fit_eight(placed, [&](std::size_t k, const FittedNormal& f) { scratch_.wide[first + k] = f; });
+  }
+  /// Where the wide fit is not the best for all of the eight; settles their normals.
+  void fit_narrow(std::span<const Placed> placed, std::size_t first) {
+    const auto wide = std::span(scratch_.wide).subspan(first, placed.size());
+    if (std::all_of(wide.begin(), wide.end(), [&](const FittedNormal& w) { return share_of_detail(w) == 0; })) {
+      for (std::size_t k = 0; k < placed.size(); ++k) put(placed[k].sample, wide[k].normal);
+      return;
+    }
+    fit_eight(placed, [&](std::size_t k, const FittedNormal& narrow) {
+      const std::uint32_t i = placed[k].sample;
+      put(i, mixed(wide[k], narrow, normal_of(i)));
+    });
+  }
   [[nodiscard]] static float mean_of_normals(const Lanes* sums, int l) {
     const float x = sums[kNx][l];
     const float y = sums[kNy][l];
     const float z = sums[kNz][l];
     return (x * x + y * y + z * z) / std::max(1e-30F, sums[kW][l] * sums[kW][l]);
   }
-  /// The fit, or the normal that came, as the normals around vary.
-  [[nodiscard]] Point mixed(const Point& fit, const Point& own, float variance) const {
-    const float share = std::clamp((variance - noise_variance_) / ((kShapeRatio - 1) * noise_variance_), 0.0F, 1.0F);
-    const Eigen::Vector3f f(fit[0], fit[1], fit[2]), o(own[0], own[1], own[2]);
-    const Eigen::Vector3f sum = f + share * (o - f);
-    const float length = sum.norm();  // never 0: the two face one way
+  /// The wide fit, the narrow one or the normal that came, as the normals around vary.
+  [[nodiscard]] Point mixed(const FittedNormal& wide, const FittedNormal& narrow, const Point& own) const {
+    const Point detailed =
+        between(narrow.normal, own, share_of_shape(narrow.variance, std::max(kRoughVariance, noise_variance_)));
+    return between(wide.normal, detailed, share_of_detail(wide));
+  }
+  [[nodiscard]] float share_of_detail(const FittedNormal& wide) const {
+    return wide.fitted ? share_of_shape(wide.variance, std::max(kSmoothVariance, noise_variance_)) : 0;
+  }
+  /// From 0 to 1, of the normals' variance where noise has so much.
+  [[nodiscard]] static float share_of_shape(float variance, float noise) {
+    return std::clamp((variance - noise) / ((kShapeRatio - 1) * noise), 0.0F, 1.0F);
+  }
+  [[nodiscard]] static Point between(const Point& a, const Point& b, float share) {
+    const Eigen::Vector3f from(a[0], a[1], a[2]), to(b[0], b[1], b[2]);
+    const Eigen::Vector3f sum = from + share * (to - from);
+    const float length = sum.norm();  // never 0: both lie within 90 degrees of the normal that came
     return {sum.x() / length, sum.y() / length, sum.z() / length};
   }
   /// One sample's normal; it stays where those around are the same, whose mean has this squared length.

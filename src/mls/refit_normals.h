@@ -19,10 +19,16 @@ inline constexpr float kLeastRefitSamples = 6;
 /// than four degrees.
 inline constexpr float kBlurredVariance = 0.0005F;
 
-/// Variances of the normals around a sample, of length one. Up to this, or twice what the cloud's normals have where
-/// that is more, it is taken for noise, and the fit is better than the normal that came. From so many times that on it
-/// is shape, which a fit would level, and the normal stays; between them it is a mixture.
-inline constexpr float kNoiseVariance = 0.1F;
+/// Variances of the normals around a sample, of length one, up to which they are taken for noise, where twice what the
+/// cloud's normals have is not more: within the support, and within one so many times as wide. Up to the former the fit
+/// within the support is the best there is. Normals that vary more than that turn with the surface, which that fit
+/// would level: the fit within the narrow support is taken, and where they vary even there, the normal that came.
+/// Noise of neighbours that share samples is much the same, so that more of it is allowed in the narrow one.
+inline constexpr float kSmoothVariance = 0.03F;
+inline constexpr float kRoughVariance = 0.1F;
+inline constexpr float kNarrow = 0.5F;
+
+/// From so many times that variance on, none of the fit is left; between them it is a mixture.
 inline constexpr float kShapeRatio = 3;
 
 struct RefitSettings {

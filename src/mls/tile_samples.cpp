@@ -359,6 +359,14 @@ void RowSamples::place(const Lattice& lattice, int level, std::span<const Run> r
   }
 }
 
+void RowSamples::scale_supports(float factor) {
+  for (std::size_t k = 0; k < count_; ++k) {
+    samples_.support[k] *= factor;
+    samples_.inv_support2[k] = 1.0F / (samples_.support[k] * samples_.support[k]);
+  }
+  max_support_ *= factor;
+}
+
 int RowSamples::ranges(float y_lo, float y_hi, float z_lo, float z_hi, SampleRange* out) const {
   const auto row = [](float v) {
     return static_cast<int>(std::clamp(std::floor(v) - static_cast<float>(kLow), 0.0F, static_cast<float>(kRows - 1)));

@@ -119,6 +119,28 @@ TEST(RefitNormals, OfTwoSidesOfASheet) {
   EXPECT_LT(error_of(scene.truth, n.x, n.y, n.z), 0.4 * before);
 }
 
+/// Ripples six radii long, up to 19 degrees steep, and normals a few degrees off: a fit over three radii would level
+/// them, one over half of that makes the normals better than they came.
+TEST(RefitNormals, OfRipplesKeepTheirShape) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<> u(-1, 1);
+  RefitScene scene;
+  constexpr std::size_t kCount = 6000;
+  constexpr double kSteepest = 0.35;
+  scene.radius = 2 * kUnit * std::sqrt(4.0 / kCount);
+  const double wave = 2 * std::numbers::pi / (6 * scene.radius / kUnit);
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const double x = u(random), y = u(random);
+    const double slope = kSteepest * std::cos(wave * x);
+    const double l = std::hypot(1, slope);
+    scene.add({x, y, kSteepest / wave * std::sin(wave * x)}, {-slope / l, 0, 1 / l});
+  }
+  scene.perturb(0.12);
+  const double before = error_of(scene.truth, scene.samples.nx, scene.samples.ny, scene.samples.nz);
+  const UnitNormals n = refitted(scene, 3);
+  EXPECT_LT(error_of(scene.truth, n.x, n.y, n.z), 0.8 * before);
+}
+
 /// Two planes at a right angle with exact normals: a fit across the edge would turn those beside it.
 TEST(RefitNormals, StayBesideAnEdge) {
   std::mt19937 random(5);
