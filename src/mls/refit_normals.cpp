@@ -231,7 +231,7 @@ class TileRefit {
 
   const Kernel& kernel_;
   bool only_blurred_;
-  float noise_variance_;
+  float noise_variance_;  ///< twice what the cloud's normals have
   const LocalSamples& s_;
   const std::vector<float>& support_;
   Scratch& scratch_;

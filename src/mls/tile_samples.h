@@ -89,7 +89,7 @@ class RowSamples {
 
   /// Takes the samples that can reach a point of the block.
   void gather(const Lattice& lattice, const QueryLayers& layers, const Block& block, std::span<const Run> runs);
-  /// Makes the supports so many times as wide, up to 1.
+  /// Makes the supports so many times as wide, up to 1, until samples are gathered anew.
   void scale_supports(float factor);
   /// The arrays may be longer than size().
   [[nodiscard]] const TileSamples& samples() const { return samples_; }
