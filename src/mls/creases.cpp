@@ -225,8 +225,7 @@ std::size_t CreaseFinder::fit_sheets(std::size_t point, const std::array<FitOutp
   for (std::size_t k = 0; k < state_.points[point].sheets; ++k) {
     const Lanes* const sums = &state_.sums[k][g * kSheetSums];
     const double w = sums[kW][l];
-    // What too few samples speak of is left out: the others' sheets go on.
-    if (!(w > 0) || sums[kSeen][l] < kLeastOfSheet) continue;
+    if (!(w > 0)) continue;  // no samples: the others' sheets go on
     const double sheet_support = sums[kWR][l] / w;
     const double lift = sums[kPN][l] / w;
     if (sums[kThickness][l] / w - lift * lift > kMostThickness * kMostThickness * sheet_support * sheet_support)

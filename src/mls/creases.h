@@ -19,12 +19,9 @@ namespace lamina {
 /// much when one of them has a two-hundredth of the weight.
 inline constexpr double kLeastVariance = 0.01;
 /// What of the variance the sheets of an edge may keep within them; two halves of an even bend keep a quarter.
-inline constexpr double kMostWithin = 0.1;
+inline constexpr double kMostWithin = 0.2;
 /// How far the samples of a sheet may lie from it, root mean square, supports: more are several, one above another.
 inline constexpr double kMostThickness = 0.1;
-
-/// Samples that make a sheet beside another: their normals say how it lies, and one may be anything.
-inline constexpr float kLeastOfSheet = 2;
 /// How far the samples around a point of an edge may lie to one side, supports: further than one surface's, since each
 /// sheet has but half of them.
 inline constexpr double kMostLean = 0.6;
