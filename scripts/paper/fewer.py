@@ -10,15 +10,16 @@ from plotter import plotter, save  # noqa: E402  (in scripts)
 
 UNIT = 1e5
 MODEL = "dragon"
-UNIFORM, FLAT, OURS = "uniform cells", "thinned out where flat", "simplified"
+UNIFORM, FLAT, OURS, ASKED = "uniform cells", "thinned out where flat", "simplified", "as many as asked for"
 FINE, MESHLAB = "cells of 0.6 r, simplified", "simplified by MeshLab"
 STYLES = {UNIFORM: ("o--", "#808080"), FLAT: ("D-", "#803080"), OURS: ("s-", "#1f5fa8"), FINE: ("^-", "#308040"),
-          MESHLAB: ("x:", "#c06020")}
+          ASKED: ("*", "#b02050"), MESHLAB: ("x:", "#c06020")}
 NAMES = tuple(STYLES)
 CELLS = ("0.9r", "1.15r", "1.5r", "2r", "2.7r", "3.6r")
 DEVIATIONS = ("default", "0.02", "0.03", "0.05", "0.1")
 COUNTS = (850_000, 500_000, 300_000, 200_000, 100_000, 50_000)
 FINE_COUNTS = (1_300_000, *COUNTS)
+ASKED_COUNTS = (1_300_000, 850_000, 650_000)  # fewer leave cells as they are
 KEEP = ["--prune", "0"]  # the truth has small parts
 ALL = [*KEEP, "--deviation", "0"]  # with all triangles
 
@@ -33,6 +34,9 @@ def measured(program, cloud, truth, folder, limit, wanted):
         options = KEEP if deviation == "default" else [*KEEP, "--deviation", deviation]
         cost = runs.chosen(program, cloud, mesh, options)
         yield {"name": FLAT, "wanted": deviation, "cost": cost} | runs.judge(program, mesh, truth)
+    for count in ASKED_COUNTS if wanted(ASKED) else ():
+        cost = runs.chosen(program, cloud, mesh, [*KEEP, "--triangles", str(count)])
+        yield {"name": ASKED, "wanted": count, "cost": cost} | runs.judge(program, mesh, truth)
     meshlab = shutil.which("meshlabserver") and shutil.which("xvfb-run")
     for name, options in ((OURS, []), (MESHLAB, []), (FINE, ["--cell", "0.6r"])):
         if not wanted(name) or (name == MESHLAB and not meshlab):

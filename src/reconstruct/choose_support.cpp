@@ -20,6 +20,15 @@ double rim_overhang(double blend) {
   return kStep * std::round(wanted / kStep);
 }
 
+/// The largest leaf cell (sample radii) of a mesh that keeps all its triangles, or so many.
+double cell_for(std::uint64_t triangles, std::uint64_t samples) {
+  if (triangles == 0) return kChosenCell;
+  constexpr double kStep = 1e-4;  // so that what is told as an option gives the same mesh
+  const double full = kFullForWanted * static_cast<double>(triangles);
+  const double main = std::sqrt(kTrianglesPerCell * kSampleArea * static_cast<double>(samples) / full);
+  return std::clamp(kStep * std::round(main / kMainCell / kStep), kFinestCell, kChosenCell);
+}
+
 void follow_places(const SupportSurvey& survey, ReconstructionPlan& plan) {
   plan.feed.support = std::make_shared<const SupportField>(survey.places);
   plan.feed.blend = static_cast<double>(plan.feed.support->median());
@@ -81,13 +90,14 @@ void choose_support(const SurfaceSettings& s, const CloudSurvey& survey, const P
                     ReconstructionPlan& plan) {
   const RadiusSurvey& radii = survey.radii;
   const bool thins = !s.simplify.wanted() && s.deviation.value_or(kCleanDeviation) > 0;
+  const double unthinned = cell_for(s.simplify.triangles, plan.samples);
   plan.feed.blend = kDefaultBlend;
   if (s.blend) {
     plan.feed.blend = *s.blend;
   } else if (survey.noisy) {
-    choose_for_noise(survey, s, thins ? kNoisyCell : kChosenCell, plan);
+    choose_for_noise(survey, s, thins ? kNoisyCell : unthinned, plan);
   } else if (radii.high < kEven * radii.low && !survey.support.lines) {
-    choose_for_even(s.cell.has_value(), thins && radii.noise <= kSharp ? kThinnedCell : kChosenCell, plan);
+    choose_for_even(s.cell.has_value(), thins && radii.noise <= kSharp ? kThinnedCell : unthinned, plan);
     // A closed mesh. Normals come with samples of a surface, which ends where they do; positions alone say nothing of
     // wide gaps among them.
     plan.holes.watertight = info.found_normals ? Watertight::any_loops : Watertight::short_loops;

@@ -48,6 +48,15 @@ inline constexpr double kThinnedCell = 0.84;
 /// normals follow.
 inline constexpr double kNoisyCell = 0.7;
 
+/// The same where a number of triangles is wanted: cells whose full mesh has kFullForWanted times as many, so that
+/// there is something to choose from, but no smaller than kFinestCell.
+inline constexpr double kFinestCell = 0.6;
+inline constexpr double kFullForWanted = 2;
+
+/// What a sample stands for of the surface, square radii, and what a square cell of surface gives, clustered.
+inline constexpr double kSampleArea = 0.25;
+inline constexpr double kTrianglesPerCell = 1.8;
+
 /// How far from its nearest sample a corner keeps a value (cells): less on noise, whose outermost samples would make
 /// sheets of their own, but so many radii where cells are much smaller; more where cells between two sheets are half as
 /// large, so that values reach as far as before.

@@ -26,10 +26,10 @@ double main_cell(const FeedSettings& feed) {
   return kMainCell * feed.cell_ratio() * (feed.cell_follows_support() ? feed.blend : 1.0);
 }
 
-/// Cells of surface that a sample stands for: a quarter of its radius squared of area.
+/// Cells of surface that a sample stands for.
 double cells_per_sample(const FeedSettings& feed) {
   if (feed.fixed_cell()) return 1.0;
-  return 0.25 / (main_cell(feed) * main_cell(feed));
+  return kSampleArea / (main_cell(feed) * main_cell(feed));
 }
 
 /// Faces wait on disk for the vertices, and both for a format that is not PLY.
@@ -152,13 +152,12 @@ double tiles_memory(const ReconstructionPlan& plan) {
 }  // namespace
 
 double expected_triangles(const ReconstructionPlan& plan) {
-  // A sample stands for a quarter of its radius squared of surface; a main cell's worth of surface gives some 3.3
-  // triangles (the cells it cuts, two each), clustering leaves 55 % of them.
+  constexpr double kUnclustered = 3.3;  // the cells it cuts, two each
   const double finest = plan.lattice.cell;
   const double cell = plan.feed.fixed_cell() ? finest : std::max(finest, main_cell(plan.feed) * plan.radius.median);
   const double cells =
-      static_cast<double>(plan.samples) * 0.25 * plan.radius.median * plan.radius.median / (cell * cell);
-  return cells * (plan.cluster == ClusterMode::none ? 3.3 : 1.8);
+      static_cast<double>(plan.samples) * kSampleArea * plan.radius.median * plan.radius.median / (cell * cell);
+  return cells * (plan.cluster == ClusterMode::none ? kUnclustered : kTrianglesPerCell);
 }
 
 std::uint64_t table_bytes(const ReconstructionPlan& plan, const SlabStore& store) {

@@ -133,6 +133,22 @@ TEST(ChooseSupport, CellsAreFineOnlyWhereFlatPartsAreThinnedOut) {
   EXPECT_EQ(fine.feed.band_radii, coarse.feed.band_radii) << "as far from the samples";
 }
 
+TEST(ChooseSupport, CellsAreAsFineAsTheTrianglesThatAreWantedAskFor) {
+  const auto cell_for = [](std::uint64_t triangles, float noise) {
+    SurfaceSettings settings = by_noise();
+    settings.simplify.triangles = triangles;
+    ReconstructionPlan plan;
+    plan.samples = 1'000'000;
+    choose_support(settings, {survey(noise, 2), is_noisy(survey(noise, 2), {}), {}}, {}, plan);
+    return plan.feed.cell.value;
+  };
+  for (const float noise : {0.01F, 0.1F}) {
+    EXPECT_EQ(cell_for(500'000, noise), kChosenCell) << "the full mesh has twice as many";
+    EXPECT_LT(cell_for(800'000, noise), 0.8);
+    EXPECT_EQ(cell_for(5'000'000, noise), kFinestCell) << "samples tell no more";
+  }
+}
+
 TEST(ChooseSupport, CellsToldAsAnOptionGiveTheSameBand) {
   const ReconstructionPlan chosen = choice_of(by_noise(), survey(0.1F, 2));
   SurfaceSettings given = by_noise();
