@@ -50,7 +50,7 @@ inline constexpr double kNoisyCell = 0.7;
 
 /// The same where a number of triangles is wanted: cells whose full mesh has kFullForWanted times as many, so that
 /// there is something to choose from, but no smaller than kFinestCell.
-inline constexpr double kFinestCell = 0.6;
+inline constexpr double kFinestCell = 0.63;
 inline constexpr double kFullForWanted = 2;
 
 /// What a sample stands for of the surface, square radii, and what a square cell of surface gives, clustered.
