@@ -308,9 +308,8 @@ void add_surface_options(CLI::App& tool, SurfaceOptions& o) {
   add_simplify_goal(tool, o.simplify, simplification);
   tool.get_option("--triangles")
       ->description(
-          "How many triangles stay, at most those there are; cells are so fine that there are about twice as many "
-          "first, "
-          "where the samples have the detail");
+          "How many triangles stay, at most those there are; cells are made so fine that there are about twice as "
+          "many first, where the samples have the detail");
   auto* deviation = add_number_or_auto(
       tool, "--deviation", "auto",
       "Leave out triangles where the surface is flat: within K lengths of an edge there, root mean square; boundaries "

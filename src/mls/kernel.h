@@ -63,7 +63,7 @@ struct NormalRegion {
   Lanes first_least, second_least;
 };
 
-/// Sums over a sheet's samples: Sum up to kSums, without kNearest, and one more.
+/// Sums over a sheet's samples: Sum up to kSums, without kNearest and kSeen, and one more.
 inline constexpr int kThickness = kSums;  ///< sum w (p.n)^2
 inline constexpr int kSheetSums = kSums + 1;
 /// Sums of the products of normals' components, w nx nx, nx ny, nx nz, ny ny, ny nz, nz nz; behind them sum w.

@@ -1,8 +1,8 @@
 // The kernel's sums over the samples of a sheet (mls/creases.h); included by kernel_source.h, inside its namespace. No
 // include guard on purpose.
 
-/// Calls add(i, dx, dy, dz, d2, t, w) for the samples that act on the queries' box; t > 0 and w > 0 in the lanes in
-/// whose region they are.
+/// Calls add(i, dx, dy, dz, d2, w) for the samples that act on the queries' box; w > 0 in the lanes in whose region
+/// they are.
 template <typename Add>
 void for_region(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query,
                 const NormalRegion& region, const Add& add) {
@@ -25,7 +25,7 @@ void for_region(const TileSamples& s, const SampleRange* ranges, int count, cons
       t = along(region.second) >= vec(region.second_least) ? t : zero;
       const Vec phi = t > zero ? t : zero;
       const Vec phi2 = phi * phi;
-      add(i, dx, dy, dz, d2, t, splat(s.weight[i]) * (phi2 * phi2));
+      add(i, dx, dy, dz, d2, splat(s.weight[i]) * (phi2 * phi2));
     }
   }
 }
@@ -36,7 +36,7 @@ inline void accumulate_sheet(const TileSamples& s, const SampleRange* ranges, in
   for (int k = 0; k < kSheetSums; ++k) sum[k] = vec(sums[k]);
   for_region(
       s, ranges, count, query, region,
-      [&](std::uint32_t i, const Vec& dx, const Vec& dy, const Vec& dz, const Vec& d2, const Vec& t, const Vec& w)
+      [&](std::uint32_t i, const Vec& dx, const Vec& dy, const Vec& dz, const Vec& d2, const Vec& w)
           __attribute__((always_inline)) {
             const Vec nx = splat(s.nx[i]);
             const Vec ny = splat(s.ny[i]);
@@ -52,7 +52,6 @@ inline void accumulate_sheet(const TileSamples& s, const SampleRange* ranges, in
             sum[kPP] += w * d2;
             sum[kPN] += w * pn;
             sum[kWR] += w * splat(s.support[i]);
-            sum[kSeen] += t > splat(0.0F) ? splat(1.0F) : splat(0.0F);
             sum[kThickness] += w * pn * pn;
           });
   for (int k = 0; k < kSheetSums; ++k) vec(sums[k]) = sum[k];
@@ -64,7 +63,7 @@ inline void accumulate_moments(const TileSamples& s, const SampleRange* ranges, 
   for (int k = 0; k <= kMoments; ++k) sum[k] = vec(moments[k]);
   for_region(
       s, ranges, count, query, region,
-      [&](std::uint32_t i, const Vec&, const Vec&, const Vec&, const Vec&, const Vec&, const Vec& w)
+      [&](std::uint32_t i, const Vec&, const Vec&, const Vec&, const Vec&, const Vec& w)
           __attribute__((always_inline)) {
             const Vec nx = splat(s.nx[i]);
             const Vec ny = splat(s.ny[i]);

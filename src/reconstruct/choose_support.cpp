@@ -20,12 +20,12 @@ double rim_overhang(double blend) {
   return kStep * std::round(wanted / kStep);
 }
 
-/// The largest leaf cell (sample radii) of a mesh that keeps all its triangles, or so many.
-double cell_for(std::uint64_t triangles, std::uint64_t samples) {
-  if (triangles == 0) return kChosenCell;
+/// The largest leaf cell (sample radii) where triangles do not go for flatness: `s` wants some number of them, or all.
+double unthinned_cell(const SurfaceSettings& s, std::uint64_t samples) {
+  if (s.simplify.triangles == 0) return kChosenCell;
   constexpr double kStep = 1e-4;  // so that what is told as an option gives the same mesh
-  const double full = kFullForWanted * static_cast<double>(triangles);
-  const double main = std::sqrt(kTrianglesPerCell * kSampleArea * static_cast<double>(samples) / full);
+  const double full = kFullForWanted * static_cast<double>(s.simplify.triangles);
+  const double main = std::sqrt(triangles_per_cell(s.cluster) * kSampleArea * static_cast<double>(samples) / full);
   return std::clamp(kStep * std::round(main / kMainCell / kStep), kFinestCell, kChosenCell);
 }
 
@@ -90,7 +90,7 @@ void choose_support(const SurfaceSettings& s, const CloudSurvey& survey, const P
                     ReconstructionPlan& plan) {
   const RadiusSurvey& radii = survey.radii;
   const bool thins = !s.simplify.wanted() && s.deviation.value_or(kCleanDeviation) > 0;
-  const double unthinned = cell_for(s.simplify.triangles, plan.samples);
+  const double unthinned = unthinned_cell(s, plan.samples);
   plan.feed.blend = kDefaultBlend;
   if (s.blend) {
     plan.feed.blend = *s.blend;

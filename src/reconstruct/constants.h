@@ -53,9 +53,8 @@ inline constexpr double kNoisyCell = 0.7;
 inline constexpr double kFinestCell = 0.63;
 inline constexpr double kFullForWanted = 2;
 
-/// What a sample stands for of the surface, square radii, and what a square cell of surface gives, clustered.
+/// What a sample stands for of the surface, square radii.
 inline constexpr double kSampleArea = 0.25;
-inline constexpr double kTrianglesPerCell = 1.8;
 
 /// How far from its nearest sample a corner keeps a value (cells): less on noise, whose outermost samples would make
 /// sheets of their own, but so many radii where cells are much smaller; more where cells between two sheets are half as

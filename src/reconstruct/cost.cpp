@@ -151,13 +151,18 @@ double tiles_memory(const ReconstructionPlan& plan) {
 
 }  // namespace
 
-double expected_triangles(const ReconstructionPlan& plan) {
+double triangles_per_cell(ClusterMode cluster) {
   constexpr double kUnclustered = 3.3;  // the cells it cuts, two each
+  constexpr double kClustered = 1.8;
+  return cluster == ClusterMode::none ? kUnclustered : kClustered;
+}
+
+double expected_triangles(const ReconstructionPlan& plan) {
   const double finest = plan.lattice.cell;
   const double cell = plan.feed.fixed_cell() ? finest : std::max(finest, main_cell(plan.feed) * plan.radius.median);
   const double cells =
       static_cast<double>(plan.samples) * kSampleArea * plan.radius.median * plan.radius.median / (cell * cell);
-  return cells * (plan.cluster == ClusterMode::none ? kUnclustered : kTrianglesPerCell);
+  return cells * triangles_per_cell(plan.cluster);
 }
 
 std::uint64_t table_bytes(const ReconstructionPlan& plan, const SlabStore& store) {

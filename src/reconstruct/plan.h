@@ -139,6 +139,8 @@ std::string describe_findings(const SurfaceSettings& settings, const SurfaceStat
 
 /// Of the mesh.
 double expected_triangles(const ReconstructionPlan& plan);
+/// Triangles that a square cell of surface gives.
+double triangles_per_cell(ClusterMode cluster);
 
 /// The whole of it, for a plan that is complete but for its cost.
 ExpectedCost expected_cost(const ReconstructionPlan& plan, const Ingested& cloud);

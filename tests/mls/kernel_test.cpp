@@ -143,7 +143,7 @@ TEST(Kernel, SheetsAreSumsOverARegionOfNormals) {
         const double pn = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
         const std::array<double, kSheetSums> own{w,        w * d[0], w * d[1],   w * d[2], w * n[0],
                                                  w * n[1], w * n[2], w * d2,     w * pn,   w * s.support[i],
-                                                 0,        1,        w * pn * pn};
+                                                 0,        0,        w * pn * pn};
         for (std::size_t k = 0; k < own.size(); ++k) expected[k] += own[k];
         const std::array<double, kMoments + 1> moments{
             w * n[0] * n[0], w * n[0] * n[1], w * n[0] * n[2], w * n[1] * n[1], w * n[1] * n[2], w * n[2] * n[2], w};
