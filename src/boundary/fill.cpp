@@ -256,4 +256,12 @@ bool FilledPlace::surrounds(const Loop& other) const {
   });
 }
 
+bool lies_beside(const Loop& loop, const Loop& rim) {
+  return std::all_of(loop.vertices.begin(), loop.vertices.end(), [&](const BoundaryVertex& v) {
+    return std::any_of(rim.vertices.begin(), rim.vertices.end(), [&](const BoundaryVertex& r) {
+      return (to_vec(v.position) - to_vec(r.position)).norm() <= kBesideRim * static_cast<double>(r.radius);
+    });
+  });
+}
+
 }  // namespace lamina::boundary

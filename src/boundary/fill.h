@@ -28,6 +28,8 @@ inline constexpr double kSmallLoop = 5;
 inline constexpr double kMostSmallFold = 1.77;
 /// Another loop so near to a filling (R) takes its place: the two would be one surface twice.
 inline constexpr double kOccupied = 0.5;
+/// But not where all of it lies so near to the rim (R): a hole in the surface that the rim bounds.
+inline constexpr double kBesideRim = 1;
 
 enum class Verdict : std::uint8_t {
   filled,
@@ -80,6 +82,9 @@ class FilledPlace {
   std::vector<Eigen::Vector3d> points_;
   std::vector<std::array<std::uint32_t, 3>> triangles_;
 };
+
+/// Whether all of a loop lies along another's rim (kBesideRim).
+bool lies_beside(const Loop& loop, const Loop& rim);
 
 // The triangles of an invented closure: a disc within a closed polygon in space, no chord of the polygon in it.
 

@@ -140,6 +140,15 @@ std::vector<std::vector<std::size_t>> HoleCloser::find_occupants(const std::vect
   return occupants;
 }
 
+void HoleCloser::pass_over_holes_beside(const std::vector<Closing>& closings,
+                                        std::vector<std::vector<std::size_t>>& occupants) const {
+  tbb::parallel_for(std::size_t{0}, loops_.size(), [&](std::size_t l) {
+    std::erase_if(occupants[l], [&](std::size_t o) {
+      return closings[o].filling.verdict == Verdict::filled && lies_beside(loops_[o].first, loops_[l].first);
+    });
+  });
+}
+
 bool HoleCloser::take_islands(std::size_t outer, const std::vector<std::size_t>& occupants,
                               const std::vector<Closing>& closings, Closing& out) const {
   const Loop& loop = loops_[outer].first;
@@ -166,7 +175,8 @@ bool HoleCloser::take_islands(std::size_t outer, const std::vector<std::size_t>&
 }
 
 void HoleCloser::settle_occupied(std::vector<Closing>& closings) const {
-  const std::vector<std::vector<std::size_t>> occupants = find_occupants(closings);
+  std::vector<std::vector<std::size_t>> occupants = find_occupants(closings);
+  pass_over_holes_beside(closings, occupants);
   const std::vector<Closing> before = closings;
   tbb::parallel_for(std::size_t{0}, loops_.size(), [&](std::size_t l) {
     if (occupants[l].empty()) return;
@@ -203,7 +213,8 @@ void HoleCloser::bridge_gaps(std::vector<Closing>& closings) const {
     bridges[l].filling = std::move(closure.filling);
     bridges[l].filling.verdict = Verdict::filled;
   });
-  const std::vector<std::vector<std::size_t>> occupants = find_occupants(bridges);
+  std::vector<std::vector<std::size_t>> occupants = find_occupants(bridges);
+  pass_over_holes_beside(closings, occupants);
   for (std::size_t l = 0; l < loops_.size(); ++l) {
     if (bridges[l].is_closed() && occupants[l].empty()) closings[l] = std::move(bridges[l]);
   }

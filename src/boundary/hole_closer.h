@@ -69,6 +69,9 @@ class HoleCloser {
   void fill_all(std::vector<Closing>& closings) const;
   /// By loop, the other loops that run through its filling.
   [[nodiscard]] std::vector<std::vector<std::size_t>> find_occupants(const std::vector<Closing>& closings) const;
+  /// Takes out of each gap's occupants those that are holes in the surface along its rim.
+  void pass_over_holes_beside(const std::vector<Closing>& closings,
+                              std::vector<std::vector<std::size_t>>& occupants) const;
   /// Fills around the occupants where they are islands; false where they are not, or no filling goes around them.
   bool take_islands(std::size_t outer, const std::vector<std::size_t>& occupants, const std::vector<Closing>& closings,
                     Closing& out) const;

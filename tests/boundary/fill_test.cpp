@@ -218,12 +218,37 @@ TEST(Fill, OfAWideGapGoesOnAsTheSurfaceDoes) {
   }
 }
 
+/// Waves a few dozen edges long, so narrow that they run into each other.
+TEST(Fill, OfALongRimThatWindsAndCrossesItself) {
+  constexpr std::uint32_t kEdges = 1500;
+  Loop loop = saddle_loop(kEdges, 0.6, 0);
+  for (std::uint32_t i = 0; i < kEdges; ++i) {
+    const double a = kTurn * i / kEdges, b = a + 0.04 * std::sin(kTurn * 75 * i / kEdges);
+    const double d = 0.6 + 0.02 * std::cos(kTurn * 75 * i / kEdges);
+    const double x = d * std::cos(b), y = d * std::sin(b);
+    const Eigen::Vector3d up = Eigen::Vector3d(-x, y, 1).normalized();
+    loop.vertices[i].position = {x, y, (x * x - y * y) / 2};
+    for (std::size_t k = 0; k < 3; ++k)
+      loop.vertices[i].normal[k] = static_cast<float>(up[static_cast<Eigen::Index>(k)]);
+    loop.facing[i] = {up.x(), up.y(), up.z()};
+  }
+  const Filling filling = fill_loop(loop, 1000);
+  ASSERT_EQ(filling.verdict, Verdict::filled);
+  for (const auto& p : filling.positions) EXPECT_NEAR(p[2], (p[0] * p[0] - p[1] * p[1]) / 2, 0.01);
+}
+
 TEST(Fill, OfARimThatLeavesTheSurfaceHereAndThere) {
   Loop loop = saddle_loop(200, 0.6, 0);
   for (std::size_t i = 50; i < 90; ++i) loop.vertices[i].position[2] -= 0.1;
   expect_disc(loop, fill_loop(loop, 100));
   for (std::size_t i = 0; i < 100; ++i) loop.vertices[i].position[2] -= 0.2;
   EXPECT_EQ(fill_loop(loop, 100).verdict, Verdict::bent) << "two surfaces, a step apart";
+}
+
+TEST(Fill, HoleBesideARimIsToldFromOneInTheGap) {
+  const Loop rim = sphere_loop(200, 0.5, 0.1);
+  EXPECT_TRUE(lies_beside(sphere_loop(12, 0.45, 0.1), rim)) << "a ring along it";
+  EXPECT_FALSE(lies_beside(sphere_loop(12, 0.3, 0.1), rim));
 }
 
 TEST(Fill, GoesAroundIslands) {
