@@ -30,6 +30,9 @@ enum Sum : int {
   kSums      ///< then one sum w c per attribute
 };
 
+/// Of these the last two where samples have residuals: the residual, and its square.
+inline constexpr std::size_t kResidualSums = 2;
+
 /// Samples of a tile, structure of arrays, in cells of the level relative to the tile's origin.
 struct TileSamples {
   std::vector<float> x, y, z, nx, ny, nz;

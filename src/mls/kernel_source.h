@@ -185,8 +185,12 @@ void accumulate_some(const TileSamples& s, const SampleRange* ranges, int count,
       return accumulate_body<0, B, F>(s, ranges, count, query, facing, sums);
     case 1:
       return accumulate_body<1, B, F>(s, ranges, count, query, facing, sums);
+    case 2:
+      return accumulate_body<2, B, F>(s, ranges, count, query, facing, sums);
     case 3:
       return accumulate_body<3, B, F>(s, ranges, count, query, facing, sums);
+    case 5:
+      return accumulate_body<5, B, F>(s, ranges, count, query, facing, sums);
     default:
       return accumulate_body<-1, B, F>(s, ranges, count, query, facing, sums);
   }

@@ -103,6 +103,11 @@ std::vector<Work> list_work(Window& window, int level, std::int32_t slab, bool c
   return work;
 }
 
+/// Of a group's sums.
+std::size_t channels_of(const Window& window, const ProjectSettings& settings) {
+  return kSums + static_cast<std::size_t>(window.attributes()) + (settings.residuals ? kResidualSums : 0);
+}
+
 std::vector<Block> blocks_of(const std::vector<Work>& work) {
   std::vector<Block> blocks;
   blocks.reserve(work.size());
@@ -117,7 +122,8 @@ class Projector::Level {
  public:
   Level(Projector& projector, Window& window, std::int32_t slab, int level, SampleFeed& feed)
       : scratch_(*projector.scratch_),
-        rule_{projector.kernel_, projector.settings_, kSums + static_cast<std::size_t>(window.attributes())},
+        rule_{projector.kernel_, projector.settings_, channels_of(window, projector.settings_),
+              static_cast<float>(window.lattice().cell_size(level))},
         window_(window),
         lattice_(window.lattice()),
         level_(level),

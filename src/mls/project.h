@@ -27,6 +27,7 @@ struct ProjectSettings {
   float apart = 0.7F;           ///< provided that the two lie this far apart (cells): the lattice can tell them
   float trusted_offset = 0.4F;  ///< trusted while |projected point - weighted average| <= this, in support radii
   int trusted_samples = 3;      ///< and at least this many samples contributed
+  bool residuals = false;       ///< samples have them (ActiveBucket::residual): what their mean tells is added
   bool creases = false;         ///< sharp edges where normals fall into two or three groups (creases.h); corners only
 };
 

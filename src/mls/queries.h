@@ -39,7 +39,8 @@ void list_queries(const Work& work, std::vector<Query>& out);
 struct QueryBatch {
   std::vector<Queries> points;  ///< cells relative to the tile
   std::vector<Queries> facing;  ///< samples whose normals point away from these do not count; zero: all do
-  std::vector<Lanes> sums;      ///< per group kSums + attributes lanes
+  std::vector<Lanes> sums;      ///< per group ProjectRule::channels lanes
+  [[nodiscard]] std::size_t channels() const { return points.empty() ? 0 : sums.size() / points.size(); }
 };
 
 /// What a tile keeps between batches and steps.
@@ -55,7 +56,8 @@ struct TileState {
 struct ProjectRule {
   const Kernel& kernel;
   const ProjectSettings& settings;
-  std::size_t channels;  ///< of a group's sums: kSums + attributes
+  std::size_t channels;  ///< of a group's sums: kSums + attributes (+ kResidualSums)
+  float cell = 1;        ///< of the level, steps
 
   /// Cell centres lie half a cell above their corner.
   [[nodiscard]] float shift() const { return settings.centres ? 0.5F : 0.0F; }

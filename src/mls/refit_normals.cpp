@@ -56,6 +56,7 @@ std::vector<Placed> place(const LocalSamples& s, std::int32_t cell) {
 /// Of the sphere around a sample, or its own where there is none.
 struct FittedNormal {
   std::array<float, 3> normal{};
+  float residual = 0;  ///< how far outside of the sphere the sample lies, cells
   float variance = 0;  ///< of the normals around, of length one
   bool fitted = false;
 };
@@ -78,7 +79,7 @@ float variance_of(float median_angle) {
 class TileRefit {
  public:
   TileRefit(const Kernel& kernel, const RefitSettings& settings, const ActiveBucket& bucket, Scratch& scratch,
-            UnitNormals& out)
+            FilteredNormals& out)
       : kernel_(kernel),
         only_blurred_(settings.only_blurred),
         noise_variance_(2 * variance_of(settings.noise)),
@@ -154,11 +155,15 @@ class TileRefit {
       const Point found{fit.nx[l], fit.ny[l], fit.nz[l]};
       const float along = found[0] * own[0] + found[1] * own[1] + found[2] * own[2];
       const bool keep = !(along > 0) || e.sums[kSeen][l] < kLeastRefitSamples;
-      take(k, FittedNormal{keep ? own : found, 1 - mean_of_normals(e.sums.data(), l), !keep});
+      take(k, FittedNormal{keep ? own : found, keep ? 0.0F : fit.distance[l], 1 - mean_of_normals(e.sums.data(), l),
+                           !keep});
     }
   }
   void fit_wide(std::span<const Placed> placed, std::size_t first) {
-    fit_eight(placed, [&](std::size_t k, const FittedNormal& f) { scratch_.wide[first + k] = f; });
+    fit_eight(placed, [&](std::size_t k, const FittedNormal& f) {
+      scratch_.wide[first + k] = f;
+      out_.residual[placed[k].sample] = f.residual / inv_;
+    });
   }
   /// Where the wide fit is not the best for all of the eight; settles their normals.
   void fit_narrow(std::span<const Placed> placed, std::size_t first) {
@@ -235,7 +240,7 @@ class TileRefit {
   const LocalSamples& s_;
   const std::vector<float>& support_;
   Scratch& scratch_;
-  UnitNormals& out_;
+  FilteredNormals& out_;
   std::array<std::uint32_t, 3> origin_{};
   float inv_ = 1;
 };
@@ -282,7 +287,7 @@ void RefitNormals::add(std::size_t bucket, const LocalSamples& samples, const st
   added_[bucket] = std::move(added);
 }
 
-UnitNormals RefitNormals::find(std::size_t bucket) {
+FilteredNormals RefitNormals::find(std::size_t bucket) {
   const Added& own = *added_.at(bucket);
   const LocalSamples& s = own.bucket.samples;
   ClusteredBatch around;
@@ -305,8 +310,9 @@ UnitNormals RefitNormals::find(std::size_t bucket) {
   const QueryLayers layers{settings_.level, floor_div(own.low, cell), floor_div(own.high, cell) + 1,
                            static_cast<float>(cell), 0};
   const TileRuns bins = bin_clusters(lattice_, layers, around, blocks);
-  UnitNormals out;
+  FilteredNormals out;
   for (auto* v : {&out.x, &out.y, &out.z}) v->resize(s.size());
+  if (!settings_.only_blurred) out.residual.resize(s.size());
   tbb::enumerable_thread_specific<Scratch> scratch;
   tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t t) {
     Scratch& local = scratch.local();

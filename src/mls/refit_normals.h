@@ -55,7 +55,7 @@ class RefitNormals final : public NormalFilter {
   ~RefitNormals() override;
   [[nodiscard]] double halo() const override;
   void add(std::size_t bucket, const LocalSamples& samples, const std::vector<float>& radii) override;
-  UnitNormals find(std::size_t bucket) override;
+  FilteredNormals find(std::size_t bucket) override;
   void forget_below(std::int64_t z) override;
 
  private:

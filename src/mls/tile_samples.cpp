@@ -219,8 +219,14 @@ void cluster_samples(const ActiveBucket& bucket, const Lattice& lattice, Cluster
   pick(bucket.support, order, out.support);
   pick(bucket.weight, order, out.weight);
   pick(bucket.band, order, out.band);
-  out.attributes.resize(s.attributes.size());
+  out.attributes.resize(s.attributes.size() + (bucket.residual.empty() ? 0 : kResidualSums));
   for (std::size_t a = 0; a < s.attributes.size(); ++a) pick(s.attributes[a], order, out.attributes[a]);
+  if (!bucket.residual.empty()) {
+    pick(bucket.residual, order, out.attributes.end()[-2]);
+    out.attributes.back().resize(order.size());
+    std::transform(out.attributes.end()[-2].begin(), out.attributes.end()[-2].end(), out.attributes.back().begin(),
+                   [](float r) { return r * r; });
+  }
   out.clusters.clear();
   for (std::size_t k = 0; k < order.size(); ++k) {
     if (k == 0 || order[k].key != order[k - 1].key) {

@@ -21,10 +21,11 @@ struct SampleCluster {
 
 /// What projection needs of a bucket's samples; those without a support are left out.
 struct ClusteredBucket {
-  std::vector<std::int32_t> x, y, z;           ///< steps
-  std::vector<float> nx, ny, nz;               ///< unit normals
-  std::vector<float> support, weight, band;    ///< as in ActiveBucket
-  std::vector<std::vector<float>> attributes;  ///< one array per attribute
+  std::vector<std::int32_t> x, y, z;         ///< steps
+  std::vector<float> nx, ny, nz;             ///< unit normals
+  std::vector<float> support, weight, band;  ///< as in ActiveBucket
+  /// One array per attribute and, where residuals are known, two more: the residual (steps) and its square.
+  std::vector<std::vector<float>> attributes;
   std::vector<SampleCluster> clusters;
 };
 

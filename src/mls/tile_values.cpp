@@ -41,6 +41,22 @@ float density(const Lanes* sums, int l) {
   return sums[kSeen][l] / (std::numbers::pi_v<float> * std::max(square - height * height, kLeastDisc * square));
 }
 
+/// How much farther out than its fit the surface lies, cells: the mean residual of the samples, where their scatter
+/// does not make it. Adding what a smooth fit leaves, smoothed, takes most of its error away (Tukey 1977: twicing).
+float left_out(const Lanes* sums, const ProjectRule& rule, int l, float offset_from_mean) {
+  const Lanes* const residuals = sums + rule.channels - kResidualSums;
+  const float inv = 1.0F / sums[kW][l];
+  const float mean = residuals[0][l] * inv;
+  const float mean2 = mean * mean;
+  const float chance = kResidualShare * kResidualShare * std::max(residuals[1][l] * inv - mean2, 0.0F);
+  const float both = mean2 * mean2 + chance * chance;
+  if (!(both > 0)) return 0;
+  const float around = std::max(1 - offset_from_mean / kResidualOffset, 0.0F);
+  const float size = std::abs(mean) / (kMostResidual * sums[kWR][l] * inv * rule.cell);
+  const float near = std::max(1 - size * size, 0.0F);
+  return around * near * near * mean * (mean2 * mean2 / both) / rule.cell;
+}
+
 /// Makes a corner's projected point the average of its samples, on the side where the fit has it: a fit that reaches
 /// beyond its samples tells no more.
 void keep_to_samples(const Lanes* sums, const FitInput& in, int l, FitOutput& fit) {
@@ -126,6 +142,7 @@ void fit_tile(const ProjectRule& rule, const TileState& state, const std::vector
       const bool seen = is_seen(sums, l) && has_normal;
       const bool trusted = seen && fit.offset_from_mean[l] <= settings.trusted_offset &&
                            sums[kSeen][l] >= static_cast<float>(settings.trusted_samples);
+      if (trusted && settings.residuals) fit.distance[l] -= left_out(sums, rule, l, fit.offset_from_mean[l]);
       if (seen && !trusted && !settings.centres) keep_to_samples(sums, in, l, fit);
       out.seen[g * kLanes + static_cast<std::size_t>(l)] = seen ? 1 : 0;
       out.trusted[g * kLanes + static_cast<std::size_t>(l)] = trusted ? 1 : 0;
@@ -144,7 +161,7 @@ void store_values(Window& window, int level, const Work& work, const std::vector
   CornerBlock& leaf = *work.tile.leaf;
   const bool corners = work.corners();
   const auto [begin, end] = work.layers;
-  const std::size_t channels = kSums + static_cast<std::size_t>(window.attributes());
+  const std::size_t channels = state.all.channels();
   for (int z = begin; z < end; ++z) {
     points.seen.words[z] = points.trusted.words[z] = 0;
     if (corners) leaf.outside.words[z] = leaf.creased.words[z] = 0;

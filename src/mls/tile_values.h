@@ -16,6 +16,14 @@ inline constexpr float kTorn = 0.5F;
 /// to stand on its own. All of one sample's corners lead to the same point, and triangles between them have no area.
 inline constexpr float kAlone = 1;
 
+/// The mean of what a fit leaves of its samples is its own error, not noise, where it is more than this share of their
+/// scatter: the fit levels what is as narrow as its support. Below the share that counts goes to zero.
+inline constexpr float kResidualShare = 0.5F;
+/// Means of this size (support radii) or more are of strays and other sheets, and count nothing (Tukey's biweight).
+inline constexpr float kMostResidual = 0.25F;
+/// Where samples lie to one side (offset from their mean, support radii) their residuals tell less and less.
+inline constexpr float kResidualOffset = 0.2F;
+
 /// The fits of a tile's queries, and what they are worth.
 struct TileFit {
   std::vector<FitOutput> fits;        ///< by group of eight queries; those of unseen groups are left as they were

@@ -118,6 +118,7 @@ void choose_support(const SurfaceSettings& s, const CloudSurvey& survey, const P
     plan.refit.support = double{kConsensusReach};
     plan.refit.only_blurred = true;
   }
+  plan.projection.residuals = plan.refit.support > 0 && !plan.refit.only_blurred;
   // Free clustering joins sheets: a boundary loop may pass through a vertex several times.
   plan.holes.longest = s.cluster == ClusterMode::free ? 0 : s.close_holes.value_or(kLongestRim);
   plan.holes.mark = s.vertex_filled;

@@ -32,6 +32,7 @@ struct ActiveBucket {
   LocalSamples samples;             ///< in the order of sort_by_block()
   std::vector<float> support;       ///< R_i = H r_i, steps; 0: the sample is left out
   std::vector<float> weight;        ///< q_i
+  std::vector<float> residual;      ///< how far outside of the surface fitted around it, steps; empty: not known
   std::vector<float> band;          ///< how near it has to be for a corner to keep a value, steps
   std::vector<std::uint8_t> level;  ///< coarsest level whose cells are small enough for the sample
   float max_support = 0;            ///< largest R_i, steps

@@ -239,6 +239,7 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
     out.samples.ny = known.normals.y;
     out.samples.nz = known.normals.z;
   }
+  out.residual = known.normals.residual;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 8192), [&](const auto& range) {
     SupportField::Cursor* const local = settings_.support ? &settings_.support->cursor() : nullptr;
     for (std::size_t i = range.begin(); i < range.end(); ++i) {

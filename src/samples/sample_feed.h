@@ -21,8 +21,10 @@
 
 namespace lamina {
 
-struct UnitNormals {
+/// Unit normals and, where surfaces were fitted to find them, how far outside of its own each sample lies, steps.
+struct FilteredNormals {
   std::vector<float> x, y, z;
+  std::vector<float> residual;  ///< empty: not known
 };
 
 /// Normals better than the input's, found from the samples around as these pass.
@@ -38,7 +40,7 @@ class NormalFilter {
   /// A bucket's samples and the radii they have (steps; 0: left out).
   virtual void add(std::size_t bucket, const LocalSamples& samples, const std::vector<float>& radii) = 0;
   /// Of a bucket that was added, in its order; all samples within halo() have been added.
-  virtual UnitNormals find(std::size_t bucket) = 0;
+  virtual FilteredNormals find(std::size_t bucket) = 0;
   /// Samples below z act on nothing more.
   virtual void forget_below(std::int64_t z) = 0;
 };
@@ -133,7 +135,7 @@ class SampleFeed {
   struct Known {
     std::vector<float> radius;  ///< r_i, steps
     float max_support = 0;
-    UnitNormals normals;      ///< where they are filtered
+    FilteredNormals normals;  ///< where they are filtered
     std::vector<bool> finer;  ///< which samples take a level less; empty: none
   };
   void annotate(std::size_t bucket, ActiveBucket& out) const;

@@ -56,7 +56,7 @@ RefitScene sphere(std::size_t count) {
   return scene;
 }
 
-UnitNormals refitted(const RefitScene& scene, float support) {
+FilteredNormals refitted(const RefitScene& scene, float support) {
   const auto radius = static_cast<float>(scene.radius);
   RefitNormals refit({support, radius, 0, scene.noise}, {static_cast<std::int32_t>(radius), 4}, select_kernel());
   refit.add(0, scene.samples, std::vector<float>(scene.samples.size(), radius));
@@ -84,7 +84,7 @@ TEST(RefitNormals, OfASphereComeNearTheTruth) {
   EXPECT_GT(before, 0.3);
   double last = before;
   for (const float support : {2.0F, 4.0F}) {
-    const UnitNormals n = refitted(scene, support);
+    const FilteredNormals n = refitted(scene, support);
     const double after = error_of(scene.truth, n.x, n.y, n.z);
     EXPECT_LT(after, 0.6 * last) << support;  // four times the samples: half the error
     last = after;
@@ -96,9 +96,34 @@ TEST(RefitNormals, OfAnExactSphereStayExact) {
   RefitScene scene = sphere(6000);
   scene.perturb(0);
   for (const float support : {2.0F, 4.0F}) {
-    const UnitNormals n = refitted(scene, support);
+    const FilteredNormals n = refitted(scene, support);
     EXPECT_LT(error_of(scene.truth, n.x, n.y, n.z), 2e-3) << support;
   }
+}
+
+/// One sample in forty lies outside of the sphere that the others are on.
+TEST(RefitNormals, TellHowFarOutsideOfTheirFitSamplesLie) {
+  std::mt19937 random(3);
+  std::normal_distribution<> normal;
+  RefitScene scene;
+  constexpr std::size_t kCount = 6000, kEvery = 40;
+  scene.radius = 2 * kUnit * std::sqrt(4 * std::numbers::pi / kCount);
+  const double raised = 0.3 * scene.radius / kUnit;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    Vector v{normal(random), normal(random), normal(random)};
+    const double l = std::hypot(v[0], v[1], v[2]);
+    for (double& c : v) c /= l;
+    const double at = i % kEvery == 0 ? 1 + raised : 1;
+    scene.add({at * v[0], at * v[1], at * v[2]}, v);
+  }
+  scene.perturb(0.1);
+  const FilteredNormals n = refitted(scene, 3);
+  ASSERT_EQ(n.residual.size(), kCount);
+  double out = 0, on = 0;
+  for (std::size_t i = 0; i < kCount; ++i) (i % kEvery == 0 ? out : on) += static_cast<double>(n.residual[i]);
+  const double wanted = 0.3 * scene.radius;
+  EXPECT_NEAR(out / (static_cast<double>(kCount) / kEvery), wanted, 0.2 * wanted);
+  EXPECT_NEAR(on / (static_cast<double>(kCount) * (kEvery - 1) / kEvery), 0, 0.1 * wanted);
 }
 
 /// Half a radius apart and facing away from each other: each side is fitted to its own.
@@ -115,7 +140,7 @@ TEST(RefitNormals, OfTwoSidesOfASheet) {
   }
   scene.perturb(0.5);
   const double before = error_of(scene.truth, scene.samples.nx, scene.samples.ny, scene.samples.nz);
-  const UnitNormals n = refitted(scene, 3);
+  const FilteredNormals n = refitted(scene, 3);
   EXPECT_LT(error_of(scene.truth, n.x, n.y, n.z), 0.4 * before);
 }
 
@@ -137,7 +162,7 @@ TEST(RefitNormals, OfRipplesKeepTheirShape) {
   }
   scene.perturb(0.12);
   const double before = error_of(scene.truth, scene.samples.nx, scene.samples.ny, scene.samples.nz);
-  const UnitNormals n = refitted(scene, 3);
+  const FilteredNormals n = refitted(scene, 3);
   EXPECT_LT(error_of(scene.truth, n.x, n.y, n.z), 0.8 * before);
 }
 
@@ -157,7 +182,7 @@ TEST(RefitNormals, StayBesideAnEdge) {
     }
   }
   scene.perturb(0);
-  const UnitNormals n = refitted(scene, 3);
+  const FilteredNormals n = refitted(scene, 3);
   EXPECT_LT(error_of(scene.truth, n.x, n.y, n.z), 0.03);
 }
 
@@ -166,7 +191,7 @@ TEST(RefitNormals, StayWhereTooFewSamplesAreNear) {
   scene.radius = 0.01 * kUnit;
   for (int i = 0; i < 40; ++i) scene.add({0.1 * i, 0, 0.05 * (i % 3)}, {0, 1, 0});
   scene.perturb(0.3);
-  const UnitNormals n = refitted(scene, 4);
+  const FilteredNormals n = refitted(scene, 4);
   EXPECT_EQ(n.x, scene.samples.nx);
   EXPECT_EQ(n.y, scene.samples.ny);
   EXPECT_EQ(n.z, scene.samples.nz);
@@ -176,7 +201,7 @@ TEST(RefitNormals, StayWhereTooFewSamplesAreNear) {
 TEST(RefitNormals, DoNotDependOnBuckets) {
   RefitScene scene = sphere(6000);
   scene.perturb(0.5);
-  const UnitNormals whole = refitted(scene, 3);
+  const FilteredNormals whole = refitted(scene, 3);
   const auto radius = static_cast<float>(scene.radius);
   RefitNormals refit({3, radius, 0, scene.noise}, {static_cast<std::int32_t>(radius), 4}, select_kernel());
   constexpr int kBuckets = 20;
@@ -198,7 +223,7 @@ TEST(RefitNormals, DoNotDependOnBuckets) {
       refit.add(added, buckets[added], std::vector<float>(buckets[added].size(), radius));
       ++added;
     }
-    const UnitNormals n = refit.find(b);
+    const FilteredNormals n = refit.find(b);
     refit.forget_below(static_cast<std::int64_t>(bottom(static_cast<int>(b)) - refit.halo()) - 1);
     for (std::size_t i = 0; i < numbers[b].size(); ++i) {
       const std::size_t at = numbers[b][i];

@@ -41,16 +41,17 @@ inline Bounds bounds_of(const LocalSamples& s) {
   return {*x.first, *x.second, *y.first, *y.second};
 }
 
-/// A cloud with given radii on its way to projection.
+/// A cloud with given radii on its way to projection, with the normals of a filter where there is one.
 class StreamedCloud {
  public:
   StreamedCloud(const LocalSamples& cloud, const Lattice& lattice, const FeedSettings& settings,
-                std::int32_t bucket_height)
+                std::int32_t bucket_height, NormalFilter* filter = nullptr)
       : store_(make_store(cloud, bucket_height)),
         feed(store_, lattice, settings, {}, true),
         window(lattice, static_cast<int>(cloud.attributes.size()), bounds_of(cloud)),
         first(lattice.slab_of(*std::min_element(cloud.z.begin(), cloud.z.end())) - 2),
         end(lattice.slab_of(*std::max_element(cloud.z.begin(), cloud.z.end())) + 4) {
+    if (filter != nullptr) feed.filter_normals(*filter);
     feed.prepare(std::numeric_limits<std::int32_t>::max(), [&](const ActiveBucket& b) {
       std::vector<Mark> marks;
       for (std::size_t i = 0; i < b.samples.size(); ++i) {
