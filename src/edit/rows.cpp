@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cstring>
 #include <memory>
-#include <numeric>
 #include <queue>
 #include <utility>
 
@@ -88,12 +87,10 @@ struct RecordSorter::Run {
 
 RecordSorter::RecordSorter(std::size_t record_bytes, std::size_t memory_bytes, std::string directory)
     : record_bytes_(record_bytes),
-      // A record waits with its key and its place in the order.
-      capacity_(
-          std::clamp(memory_bytes / (record_bytes + kKeyBytes + sizeof(std::uint32_t)), kLeastRecords, kMostRecords)),
+      capacity_(std::clamp(memory_bytes / (record_bytes + sizeof(Held)), kLeastRecords, kMostRecords)),
       records_(std::make_unique_for_overwrite<std::byte[]>(capacity_ * record_bytes)),
       file_(std::move(directory)) {
-  keys_.reserve(capacity_);  // growing would take twice the memory for a while
+  held_.reserve(capacity_);  // growing would take twice the memory for a while
 }
 
 RecordSorter::~RecordSorter() = default;
@@ -101,22 +98,20 @@ RecordSorter::~RecordSorter() = default;
 void RecordSorter::add(std::span<const std::uint64_t> keys, const std::byte* records) {
   size_ += keys.size();
   while (!keys.empty()) {
-    const std::size_t n = std::min(keys.size(), capacity_ - held_);
-    keys_.insert(keys_.end(), keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(n));
-    std::memcpy(records_.get() + held_ * record_bytes_, records, n * record_bytes_);
-    held_ += n;
+    const std::size_t n = std::min(keys.size(), capacity_ - held_.size());
+    std::memcpy(records_.get() + held_.size() * record_bytes_, records, n * record_bytes_);
+    for (const std::uint64_t key : keys.first(n)) held_.push_back({key, static_cast<std::uint32_t>(held_.size())});
     records += n * record_bytes_;
     keys = keys.subspan(n);
-    if (held_ == capacity_) spill();
+    if (held_.size() == capacity_) spill();
   }
 }
 
 void RecordSorter::sort_held() {
-  order_.resize(held_);
-  std::iota(order_.begin(), order_.end(), 0u);
   // By key, then by place: the order is total, so the sort need not be stable.
-  tbb::parallel_sort(order_.begin(), order_.end(),
-                     [&](std::uint32_t a, std::uint32_t b) { return std::pair(keys_[a], a) < std::pair(keys_[b], b); });
+  tbb::parallel_sort(held_.begin(), held_.end(), [](const Held& a, const Held& b) {
+    return a.key < b.key || (a.key == b.key && a.record < b.record);
+  });
 }
 
 void RecordSorter::spill() {
@@ -124,15 +119,14 @@ void RecordSorter::spill() {
   Run run;
   run.next = file_.size();
   std::vector<std::byte> record(kKeyBytes + record_bytes_);
-  for (const std::uint32_t i : order_) {
-    std::memcpy(record.data(), &keys_[i], kKeyBytes);
-    std::memcpy(record.data() + kKeyBytes, records_.get() + std::size_t{i} * record_bytes_, record_bytes_);
+  for (const Held& held : held_) {
+    std::memcpy(record.data(), &held.key, kKeyBytes);
+    std::memcpy(record.data() + kKeyBytes, record_of(held), record_bytes_);
     file_.append(record, writer_);
   }
   run.end = file_.size();
   runs_.push_back(std::move(run));
-  held_ = 0;
-  keys_.clear();
+  held_.clear();
 }
 
 void RecordSorter::drain(std::size_t batch, const Take& take) {
@@ -149,9 +143,9 @@ void RecordSorter::drain(std::size_t batch, const Take& take) {
   if (runs_.empty()) {
     // All of it fitted: nothing went to the file.
     sort_held();
-    for (const std::uint32_t i : order_) give(keys_[i], records_.get() + std::size_t{i} * record_bytes_);
+    for (const Held& held : held_) give(held.key, record_of(held));
   } else {
-    if (held_ > 0) spill();
+    if (!held_.empty()) spill();
     file_.flush(writer_);
     file_.check(writer_.drain());
     const std::size_t whole = kKeyBytes + record_bytes_;

@@ -41,14 +41,21 @@ class RecordSorter {
 
  private:
   struct Run;
+  /// A record in memory: its key beside its place, so that sorting does not go to and fro.
+  struct Held {
+    std::uint64_t key;
+    std::uint32_t record;
+  };
+  [[nodiscard]] const std::byte* record_of(const Held& held) const {
+    return records_.get() + std::size_t{held.record} * record_bytes_;
+  }
   void sort_held();
   void spill();
 
-  std::size_t record_bytes_, capacity_, held_ = 0;
+  std::size_t record_bytes_, capacity_;
   std::uint64_t size_ = 0;
   std::unique_ptr<std::byte[]> records_;
-  std::vector<std::uint64_t> keys_;
-  std::vector<std::uint32_t> order_;  ///< of the held records, once sorted
+  std::vector<Held> held_;
   SpillFile file_;
   BackgroundWriter writer_{SpillFile::kBufferBytes, 4};  // ends before the file does
   std::vector<Run> runs_;

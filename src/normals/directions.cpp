@@ -7,78 +7,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <vector>
 
-#include "meshes/vec3.h"
+#include "base/four.h"
+#include "samples/nearest_search.h"
 
 namespace lamina::normals {
-namespace {
-
-using meshes::cross;
-using meshes::dot;
-using meshes::Vec3;
-
-/// The least root of l^3 - t l^2 + s l - d, all of whose roots are real and not negative: Newton's steps from 0 never
-/// pass it.
-double least_root(double t, double s, double d) {
-  double l = 0;
-  for (int i = 0; i < 64; ++i) {
-    const double value = ((l - t) * l + s) * l - d;
-    const double slope = (3 * l - 2 * t) * l + s;
-    if (!(value < 0) || !(slope > 0)) break;
-    const double next = l - value / slope;
-    if (!(next > l)) break;
-    l = next;
-  }
-  return l;
-}
-
-}  // namespace
-
-Plane fit_plane(const Moments& m) {
-  Plane plane;
-  if (m.count < 3) return plane;
-  const double n = 1 / m.count;
-  const Vec3 mean{m.sum[0] * n, m.sum[1] * n, m.sum[2] * n};
-  double xx = m.products[0] * n - mean[0] * mean[0];
-  double xy = m.products[1] * n - mean[0] * mean[1];
-  double xz = m.products[2] * n - mean[0] * mean[2];
-  double yy = m.products[3] * n - mean[1] * mean[1];
-  double yz = m.products[4] * n - mean[1] * mean[2];
-  double zz = m.products[5] * n - mean[2] * mean[2];
-  const double trace = xx + yy + zz;
-  if (!(trace > 0)) return plane;
-  // Of trace one: what follows is a matter of ratios.
-  const double scale = 1 / trace;
-  for (double* v : {&xx, &xy, &xz, &yy, &yz, &zz}) *v *= scale;
-  const double s = xx * yy - xy * xy + xx * zz - xz * xz + yy * zz - yz * yz;
-  const double d = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
-  const double least = std::clamp(least_root(1, s, d), 0.0, 1.0 / 3);
-  const double sum = 1 - least;  // of the other two
-  const double product = std::max(0.0, s - least * sum);
-  const double half = 0.5 * sum;
-  const double most = half + std::sqrt(std::max(0.0, half * half - product));
-  plane.least = least * trace;
-  plane.middle = product / most * trace;
-  plane.most = most * trace;
-
-  const Vec3 r0{xx - least, xy, xz};
-  const Vec3 r1{xy, yy - least, yz};
-  const Vec3 r2{xz, yz, zz - least};
-  const std::array<Vec3, 3> candidates{cross(r0, r1), cross(r0, r2), cross(r1, r2)};
-  const Vec3* best = candidates.data();
-  for (const Vec3& c : candidates) {
-    if (dot(c, c) > dot(*best, *best)) best = &c;
-  }
-  const double squared = dot(*best, *best);
-  // The rows span a line where the two smaller variances are equal: no plane is the best.
-  constexpr double kNone = 1e-18;
-  if (!(squared > kNone)) return plane;
-  const double inverse = 1 / std::sqrt(squared);
-  for (std::size_t a = 0; a < 3; ++a) plane.normal[a] = static_cast<float>((*best)[a] * inverse);
-  return plane;
-}
-
 namespace {
 
 constexpr double kLine = 1.0 / 32;  ///< a smaller share of the middle variance in the largest is a line's
@@ -142,6 +77,9 @@ int look_across(const SampleTree& tree, std::uint32_t place, std::size_t count, 
 /// Of samples outside the slab, and of those whose normals are given.
 constexpr std::uint8_t kNoLevel = 255;
 
+/// Samples that follow one another, neighbours nearly always: what level the first of them needs serves all.
+constexpr std::size_t kSharing = 2;
+
 class DirectionFinder {
  public:
   DirectionFinder(const SampleTree& tree, const DirectionSettings& settings, WindowSamples& samples, Links& links)
@@ -157,7 +95,14 @@ class DirectionFinder {
   }
 
   void run() {
-    for_core([&](std::size_t i) { search(i); });
+    const std::size_t n = links_.core.size();
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, (n + kSharing - 1) / kSharing, 256), [&](const auto& range) {
+      NearestSearch nearest(tree_);
+      for (std::size_t group = range.begin(); group < range.end(); ++group) {
+        std::uint8_t level = kNoLevel;
+        for (std::size_t i = kSharing * group; i < std::min(kSharing * (group + 1), n); ++i) search(i, nearest, level);
+      }
+    });
     // Noise is no matter of single samples: levels that neighbours do not share are chance.
     const std::vector<std::uint8_t> chosen = level_;
     for_core([&](std::size_t i) { settle(i, chosen); });
@@ -171,12 +116,13 @@ class DirectionFinder {
     });
   }
 
-  void search(std::size_t i) {
+  /// `level` is that of the samples before which share it, if one of them has asked for any.
+  void search(std::size_t i, NearestSearch& nearest, std::uint8_t& level) {
     const auto k = static_cast<std::size_t>(settings_.k);
     const std::uint32_t place = links_.core[i];
     std::array<Neighbour, SampleTree::kMostNeighbours> found;
     std::size_t wanted = std::max(k, kLeastLinked);
-    std::size_t count = tree_.nearest(place, wanted, bound_, found.data());
+    std::size_t count = nearest.nearest(place, wanted, bound_, found.data());
     std::size_t taken = std::min(count, k);
     Plane plane = plane_of(tree_, place, found.data(), taken);
     const std::size_t most = std::min(4 * wanted, SampleTree::kMostNeighbours);
@@ -203,18 +149,17 @@ class DirectionFinder {
       plane = plane_of_ball(place, plane);
     } else if (taken > 0) {
       reach_[i] = plane.valid() ? squared : 0.0F;
-      level_[place] = choose_level(tree_, {place, plane, static_cast<double>(taken + 1), reach_[i], bound_});
+      const FirstFit first{place, plane, static_cast<double>(taken + 1), reach_[i], bound_};
+      const bool uncertain = is_uncertain(first);
+      if (uncertain && level == kNoLevel) level = choose_level(tree_, first);
+      level_[place] = uncertain ? level : 0;
     }
     set_normal(place, plane);
   }
 
   /// Too few within the radius: the nearest ones will do.
   [[nodiscard]] Plane plane_of_ball(std::uint32_t place, const Plane& nearest) const {
-    Moments m;
-    m.count = 1;
-    tree_.within(place, settings_.radius * settings_.radius,
-                 [&](const Neighbour&, const std::array<float, 3>& offset) { m.add(offset); });
-    const Plane wide = fit_plane(m);
+    const Plane wide = fit_plane(BallMoments(tree_, place).grow_to(settings_.radius * settings_.radius));
     return is_line(wide) ? nearest : wide;
   }
 
@@ -296,17 +241,20 @@ bool is_slim(const Plane& plane, double samples) {
 
 }  // namespace
 
+bool is_uncertain(const FirstFit& first) {
+  return first.plane.valid() && tilt_variance(first.plane, first.samples) > kUncertain * kUncertain;
+}
+
 std::uint8_t choose_level(const SampleTree& tree, const FirstFit& first) {
+  if (!is_uncertain(first)) return 0;
   std::array<Estimate, kMostLevel + 1> estimates;
   estimates[0] = {first.plane, tilt_variance(first.plane, first.samples)};
-  if (!first.plane.valid() || estimates[0].tilt <= kUncertain * kUncertain) return 0;
+  BallMoments around(tree, first.place);
   std::uint8_t level = 0;
   while (level < kMostLevel && estimates[level].tilt > kCertain * kCertain) {
     const float squared = reach_of_level(first.squared, static_cast<std::uint8_t>(level + 1));
     if (squared > first.bound) break;
-    Moments m;
-    m.count = 1;
-    tree.within(first.place, squared, [&](const Neighbour&, const std::array<float, 3>& offset) { m.add(offset); });
+    const Moments m = around.grow_to(squared);
     const Estimate next{fit_plane(m), 0};
     const Plane& last = estimates[level].plane;
     if (!next.plane.valid() || is_slim(next.plane, m.count)) break;
@@ -330,15 +278,6 @@ float reach_of_level(float first_squared, std::uint8_t level) {
   return std::ldexp(first_squared, level);
 }
 
-Plane plane_within(const SampleTree& tree, std::uint32_t place, float squared) {
-  Moments m;
-  m.count = 1;
-  tree.within(place, squared, [&](const Neighbour& n, const std::array<float, 3>& offset) {
-    m.add(offset, 1 - double{n.squared} / double{squared});
-  });
-  return fit_plane(m);
-}
-
 float height_of_sheet(const SampleTree& tree, std::uint32_t place, const std::array<float, 3>& normal,
                       const SheetReach& reach) {
   constexpr float kColumn = 0.4F;  // of the plane's reach: that is wide for its direction, and curved
@@ -349,21 +288,28 @@ float height_of_sheet(const SampleTree& tree, std::uint32_t place, const std::ar
   const float band = kBand * std::sqrt(reach.nearest);
   const float across = kColumn * kColumn * reach.plane;
   const float tall = kTall * band;
-  std::vector<float> heights{0.0F};
-  tree.within(place, across + tall * tall, [&](const Neighbour& m, const std::array<float, 3>& d) {
-    const float h = normal[0] * d[0] + normal[1] * d[1] + normal[2] * d[2];
-    if (std::abs(h) < tall && m.squared - h * h < across) heights.push_back(h);
+  std::vector<FourFloats> heights;
+  tree.fours_within({place, -1, across + tall * tall}, [&](const SampleTree::FourSamples& four) {
+    const auto& d = four.offset;
+    const FourFloats h = normal[0] * d[0] + normal[1] * d[1] + normal[2] * d[2];
+    const FourInts inside = (h < tall) & (h > -tall) & (four.squared - h * h < across);
+    constexpr float kNowhere = std::numeric_limits<float>::max();  // far out of the band, wherever that is
+    if (bits_of(inside) != 0) heights.push_back(inside ? h : FourFloats{} + kNowhere);
   });
   float at = 0;
+  const float per_band = 1 / band;
   for (int step = 0; step < kMostSteps; ++step) {
-    float sum = 0;
-    float weight = 0;
-    for (const float h : heights) {
-      const float u = (h - at) / band;
-      const float w = std::max(0.0F, 1 - u * u);
-      sum += w * w * h;
-      weight += w * w;
+    FourFloats sums{};
+    FourFloats weights{};
+    for (const FourFloats& h : heights) {
+      const FourFloats u = (h - at) * per_band;
+      const FourFloats w = 1 - u * u;
+      const FourFloats w2 = where(w > 0, w * w);
+      sums += w2 * h;
+      weights += w2;
     }
+    const float sum = sum_of(sums);
+    const float weight = sum_of(weights);
     const float next = sum / weight;
     const bool still = std::abs(next - at) < kStill * band;
     at = next;

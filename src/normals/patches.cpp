@@ -1,6 +1,7 @@
 #include "normals/sample_window.h"
 
 #include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_sort.h>
 
@@ -59,6 +60,7 @@ class PatchGrower {
 
   void run() {
     sort_into_cells();
+    judge_links();
     for_cells([&](Cell& cell) { grow(cell); });
     auto node = static_cast<std::uint32_t>(graph_.nodes.size());
     for (Cell& cell : cells_) {
@@ -113,9 +115,31 @@ class PatchGrower {
     std::uint32_t from, to;  ///< slots
     bool opposite;
   };
-
-  [[nodiscard]] float agreement_of(std::size_t i, std::uint32_t place, std::uint32_t other, const Vector3f& n) const {
-    return agreement(offset(place, other), n, normal_of(samples_, other), links_.scale[i]);
+  /// What a sample's links say of normals as they were found; a bit for each link besides.
+  struct Judgement {
+    std::array<float, Links::kMost> agreement{};
+    std::uint8_t along = 0, same = 0;
+  };
+  void judge_links() {
+    judged_.resize(links_.core.size());
+    turned_.assign(samples_.size(), 0);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, judged_.size(), 1024), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) judged_[i] = judge(i);
+    });
+  }
+  [[nodiscard]] Judgement judge(std::size_t i) const {
+    Judgement out;
+    const std::uint32_t place = links_.core[i];
+    const Vector3f n = normal_of(samples_, place);
+    for (std::size_t l = 0; l < Links::kMost; ++l) {
+      const std::uint32_t other = links_.neighbours[i][l];
+      const Vector3f m = normal_of(samples_, other);
+      const Vector3f d = offset(place, other);
+      out.agreement[l] = agreement(d, n, m, links_.scale[i]);
+      if (lie_along(d, n, m)) out.along = static_cast<std::uint8_t>(out.along | 1U << l);
+      if (dot(n, m) > 0) out.same = static_cast<std::uint8_t>(out.same | 1U << l);
+    }
+    return out;
   }
 
   /// Between the sheets that the two belong to.
@@ -129,18 +153,18 @@ class PatchGrower {
 
   /// Joins samples of the cell along their links, the strongest first.
   void grow(Cell& cell) {
-    std::array<std::vector<Link>, kStrengths> by_strength;
+    std::array<std::vector<Link>, kStrengths>& by_strength = by_strength_.local();
+    for (std::vector<Link>& links : by_strength) links.clear();
     for (std::size_t s = cell.begin; s < cell.end; ++s) {
       const std::uint32_t i = order_[s];
       const std::uint32_t place = links_.core[i];
       if (is_fixed(place) || !samples_.has_normal(place)) continue;
-      const Vector3f n = normal_of(samples_, place);
-      for (const std::uint32_t other : links_.neighbours[i]) {
-        if (other == place || cell_of_[other] != cell_of_[place] || is_fixed(other) || !samples_.has_normal(other))
-          continue;
-        const float w = agreement_of(i, place, other, n);
+      for (std::size_t l = 0; l < Links::kMost; ++l) {
+        const float w = judged_[i].agreement[l];
         const float strength = std::min(std::abs(w), 1.0F);
         if (strength < kWeakest) continue;
+        const std::uint32_t other = links_.neighbours[i][l];
+        if (other == place || cell_of_[other] != cell_of_[place] || is_fixed(other)) continue;
         const auto bin = std::min(kStrengths - 1, static_cast<int>((1 - strength) / (1 - kWeakest) * kStrengths));
         by_strength[static_cast<std::size_t>(bin)].push_back({static_cast<std::uint32_t>(s), slot_[other], w < 0});
       }
@@ -172,6 +196,7 @@ class PatchGrower {
       samples_.node[place] = root == s ? next++ : samples_.node[links_.core[order_[root]]];
       if (forest_->sign(static_cast<std::uint32_t>(s)) < 0) {
         for (auto* n : {&samples_.nx[place], &samples_.ny[place], &samples_.nz[place], &samples_.lift[place]}) *n = -*n;
+        turned_[place] = 1;
       }
     }
     sum_up(cell);
@@ -231,17 +256,17 @@ class PatchGrower {
       const std::uint32_t place = links_.core[i];
       const std::uint32_t node = samples_.node[place];
       if (node == kNoNode) continue;
-      const Vector3f n = normal_of(samples_, place);
-      for (const std::uint32_t other : links_.neighbours[i]) {
+      for (std::size_t l = 0; l < Links::kMost; ++l) {
+        const std::uint32_t other = links_.neighbours[i][l];
         if (other == place || samples_.node[other] == kNoNode) continue;
-        const Vector3f m = normal_of(samples_, other);
-        const bool along = lie_along(offset(place, other), n, m);
-        const bool same = dot(n, m) > 0;
+        const bool turned = turned_[place] != turned_[other];
+        const bool along = (judged_[i].along >> l & 1) != 0;
+        const bool same = (judged_[i].same >> l & 1) != (turned ? 1 : 0);
         if (samples_.node[other] == node) {
           if (along) ++(same ? cell.same : cell.opposite);
           continue;
         }
-        const float w = agreement_of(i, place, other, n);
+        const float w = turned ? -judged_[i].agreement[l] : judged_[i].agreement[l];
         cell.edges.push_back({std::min(node, samples_.node[other]), std::max(node, samples_.node[other]),
                               w * std::min(std::abs(w), 1.0F), along && same ? 1U : 0U, along && !same ? 1U : 0U});
       }
@@ -288,7 +313,10 @@ class PatchGrower {
   std::vector<std::uint32_t> order_;       ///< numbers of core samples, by cell
   std::vector<std::uint32_t> cell_of_;     ///< by place; kNoNode outside the slab
   std::vector<std::uint32_t> slot_;        ///< by place: where in order_
+  std::vector<Judgement> judged_;          ///< by number of the core sample
+  std::vector<std::uint8_t> turned_;       ///< by place: 1 where the patch has another sign than the normal found
   std::optional<SignedUnionFind> forest_;  ///< of slots
+  tbb::enumerable_thread_specific<std::array<std::vector<Link>, kStrengths>> by_strength_;
   std::vector<Cell> cells_;
 };
 

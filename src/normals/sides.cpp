@@ -93,8 +93,12 @@ bool is_inside_out(const Body& body) {
   return body.volume < 0;
 }
 
-Sides::Sides(const PatchGraph& graph, const InputAxes& axes, const std::vector<std::uint8_t>& open)
-    : graph_(graph), around_(graph), sights_(look_around(graph, around_, open)), up_(to_double(axes[2])) {
+Sides::Sides(const PatchGraph& graph, const InputAxes& axes, std::vector<float> looks)
+    : graph_(graph),
+      around_(graph),
+      looks_(std::move(looks)),
+      sights_(look_around(graph, around_, looks_)),
+      up_(to_double(axes[2])) {
   if (!(graph.cell > 0)) return;
   flat_ = flat_across(graph, axes);
   is_level_ = flat_ && dot(*flat_, up_) > kLevel;
@@ -114,12 +118,13 @@ std::vector<Body> Sides::bodies(const std::vector<std::uint32_t>& root, const st
     }
     const double area = area_of(node, graph_.cell);
     body.counted += area;
-    body.seen += area * sign[i] * preference(sights_[i]);
-    body.skyward += area * sign[i] * skyward(node, sights_[i], up_);
+    const double looked = double{looks_[i]} * area;
+    body.seen += looked * sign[i] * preference(sights_[i]);
+    body.skyward += looked * sign[i] * skyward(node, sights_[i], up_);
     const bool in = is_shut_in(sights_[i].front, sights_[i].back);
     const bool out = is_shut_in(sights_[i].back, sights_[i].front);
-    ((sign[i] > 0) ? body.shut_in : body.shut_out) += in ? area : 0;
-    ((sign[i] > 0) ? body.shut_out : body.shut_in) += out ? area : 0;
+    ((sign[i] > 0) ? body.shut_in : body.shut_out) += in ? looked : 0;
+    ((sign[i] > 0) ? body.shut_out : body.shut_in) += out ? looked : 0;
   }
   for (std::size_t i = 1; i < n; ++i) {
     const PatchNode& node = graph_.nodes[i];
@@ -154,7 +159,7 @@ std::optional<std::uint32_t> Sides::find_room(const std::vector<Body>& bodies, c
     const double here = area_of(graph_.nodes[i], graph_.cell);
     if (own) area += here;
     if (own || root[i] == kFixed || (bodies[root[i]].encloses() && bodies[root[i]].openness() < kSealed)) continue;
-    if (sights_[i].front.is_closed() && sights_[i].back.is_closed()) hidden += here;
+    if (sights_[i].front.is_closed() && sights_[i].back.is_closed()) hidden += double{looks_[i]} * here;
   }
   constexpr double kMuch = 0.0125;
   if (hidden < kMuch * area) return {};
@@ -333,7 +338,7 @@ PatchSigns find_signs(const PatchGraph& graph, const InputAxes& axes) {
   read_forest(forest, root, signs);
   std::vector<std::uint8_t> open(n, 0);
   for (std::uint32_t i = 1; i < n; ++i) open[i] = root[i] != kFixed ? 1 : 0;
-  const Sides sides(graph, axes, open);
+  const Sides sides(graph, axes, choose_looks(root));
   std::vector<Body> bodies = sides.bodies(root, signs.sign);
   if (const auto room = sides.find_room(bodies, root, signs.sign)) {
     evidence = evidence_of(graph, sides.votes_from_within(bodies[*room], *room, root, signs.sign));

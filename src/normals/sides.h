@@ -155,10 +155,13 @@ struct Sight {
   View front, back;
 };
 
-/// Looks around from the patches that `wanted` says (by node). What lies nearer than about two cubes hides nothing: it
-/// may be the patch's own surface. All is open where nothing is known of what patches hide.
-std::vector<Sight> look_around(const PatchGraph& graph, const Occupancy& around,
-                               const std::vector<std::uint8_t>& wanted);
+/// By node: for how many patches of its body a patch is looked from; 0: it is not, another one stands for it. A body of
+/// tens of thousands is known by a few thousand. Patches that have the fixed node for a root need no look.
+std::vector<float> choose_looks(const std::vector<std::uint32_t>& root);
+
+/// Looks around from the patches that are chosen. What lies nearer than about two cubes hides nothing: it may be the
+/// patch's own surface. All is open where nothing is known of what patches hide.
+std::vector<Sight> look_around(const PatchGraph& graph, const Occupancy& around, const std::vector<float>& looks);
 
 // How much of a closed surface could have been scanned from a few places inside: nearly all of a room, but less of a
 // thing with limbs, holes or folds.
@@ -211,7 +214,7 @@ struct Side {
 
 class Sides {
  public:
-  Sides(const PatchGraph& graph, const InputAxes& axes, const std::vector<std::uint8_t>& open);
+  Sides(const PatchGraph& graph, const InputAxes& axes, std::vector<float> looks);
 
   /// By root.
   [[nodiscard]] std::vector<Body> bodies(const std::vector<std::uint32_t>& root,
@@ -238,6 +241,7 @@ class Sides {
 
   const PatchGraph& graph_;
   Occupancy around_;
+  std::vector<float> looks_;
   std::vector<Sight> sights_;
   std::array<double, 3> up_{};                 ///< of the input
   std::optional<std::array<double, 3>> flat_;  ///< across a cloud that is wide and flat

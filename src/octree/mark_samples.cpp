@@ -7,6 +7,7 @@
 #include <cstring>
 #include <vector>
 
+#include "base/four.h"
 #include "lattice/lattice.h"
 
 namespace lamina {
@@ -18,11 +19,9 @@ void set_bits(BlockMask& mask, int layer, std::uint64_t bits) {
   if ((word.load(std::memory_order_relaxed) & bits) != bits) word.fetch_or(bits, std::memory_order_relaxed);
 }
 
-typedef float Four __attribute__((vector_size(16)));             // NOLINT(modernize-use-using): attributes on typedefs
-typedef std::int32_t FourInts __attribute__((vector_size(16)));  // NOLINT(modernize-use-using)
-typedef std::int16_t FourRows __attribute__((vector_size(8)));   // NOLINT(modernize-use-using)
+typedef std::int16_t FourRows __attribute__((vector_size(8)));  // NOLINT(modernize-use-using)
 
-/// Four rows of 16 bits, from the lowest bits up.
+/// FourFloats rows of 16 bits, from the lowest bits up.
 using RowWord = std::uint64_t;
 
 /// A sample as its cell sees it: all in cells, from the cell's low corner.
@@ -34,24 +33,24 @@ struct InCell {
 /// Of the 4^3 corners around a cell, from one below its low corner on, those that a sample in the cell acts on: rows of
 /// x, a word per layer.
 std::array<RowWord, 4> corners_near(const InCell& sample) {
-  const auto from_sample = [&](std::size_t axis) { return Four{-1, 0, 1, 2} - sample.point[axis]; };
-  const Four dx = from_sample(0);
-  const Four dy = from_sample(1);
-  const Four dz = from_sample(2);
-  const Four x2 = dx * dx;
-  const Four y2 = dy * dy;
-  const Four up_x = dx * sample.normal[0];
-  const Four up_y = dy * sample.normal[1];
-  const Four up_z = dz * sample.normal[2];
+  const auto from_sample = [&](std::size_t axis) { return FourFloats{-1, 0, 1, 2} - sample.point[axis]; };
+  const FourFloats dx = from_sample(0);
+  const FourFloats dy = from_sample(1);
+  const FourFloats dz = from_sample(2);
+  const FourFloats x2 = dx * dx;
+  const FourFloats y2 = dy * dy;
+  const FourFloats up_x = dx * sample.normal[0];
+  const FourFloats up_y = dy * sample.normal[1];
+  const FourFloats up_z = dz * sample.normal[2];
   std::array<RowWord, 4> out;
   for (int z = 0; z < 4; ++z) {
-    const Four left = (sample.radius * sample.radius - dz[z] * dz[z]) - y2;  // a lane a row
-    const Four up = up_y + up_z[z];
+    const FourFloats left = (sample.radius * sample.radius - dz[z] * dz[z]) - y2;  // a lane a row
+    const FourFloats up = up_y + up_z[z];
     FourInts rows{};
     for (int x = 0; x < 4; ++x) {
-      const Four height = up + up_x[x];
-      const FourInts near = (height < Four{} + sample.height) & (height > Four{} - sample.height);
-      rows |= (left > x2[x] + Four{}) & near & (1 << x);
+      const FourFloats height = up + up_x[x];
+      const FourInts near = (height < FourFloats{} + sample.height) & (height > FourFloats{} - sample.height);
+      rows |= (left > x2[x] + FourFloats{}) & near & (1 << x);
     }
     out[static_cast<std::size_t>(z)] = std::bit_cast<RowWord>(__builtin_convertvector(rows, FourRows));
   }

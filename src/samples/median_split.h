@@ -8,6 +8,8 @@
 #include <span>
 #include <utility>
 
+#include "base/four.h"
+
 namespace lamina {
 
 /// A sample in a tree that is being built.
@@ -15,8 +17,6 @@ struct TreeItem {
   std::array<std::int32_t, 3> at;
   std::uint32_t number;
 };
-
-typedef std::int32_t FourInts __attribute__((vector_size(16)));  // NOLINT(modernize-use-using): attributes on typedefs
 
 /// A box of samples, all three axes at once; the fourth lane is anything.
 struct ItemBox {
@@ -37,6 +37,31 @@ struct ItemBox {
       box.high = at > box.high ? at : box.high;
     }
     return box;
+  }
+  /// To a position or the nearest one of another box, 0 inside; steps^2. No sample of one box is nearer to one of the
+  /// other, rounding included.
+  [[nodiscard]] float squared_to(const std::array<std::int32_t, 3>& at) const {
+    const FourInts four{at[0], at[1], at[2], 0};
+    return squared_to({four, four});
+  }
+  [[nodiscard]] float squared_to(const ItemBox& other) const {
+    const FourInts below = low - other.high;
+    const FourInts above = other.low - high;
+    FourInts past = below > above ? below : above;
+    past = past > 0 ? past : FourInts{};
+    const FourFloats d = to_floats(past);
+    return d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+  }
+  /// To its farthest corner, rounding included.
+  [[nodiscard]] float farthest_squared_to(const std::array<std::int32_t, 3>& at) const {
+    const FourInts four{at[0], at[1], at[2], 0};
+    const FourInts below = four - low;
+    const FourInts above = high - four;
+    const FourFloats d = to_floats(below > above ? below : above);
+    return d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+  }
+  [[nodiscard]] ItemBox with(const ItemBox& other) const {
+    return {low < other.low ? low : other.low, high > other.high ? high : other.high};
   }
   [[nodiscard]] std::size_t longest_axis() const {
     const FourInts extent = high - low;

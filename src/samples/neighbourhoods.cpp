@@ -18,18 +18,6 @@ constexpr std::size_t kEnoughInLeaf = 12;  ///< samples in a leaf, one more wher
 
 static_assert(CellLayer::kMostInLeaf >= 2 * kEnoughInLeaf + 2);
 
-/// The squared distance between two boxes; no sample of one is nearer to one of the other, rounding included.
-float squared_distance(const ItemBox& a, const ItemBox& b) {
-  const FourInts below = a.low - b.high;
-  const FourInts above = b.low - a.high;
-  const FourInts more = below > above ? below : above;
-  const FourInts gap = more > FourInts{} ? more : FourInts{};
-  const auto dx = static_cast<float>(gap[0]);
-  const auto dy = static_cast<float>(gap[1]);
-  const auto dz = static_cast<float>(gap[2]);
-  return dx * dx + dy * dy + dz * dz;
-}
-
 template <typename T>
 void drop_from(std::vector<T>& values, std::size_t n) {
   values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(n));
@@ -137,7 +125,7 @@ std::size_t CellLayer::first_cell(std::int32_t x, std::int32_t y) const {
 void CellLayer::search(Query& query, std::int32_t x, std::int32_t y, const PlacedAxes& at) const {
   for (std::size_t c = first_cell(x - 1, y); c < cells_.size() && cells_[c].y == y && cells_[c].x <= x + 1; ++c) {
     const Cell& cell = cells_[c];
-    if (squared_distance(query.box, nodes_[cell.first_node]) > query.bound) continue;
+    if (query.box.squared_to(nodes_[cell.first_node]) > query.bound) continue;
     search(query, cell, {0, cell.begin, cell.end, cell.depth}, at);
   }
 }
@@ -154,8 +142,8 @@ void CellLayer::search(Query& query, const Cell& cell, const Subtree& tree, cons
   const std::size_t middle = tree.begin + (tree.end - tree.begin) / 2;
   const Subtree lower{2 * tree.node + 1, tree.begin, middle, tree.depth - 1};
   const Subtree upper{2 * tree.node + 2, middle, tree.end, tree.depth - 1};
-  const float to_lower = squared_distance(query.box, nodes_[cell.first_node + lower.node]);
-  const float to_upper = squared_distance(query.box, nodes_[cell.first_node + upper.node]);
+  const float to_lower = query.box.squared_to(nodes_[cell.first_node + lower.node]);
+  const float to_upper = query.box.squared_to(nodes_[cell.first_node + upper.node]);
   const bool lower_first = to_lower <= to_upper;
   if (std::min(to_lower, to_upper) <= query.bound) search(query, cell, lower_first ? lower : upper, at);
   if (std::max(to_lower, to_upper) <= query.bound) search(query, cell, lower_first ? upper : lower, at);

@@ -26,9 +26,10 @@ SampleTree::SampleTree(std::span<const std::int32_t> x, std::span<const std::int
   for (std::size_t i = 0; i < n; ++i) items[i] = {{x[i], y[i], z[i]}, static_cast<std::uint32_t>(i)};
   while ((n >> depth_) > kLeaf) ++depth_;
   nodes_.resize((std::size_t{1} << depth_) - 1);
+  boxes_.resize(nodes_.size() + 1);
   if (n > 0) build(items, {0, 0, n, 0});
   order_.resize(n);
-  for (auto& axis : at_) axis.resize(n);
+  for (auto& axis : at_) axis.resize(n + 3);
   for (std::size_t i = 0; i < n; ++i) {
     order_[i] = items[i].number;
     for (std::size_t a = 0; a < 3; ++a) at_[a][i] = items[i].at[a];
@@ -36,8 +37,12 @@ SampleTree::SampleTree(std::span<const std::int32_t> x, std::span<const std::int
 }
 
 void SampleTree::build(std::span<TreeItem> items, const Subtree& tree) {
-  if (tree.depth == depth_) return;
-  const std::size_t axis = ItemBox::around(items.subspan(tree.begin, tree.end - tree.begin)).longest_axis();
+  const ItemBox box = ItemBox::around(items.subspan(tree.begin, tree.end - tree.begin));
+  if (tree.depth == depth_) {
+    boxes_[tree.node - nodes_.size()] = box;
+    return;
+  }
+  const std::size_t axis = box.longest_axis();
   MedianSplit(items, axis).select(tree.begin, tree.middle(), tree.end);
   nodes_[tree.node] = {items[tree.middle()].at[axis], static_cast<int>(axis)};
   if (tree.end - tree.begin > kParallel) {
@@ -57,6 +62,23 @@ std::size_t SampleTree::nearest(std::uint32_t place, std::size_t k, float bound,
   q.found = found;
   if (q.wanted > 0) search(q, whole(), 0.0F);
   return q.count;
+}
+
+SampleTree::Block SampleTree::block_of(std::uint32_t place) const {
+  constexpr int kLevels = 2;  // above the leaves
+  Subtree tree = whole();
+  while (tree.depth < depth_ - kLevels) tree = place < tree.middle() ? tree.lower() : tree.upper();
+  Block block{static_cast<std::uint32_t>(tree.begin), static_cast<std::uint32_t>(tree.end)};
+  std::size_t first = tree.node;
+  std::size_t count = 1;
+  for (int depth = tree.depth; depth < depth_; ++depth) {
+    first = 2 * first + 1;
+    count *= 2;
+  }
+  first -= nodes_.size();
+  block.box = boxes_[first];
+  for (std::size_t leaf = first; leaf < first + count; ++leaf) block.box = block.box.with(boxes_[leaf]);
+  return block;
 }
 
 void SampleTree::search(Query& q, const Subtree& tree, float squared) const {

@@ -2,12 +2,15 @@
 // beside edit/point_tree.h, which asks for the one nearest of any positions: here every sample asks for its k nearest,
 // so leaves hold a dozen samples side by side and distances are sums of floats.
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
+#include "base/four.h"
 #include "samples/median_split.h"
 #include "samples/nearest.h"
 
@@ -38,6 +41,56 @@ class SampleTree {
     if (!order_.empty()) within(place, squared, visit, whole());
   }
 
+  /// Four samples, as seen from a position; some may lie infinitely far away and be none.
+  struct FourSamples {
+    std::array<FourFloats, 3> offset;  ///< offset()
+    FourFloats squared;                ///< distance, steps^2
+    FourInts places;
+  };
+  /// Between two squared distances of a sample, steps^2: farther than `inner`, not farther than `outer`.
+  struct Shell {
+    std::uint32_t place = 0;
+    float inner = 0, outer = 0;
+  };
+  /// Calls visit(four) until all samples of the shell have been visited, in the order of places. Others come with them.
+  template <class Visit>
+  void fours_within(const Shell& shell, const Visit& visit) const {
+    if (!order_.empty()) fours_within(shell, position(shell.place), visit, whole());
+  }
+
+  /// Calls visit(four) for the samples at places [begin, end), as seen from a position.
+  template <class Visit>
+  void fours_of(const std::array<std::int32_t, 3>& at, std::size_t begin, std::size_t end, const Visit& visit) const {
+    for (std::size_t p = begin; p < end; p += 4) {
+      FourSamples four;
+      four.places = four_times(static_cast<std::int32_t>(p)) + FourInts{0, 1, 2, 3};
+      for (std::size_t a = 0; a < 3; ++a) four.offset[a] = to_floats(load_four(at_[a].data() + p) - at[a]);
+      const auto& d = four.offset;
+      const FourInts is_sample = four.places < static_cast<std::int32_t>(end);
+      four.squared =
+          is_sample ? d[0] * d[0] + d[1] * d[1] + d[2] * d[2] : FourFloats{} + std::numeric_limits<float>::infinity();
+      visit(four);
+    }
+  }
+
+  /// Places [begin, end), which lie close together, and the box around them.
+  struct Block {
+    std::uint32_t begin = 0, end = 0;
+    ItemBox box{};
+  };
+  static constexpr std::size_t kMostInLeaf = 26;
+  /// A few leaves side by side, that of the place among them.
+  [[nodiscard]] Block block_of(std::uint32_t place) const;
+  /// Calls visit(leaf) for every leaf, a Block, that may hold samples within the squared distance of a box, in the
+  /// order of places.
+  template <class Visit>
+  void around(const ItemBox& box, float squared, const Visit& visit) const {
+    if (!order_.empty()) around({&box, squared, {}}, visit, whole());
+  }
+
+  [[nodiscard]] std::array<std::int32_t, 3> position(std::uint32_t place) const {
+    return {at_[0][place], at_[1][place], at_[2][place]};
+  }
   /// From the sample at place `a` to that at place `b`, steps.
   [[nodiscard]] std::array<float, 3> offset(std::uint32_t a, std::uint32_t b) const {
     return {static_cast<float>(at_[0][b] - at_[0][a]), static_cast<float>(at_[1][b] - at_[1][a]),
@@ -52,7 +105,6 @@ class SampleTree {
     int axis = 0;
   };
   struct Query;
-  static constexpr std::size_t kMostInLeaf = 26;
 
   /// What lies below a node: places [begin, end).
   struct Subtree {
@@ -66,6 +118,47 @@ class SampleTree {
 
   void build(std::span<TreeItem> items, const Subtree& tree);
   void search(Query& q, const Subtree& tree, float squared) const;
+
+  template <class Visit>
+  void fours_within(const Shell& shell, const std::array<std::int32_t, 3>& at, const Visit& visit,
+                    const Subtree& tree) const {
+    if (tree.depth == depth_) {
+      const ItemBox& box = boxes_[tree.node - nodes_.size()];
+      if (box.squared_to(at) <= shell.outer && box.farthest_squared_to(at) > shell.inner)
+        fours_of(at, tree.begin, tree.end, visit);
+      return;
+    }
+    const Node& n = nodes_[tree.node];
+    const auto side = static_cast<float>(at[static_cast<std::size_t>(n.axis)] - n.split);
+    if (side <= 0 || side * side <= shell.outer) fours_within(shell, at, visit, tree.lower());
+    if (side >= 0 || side * side <= shell.outer) fours_within(shell, at, visit, tree.upper());
+  }
+
+  /// A box, how far around it, and by axis how far the node in question lies outside of it.
+  struct Around {
+    const ItemBox* box;
+    float squared;
+    std::array<float, 3> outside;
+  };
+  template <class Visit>
+  void around(const Around& here, const Visit& visit, const Subtree& tree) const {
+    if (tree.depth == depth_) {
+      const ItemBox& box = boxes_[tree.node - nodes_.size()];
+      if (box.squared_to(*here.box) <= here.squared)
+        visit(Block{static_cast<std::uint32_t>(tree.begin), static_cast<std::uint32_t>(tree.end), box});
+      return;
+    }
+    const Node& n = nodes_[tree.node];
+    const auto axis = static_cast<std::size_t>(n.axis);
+    const auto go = [&](std::int32_t past, const Subtree& half) {
+      Around there = here;
+      there.outside[axis] = std::max(there.outside[axis], static_cast<float>(past));
+      const auto& d = there.outside;
+      if (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] <= there.squared) around(there, visit, half);
+    };
+    go(here.box->low[axis] - n.split, tree.lower());
+    go(n.split - here.box->high[axis], tree.upper());
+  }
 
   template <class Visit>
   void within(std::uint32_t place, float squared, const Visit& visit, const Subtree& tree) const {
@@ -93,9 +186,11 @@ class SampleTree {
     if (side >= 0 || side * side <= squared) within(place, squared, visit, tree.upper());
   }
 
-  std::array<std::vector<std::int32_t>, 3> at_;  ///< by place
+  /// By place; behind the last one there are some more numbers, so that four can be loaded from anywhere.
+  std::array<std::vector<std::int32_t>, 3> at_;
   std::vector<std::uint32_t> order_;
-  std::vector<Node> nodes_;  ///< a heap: the children of i are 2 i + 1 and 2 i + 2; all leaves are at one depth
+  std::vector<Node> nodes_;     ///< a heap: the children of i are 2 i + 1 and 2 i + 2; all leaves are at one depth
+  std::vector<ItemBox> boxes_;  ///< of the leaves
   int depth_ = 0;
 };
 

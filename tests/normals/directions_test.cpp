@@ -60,6 +60,31 @@ void expect_same_as_eigen(const Offsets& offsets) {
   EXPECT_NEAR(normal.norm(), 1, 1e-6);
 }
 
+TEST(BallMoments, AreThoseOfTheSamplesInside) {
+  std::mt19937 random(11);
+  std::uniform_int_distribution<std::int32_t> at(-100'000, 100'000);
+  std::array<std::vector<std::int32_t>, 3> axes;
+  for (int i = 0; i < 3000; ++i) {
+    for (auto& axis : axes) axis.push_back(at(random));
+  }
+  const SampleTree tree(axes[0], axes[1], axes[2]);
+  for (std::uint32_t place = 0; place < tree.size(); place += 100) {
+    BallMoments ball(tree, place);
+    for (const float radius : {10'000.0F, 30'000.0F, 50'000.0F}) {
+      Moments expected;
+      for (std::uint32_t other = 0; other < tree.size(); ++other) {
+        const std::array<float, 3> d = tree.offset(place, other);
+        if (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] <= radius * radius) expected.add(d);
+      }
+      const Moments found = ball.grow_to(radius * radius);
+      ASSERT_EQ(found.count, expected.count);
+      const double most = expected.count * double{radius} * double{radius};
+      for (std::size_t i = 0; i < 3; ++i) ASSERT_NEAR(found.sum[i], expected.sum[i], 1e-6 * most / double{radius});
+      for (std::size_t i = 0; i < 6; ++i) ASSERT_NEAR(found.products[i], expected.products[i], 1e-6 * most);
+    }
+  }
+}
+
 TEST(FitPlane, IsTheEigenvectorOfTheLeastVariance) {
   std::mt19937 random(1);
   for (const double thin : {0.0, 1e-6, 1e-3, 0.1, 0.5, 0.9}) {

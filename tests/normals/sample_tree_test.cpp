@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <random>
 
+#include "samples/nearest_search.h"
+
 namespace lamina::normals {
 namespace {
 
@@ -44,16 +46,23 @@ std::vector<Neighbour> all_by_distance(const SampleTree& tree, std::uint32_t pla
 void expect_nearest(const Positions& p, std::size_t k, float bound) {
   const SampleTree tree(p.x, p.y, p.z);
   std::array<Neighbour, SampleTree::kMostNeighbours> found;
+  NearestSearch search(tree);
+  std::array<Neighbour, SampleTree::kMostNeighbours> found_in_turn;
   const auto step = static_cast<std::uint32_t>(tree.size() / 40 + 1);
-  for (std::uint32_t place = 0; place < tree.size(); place += step) {
+  for (std::uint32_t place = 0; place < tree.size(); ++place) {
+    const std::size_t in_turn = search.nearest(place, k, bound, found_in_turn.data());
+    if (place % step != 0) continue;
     std::vector<Neighbour> expected = all_by_distance(tree, place);
     std::erase_if(expected, [&](const Neighbour& n) { return n.squared > bound; });
     expected.resize(std::min(expected.size(), k));
     const std::size_t count = tree.nearest(place, k, bound, found.data());
     ASSERT_EQ(count, expected.size()) << place;
+    ASSERT_EQ(in_turn, count) << place;
     for (std::size_t i = 0; i < count; ++i) {
       ASSERT_EQ(found[i].squared, expected[i].squared) << place << ", " << i;
       ASSERT_EQ(found[i].sample, expected[i].sample) << place << ", " << i;
+      ASSERT_EQ(found_in_turn[i].squared, expected[i].squared) << place << ", " << i;
+      ASSERT_EQ(found_in_turn[i].sample, expected[i].sample) << place << ", " << i;
     }
   }
 }
@@ -99,6 +108,44 @@ TEST(SampleTree, FindsAllWithinADistance) {
     std::vector<std::uint32_t> found;
     tree.within(place, squared,
                 [&](const Neighbour& n, const std::array<float, 3>& /*offset*/) { found.push_back(n.sample); });
+    ASSERT_EQ(found, expected) << place;
+  }
+}
+
+// On a surface some lie dense and some far out, so that searches go on from guesses that fit and from those that do
+// not.
+TEST(SampleTree, FindsTheNearestOfUnevenSamplesOneAfterAnother) {
+  std::mt19937 random(8);
+  std::normal_distribution<> normal;
+  Positions p;
+  for (int i = 0; i < 6000; ++i) {
+    const double spread = i % 10 == 0 ? 1e7 : 3e5;
+    p.x.push_back(static_cast<std::int32_t>(spread * normal(random)));
+    p.y.push_back(static_cast<std::int32_t>(spread * normal(random)));
+    p.z.push_back(static_cast<std::int32_t>(0.01 * spread * normal(random)));
+  }
+  for (const std::size_t k : {1, 12, 16, 17}) expect_nearest(p, k, 1e30F);
+  expect_nearest(p, 16, 1e10F);
+}
+
+TEST(SampleTree, VisitsAllOfAShell) {
+  const Positions p = random_positions(2000, 100, 9);
+  const SampleTree tree(p.x, p.y, p.z);
+  constexpr float kInner = 20 * 20;
+  constexpr float kOuter = 40 * 40;
+  for (std::uint32_t place = 0; place < tree.size(); place += 50) {
+    std::vector<std::uint32_t> expected;
+    for (const Neighbour& n : all_by_distance(tree, place)) {
+      if (n.squared > kInner && n.squared <= kOuter) expected.push_back(n.sample);
+    }
+    std::sort(expected.begin(), expected.end());
+    std::vector<std::uint32_t> found;
+    tree.fours_within({place, kInner, kOuter}, [&](const SampleTree::FourSamples& four) {
+      for (std::size_t i = 0; i < 4; ++i) {
+        if (four.squared[i] > kInner && four.squared[i] <= kOuter)
+          found.push_back(static_cast<std::uint32_t>(four.places[i]));
+      }
+    });
     ASSERT_EQ(found, expected) << place;
   }
 }
