@@ -13,8 +13,8 @@ namespace lamina {
 namespace {
 
 constexpr std::size_t kMostLeaves = 96;  ///< from more of them on the tree is faster
-constexpr float kGuess = 1.2F;           ///< of the distance to the k-th neighbour of the sample before
-constexpr float kReach = 1.6F;           ///< likewise: farther ones are left to the tree
+constexpr float kGuessedReach = 1.2F;    ///< of the distance to the k-th neighbour of the sample before
+constexpr float kGatheredReach = 1.6F;   ///< likewise: farther ones are left to the tree
 constexpr float kRounding = 1 + 1e-4F;   ///< of distances: nothing must be lost to it
 
 /// By the bits of a mask: the bytes of those of four values that it has, one after another.
@@ -136,7 +136,7 @@ class Near {
 std::size_t NearestSearch::nearest(std::uint32_t place, std::size_t k, float bound, Neighbour* found) {
   if (place < block_.begin || place >= block_.end || k != k_ || bound != bound_) gather(place, k, bound);
   // Mostly its neighbours lie about as far as those of the sample before: enough within a guess are the nearest.
-  for (const float guess : {kGuess * farthest_, reach_}) {
+  for (const float guess : {kGuessedReach * farthest_, reach_}) {
     if (around_.empty() || guess > reach_) continue;
     Near near(tree_, place, std::min(bound, guess * guess));
     look_around(near);
@@ -167,7 +167,7 @@ void NearestSearch::gather(std::uint32_t place, std::size_t k, float bound) {
   if (k == 0 || k > found.size()) return;
   const std::size_t count = tree_.nearest(place, k, bound, found.data());
   farthest_ = std::sqrt(count == k ? found[k - 1].squared : bound);
-  reach_ = std::min(kReach * farthest_, std::sqrt(bound) * kRounding);
+  reach_ = std::min(kGatheredReach * farthest_, std::sqrt(bound) * kRounding);
   std::size_t leaves = 0;
   tree_.around(block_.box, kRounding * reach_ * reach_, [&](const SampleTree::Block& leaf) {
     if (leaves >= kMostLeaves) return;
