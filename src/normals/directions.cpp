@@ -59,9 +59,13 @@ int look_across(const SampleTree& tree, std::uint32_t place, std::size_t count, 
     out.near.clear();
     Moments m;
     m.count = 1;
-    tree.within(place, squared, [&](const Neighbour& n, const std::array<float, 3>& offset) {
-      m.add(offset);
-      out.near.push_back(n);
+    tree.fours_within({place, -1, squared}, [&](const SampleTree::FourSamples& four) {
+      for (std::size_t i = 0; i < 4; ++i) {
+        const auto other = static_cast<std::uint32_t>(four.places[i]);
+        if (!(four.squared[i] <= squared) || other == place) continue;
+        m.add({four.offset[0][i], four.offset[1][i], four.offset[2][i]});
+        out.near.push_back({four.squared[i], other});
+      }
     });
     const bool grows = static_cast<double>(out.near.size()) > kGrowth * static_cast<double>(count);
     count = out.near.size();

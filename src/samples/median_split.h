@@ -38,12 +38,8 @@ struct ItemBox {
     }
     return box;
   }
-  /// To a position or the nearest one of another box, 0 inside; steps^2. No sample of one box is nearer to one of the
-  /// other, rounding included.
-  [[nodiscard]] float squared_to(const std::array<std::int32_t, 3>& at) const {
-    const FourInts four{at[0], at[1], at[2], 0};
-    return squared_to({four, four});
-  }
+  /// To another box, 0 where they touch; steps^2. No sample of one box is nearer to one of the other, rounding
+  /// included.
   [[nodiscard]] float squared_to(const ItemBox& other) const {
     const FourInts below = low - other.high;
     const FourInts above = other.low - high;
@@ -52,13 +48,9 @@ struct ItemBox {
     const FourFloats d = to_floats(past);
     return d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
   }
-  /// To its farthest corner, rounding included.
-  [[nodiscard]] float farthest_squared_to(const std::array<std::int32_t, 3>& at) const {
+  static ItemBox of(const std::array<std::int32_t, 3>& at) {
     const FourInts four{at[0], at[1], at[2], 0};
-    const FourInts below = four - low;
-    const FourInts above = high - four;
-    const FourFloats d = to_floats(below > above ? below : above);
-    return d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
+    return {four, four};
   }
   [[nodiscard]] ItemBox with(const ItemBox& other) const {
     return {low < other.low ? low : other.low, high > other.high ? high : other.high};

@@ -12,7 +12,7 @@
 namespace lamina {
 namespace {
 
-constexpr std::size_t kMostLeaves = 96;  ///< from more of them on the tree is faster
+constexpr std::size_t kMostBlocks = 24;  ///< from more of them on the tree is faster
 constexpr float kGuessedReach = 1.2F;    ///< of the distance to the k-th neighbour of the sample before
 constexpr float kGatheredReach = 1.6F;   ///< likewise: farther ones are left to the tree
 constexpr float kRounding = 1 + 1e-4F;   ///< of distances: nothing must be lost to it
@@ -39,36 +39,11 @@ class Near {
   [[nodiscard]] bool is_full() const { return count_ > kMost; }
   [[nodiscard]] std::size_t count() const { return count_; }
 
-  /// A bit for each of the leaves that are near enough.
-  [[nodiscard]] unsigned reached(const std::array<FourInts, 3>& low, const std::array<FourInts, 3>& high) const {
-    std::array<FourInts, 3> past;
-    for (std::size_t a = 0; a < 3; ++a) {
-      const FourInts below = low[a] - at_[a];
-      const FourInts above = at_[a] - high[a];
-      past[a] = below > above ? below : above;
-      past[a] = past[a] > 0 ? past[a] : FourInts{};
+  void take(const SampleTree::Block& block) {
+    for (unsigned leaves = block.within(ItemBox::of(at_), bound_); leaves != 0; leaves &= leaves - 1) {
+      const auto leaf = static_cast<std::size_t>(std::countr_zero(leaves));
+      take_places(block.begin[leaf], block.begin[leaf + 1]);
     }
-    const FourFloats x = to_floats(past[0]);
-    const FourFloats y = to_floats(past[1]);
-    const FourFloats z = to_floats(past[2]);
-    return bits_of(x * x + y * y + z * z <= bound_);
-  }
-
-  /// Those of places [begin, end).
-  void take(std::uint32_t begin, std::uint32_t end) {
-    static constexpr BytesOfFour kBytes = bytes_by_mask();
-    tree_->fours_of(at_, begin, end, [&](const SampleTree::FourSamples& four) {
-      if (is_full()) return;
-      const FourInts wanted = (four.squared <= bound_) & (four.places != static_cast<std::int32_t>(place_));
-      const unsigned mask = bits_of(wanted);
-      __m128i bytes;
-      std::memcpy(&bytes, kBytes[mask].data(), sizeof(bytes));
-      const __m128i squared = _mm_shuffle_epi8(std::bit_cast<__m128i>(four.squared), bytes);
-      const __m128i places = _mm_shuffle_epi8(std::bit_cast<__m128i>(four.places), bytes);
-      std::memcpy(squared_.data() + count_, &squared, sizeof(squared));
-      std::memcpy(places_.data() + count_, &places, sizeof(places));
-      count_ += static_cast<std::size_t>(std::popcount(mask));
-    });
   }
 
   /// Writes the nearest ones in order and returns how many.
@@ -92,6 +67,22 @@ class Near {
  private:
   static constexpr std::size_t kMost = 64;
   static constexpr std::size_t kRankedAtOnce = 8;
+
+  void take_places(std::uint32_t begin, std::uint32_t end) {
+    static constexpr BytesOfFour kBytes = bytes_by_mask();
+    tree_->fours_of(at_, begin, end, [&](const SampleTree::FourSamples& four) {
+      if (is_full()) return;
+      const FourInts wanted = (four.squared <= bound_) & (four.places != static_cast<std::int32_t>(place_));
+      const unsigned mask = bits_of(wanted);
+      __m128i bytes;
+      std::memcpy(&bytes, kBytes[mask].data(), sizeof(bytes));
+      const __m128i squared = _mm_shuffle_epi8(std::bit_cast<__m128i>(four.squared), bytes);
+      const __m128i places = _mm_shuffle_epi8(std::bit_cast<__m128i>(four.places), bytes);
+      std::memcpy(squared_.data() + count_, &squared, sizeof(squared));
+      std::memcpy(places_.data() + count_, &places, sizeof(places));
+      count_ += static_cast<std::size_t>(std::popcount(mask));
+    });
+  }
 
   [[nodiscard]] Neighbour neighbour(std::size_t i) const {
     return {squared_[i], static_cast<std::uint32_t>(places_[i])};
@@ -134,12 +125,12 @@ class Near {
 }  // namespace
 
 std::size_t NearestSearch::nearest(std::uint32_t place, std::size_t k, float bound, Neighbour* found) {
-  if (place < block_.begin || place >= block_.end || k != k_ || bound != bound_) gather(place, k, bound);
+  if (block_ == nullptr || !block_->holds(place) || k != k_ || bound != bound_) gather(place, k, bound);
   // Mostly its neighbours lie about as far as those of the sample before: enough within a guess are the nearest.
   for (const float guess : {kGuessedReach * farthest_, reach_}) {
     if (around_.empty() || guess > reach_) continue;
     Near near(tree_, place, std::min(bound, guess * guess));
-    look_around(near);
+    for (const SampleTree::Block* const block : around_) near.take(*block);
     if (near.is_full() || (near.count() < k && guess * guess < bound)) continue;
     const std::size_t count = near.write(std::span(found, k));
     if (count == k) farthest_ = std::sqrt(found[k - 1].squared);
@@ -148,18 +139,8 @@ std::size_t NearestSearch::nearest(std::uint32_t place, std::size_t k, float bou
   return tree_.nearest(place, k, bound, found);
 }
 
-template <class Taker>
-void NearestSearch::look_around(Taker& near) const {
-  for (const FourLeaves& four : around_) {
-    for (unsigned reached = near.reached(four.low, four.high); reached != 0; reached &= reached - 1) {
-      const auto leaf = static_cast<std::size_t>(std::countr_zero(reached));
-      near.take(four.begin[leaf], four.end[leaf]);
-    }
-  }
-}
-
 void NearestSearch::gather(std::uint32_t place, std::size_t k, float bound) {
-  block_ = tree_.block_of(place);
+  block_ = &tree_.block_of(place);
   k_ = k;
   bound_ = bound;
   around_.clear();
@@ -168,19 +149,11 @@ void NearestSearch::gather(std::uint32_t place, std::size_t k, float bound) {
   const std::size_t count = tree_.nearest(place, k, bound, found.data());
   farthest_ = std::sqrt(count == k ? found[k - 1].squared : bound);
   reach_ = std::min(kGatheredReach * farthest_, std::sqrt(bound) * kRounding);
-  std::size_t leaves = 0;
-  tree_.around(block_.box, kRounding * reach_ * reach_, [&](const SampleTree::Block& leaf) {
-    if (leaves >= kMostLeaves) return;
-    const std::size_t lane = leaves++ % 4;
-    FourLeaves& four = lane == 0 ? around_.emplace_back() : around_.back();
-    four.begin[lane] = leaf.begin;
-    four.end[lane] = leaf.end;
-    for (std::size_t a = 0; a < 3; ++a) {
-      four.low[a][lane] = leaf.box.low[a];
-      four.high[a][lane] = leaf.box.high[a];
-    }
+  const SampleTree::Around around{block_->box(), kRounding * reach_ * reach_};
+  tree_.for_blocks(around, [&](const SampleTree::Block& block) {
+    if (around_.size() <= kMostBlocks && block.within(around.box, around.squared) != 0) around_.push_back(&block);
   });
-  if (leaves >= kMostLeaves) around_.clear();
+  if (around_.size() > kMostBlocks) around_.clear();
 }
 
 }  // namespace lamina

@@ -1,4 +1,4 @@
-// The nearest samples around many samples, one after another: for those of one block of the tree, the leaves around
+// The nearest samples around many samples, one after another: for those of one block of the tree, the blocks around
 // it are gathered once, and each of them looks through these instead of going down the tree again.
 #pragma once
 #include <array>
@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <vector>
 
-#include "samples/median_split.h"
 #include "samples/nearest.h"
 #include "samples/sample_tree.h"
 
@@ -22,21 +21,14 @@ class NearestSearch {
   std::size_t nearest(std::uint32_t place, std::size_t k, float bound, Neighbour* found);
 
  private:
-  /// Leaves side by side; unused ones are empty.
-  struct FourLeaves {
-    std::array<FourInts, 3> low{}, high{};
-    std::array<std::uint32_t, 4> begin{}, end{};
-  };
   void gather(std::uint32_t place, std::size_t k, float bound);
-  template <class Taker>
-  void look_around(Taker& near) const;
   const SampleTree& tree_;
-  SampleTree::Block block_;
+  const SampleTree::Block* block_ = nullptr;
   std::size_t k_ = 0;
   float bound_ = 0;
-  float reach_ = 0;                 ///< all within this distance of the block are in the leaves gathered, steps
-  float farthest_ = 0;              ///< distance of the k-th neighbour of the sample before, steps
-  std::vector<FourLeaves> around_;  ///< empty where they are too many
+  float reach_ = 0;     ///< all within this distance of the block lie in the blocks gathered, steps
+  float farthest_ = 0;  ///< distance of the k-th neighbour of the sample before, steps
+  std::vector<const SampleTree::Block*> around_;  ///< empty where they are too many
 };
 
 }  // namespace lamina

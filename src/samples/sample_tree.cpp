@@ -9,8 +9,9 @@
 namespace lamina {
 namespace {
 
-constexpr std::size_t kLeaf = 12;            ///< samples a leaf has at most
+constexpr std::size_t kLeaf = 12;            ///< samples a leaf has at most, one more where halves are not even
 constexpr std::size_t kParallel = 1u << 14;  ///< smaller ranges are built by one thread
+constexpr std::int32_t kOutside = (1 << 30) - 1;
 
 }  // namespace
 
@@ -20,14 +21,14 @@ struct SampleTree::Query : NearestList {
 
 SampleTree::SampleTree(std::span<const std::int32_t> x, std::span<const std::int32_t> y,
                        std::span<const std::int32_t> z) {
-  static_assert(kMostInLeaf >= 2 * kLeaf + 2);
+  static_assert(kMostInLeaf > kLeaf);
   const std::size_t n = x.size();
   std::vector<TreeItem> items(n);
   for (std::size_t i = 0; i < n; ++i) items[i] = {{x[i], y[i], z[i]}, static_cast<std::uint32_t>(i)};
-  while ((n >> depth_) > kLeaf) ++depth_;
+  while ((n >> depth_) > 4 * kLeaf) ++depth_;
   nodes_.resize((std::size_t{1} << depth_) - 1);
-  boxes_.resize(nodes_.size() + 1);
-  if (n > 0) build(items, {0, 0, n, 0});
+  blocks_.resize(nodes_.size() + 1);
+  build(items, {0, n}, {0, 0});
   order_.resize(n);
   for (auto& axis : at_) axis.resize(n + 3);
   for (std::size_t i = 0; i < n; ++i) {
@@ -36,62 +37,129 @@ SampleTree::SampleTree(std::span<const std::int32_t> x, std::span<const std::int
   }
 }
 
-void SampleTree::build(std::span<TreeItem> items, const Subtree& tree) {
-  const ItemBox box = ItemBox::around(items.subspan(tree.begin, tree.end - tree.begin));
-  if (tree.depth == depth_) {
-    boxes_[tree.node - nodes_.size()] = box;
+void SampleTree::build(std::span<TreeItem> items, const Range& range, const Below& below) {
+  if (below.depth == depth_) {
+    build_block(items, range, blocks_[below.node - nodes_.size()]);
     return;
   }
-  const std::size_t axis = box.longest_axis();
-  MedianSplit(items, axis).select(tree.begin, tree.middle(), tree.end);
-  nodes_[tree.node] = {items[tree.middle()].at[axis], static_cast<int>(axis)};
-  if (tree.end - tree.begin > kParallel) {
-    tbb::parallel_invoke([&] { build(items, tree.lower()); }, [&] { build(items, tree.upper()); });
+  const std::size_t middle = range.middle();
+  const std::size_t axis = ItemBox::around(items.subspan(range.begin, range.end - range.begin)).longest_axis();
+  MedianSplit(items, axis).select(range.begin, middle, range.end);
+  nodes_[below.node] = {items[middle].at[axis], static_cast<int>(axis)};
+  if (range.end - range.begin > kParallel) {
+    tbb::parallel_invoke(
+        [&] {
+          build(items, {range.begin, middle}, below.lower());
+        },
+        [&] {
+          build(items, {middle, range.end}, below.upper());
+        });
   } else {
-    build(items, tree.lower());
-    build(items, tree.upper());
+    build(items, {range.begin, middle}, below.lower());
+    build(items, {middle, range.end}, below.upper());
   }
+}
+
+void SampleTree::build_block(std::span<TreeItem> items, const Range& range, Block& block) {
+  std::array<Range, 4> leaves;
+  leaves.fill({range.end, range.end});
+  leaves[0] = range;
+  const auto halve = [&](Range& first, Range& second) {
+    if (first.end - first.begin <= kLeaf) return;
+    const Range all = first;
+    const std::size_t axis = ItemBox::around(items.subspan(all.begin, all.end - all.begin)).longest_axis();
+    MedianSplit(items, axis).select(all.begin, all.middle(), all.end);
+    first = {all.begin, all.middle()};
+    second = {all.middle(), all.end};
+  };
+  halve(leaves[0], leaves[2]);
+  halve(leaves[0], leaves[1]);
+  if (leaves[2].begin < leaves[2].end) halve(leaves[2], leaves[3]);
+  block.begin[4] = static_cast<std::uint32_t>(range.end);
+  for (std::size_t leaf = 0; leaf < 4; ++leaf) {
+    const auto [begin, end] = leaves[leaf];
+    // What is in none lies outside of all.
+    ItemBox box = ItemBox::of({kOutside, kOutside, kOutside});
+    if (begin < end) box = ItemBox::around(items.subspan(begin, end - begin));
+    for (std::size_t a = 0; a < 3; ++a) {
+      block.low[a][leaf] = box.low[a];
+      block.high[a][leaf] = box.high[a];
+    }
+  }
+  // A leaf ends where the next one begins, an empty one where it begins.
+  for (std::size_t leaf = 4; leaf-- > 0;)
+    block.begin[leaf] =
+        leaves[leaf].begin < leaves[leaf].end ? static_cast<std::uint32_t>(leaves[leaf].begin) : block.begin[leaf + 1];
+}
+
+unsigned SampleTree::Block::within(const ItemBox& box, float squared) const {
+  std::array<FourFloats, 3> past;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const FourInts below = low[a] - box.high[a];
+    const FourInts above = box.low[a] - high[a];
+    const FourInts more = below > above ? below : above;
+    past[a] = to_floats(more > 0 ? more : FourInts{});
+  }
+  return bits_of(past[0] * past[0] + past[1] * past[1] + past[2] * past[2] <= squared);
+}
+
+unsigned SampleTree::Block::beyond(const std::array<std::int32_t, 3>& at, float squared) const {
+  std::array<FourFloats, 3> far;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const FourInts below = at[a] - low[a];
+    const FourInts above = high[a] - at[a];
+    far[a] = to_floats(below > above ? below : above);
+  }
+  return bits_of(far[0] * far[0] + far[1] * far[1] + far[2] * far[2] > squared);
+}
+
+ItemBox SampleTree::Block::box() const {
+  const auto leaf = [&](std::size_t i) {
+    return ItemBox{{low[0][i], low[1][i], low[2][i], 0}, {high[0][i], high[1][i], high[2][i], 0}};
+  };
+  ItemBox all = leaf(0);
+  for (std::size_t i = 1; i < 4; ++i) {
+    if (begin[i] < begin[i + 1]) all = all.with(leaf(i));
+  }
+  return all;
+}
+
+const SampleTree::Block& SampleTree::block_of(std::uint32_t place) const {
+  Range range{0, order_.size()};
+  Below below;
+  while (below.depth < depth_) {
+    const bool lower = place < range.middle();
+    below = lower ? below.lower() : below.upper();
+    (lower ? range.end : range.begin) = range.middle();
+  }
+  return block_at(below);
 }
 
 std::size_t SampleTree::nearest(std::uint32_t place, std::size_t k, float bound, Neighbour* found) const {
   Query q;
-  q.at = {at_[0][place], at_[1][place], at_[2][place]};
+  q.at = position(place);
   q.place = place;
   q.wanted = std::min(k, kMostNeighbours);
   q.bound = bound;
   q.found = found;
-  if (q.wanted > 0) search(q, whole(), 0.0F);
+  if (q.wanted > 0) search(q, {0, 0}, 0.0F);
   return q.count;
 }
 
-SampleTree::Block SampleTree::block_of(std::uint32_t place) const {
-  constexpr int kLevels = 2;  // above the leaves
-  Subtree tree = whole();
-  while (tree.depth < depth_ - kLevels) tree = place < tree.middle() ? tree.lower() : tree.upper();
-  Block block{static_cast<std::uint32_t>(tree.begin), static_cast<std::uint32_t>(tree.end)};
-  std::size_t first = tree.node;
-  std::size_t count = 1;
-  for (int depth = tree.depth; depth < depth_; ++depth) {
-    first = 2 * first + 1;
-    count *= 2;
-  }
-  first -= nodes_.size();
-  block.box = boxes_[first];
-  for (std::size_t leaf = first; leaf < first + count; ++leaf) block.box = block.box.with(boxes_[leaf]);
-  return block;
-}
-
-void SampleTree::search(Query& q, const Subtree& tree, float squared) const {
-  if (tree.depth == depth_) {
-    q.take_places<kMostInLeaf>(axes(), tree.begin, tree.end);
+void SampleTree::search(Query& q, const Below& below, float squared) const {
+  const PlacedAxes axes{at_[0].data(), at_[1].data(), at_[2].data()};
+  if (below.depth == depth_) {
+    const Block& block = block_at(below);
+    for (unsigned leaves = block.within(ItemBox::of(q.at), q.bound); leaves != 0; leaves &= leaves - 1) {
+      const auto leaf = static_cast<std::size_t>(std::countr_zero(leaves));
+      q.take_places<kMostInLeaf>(axes, block.begin[leaf], block.begin[leaf + 1]);
+    }
     return;
   }
-  const Node& split = nodes_[tree.node];
+  const Node& split = nodes_[below.node];
   const auto axis = static_cast<std::size_t>(split.axis);
   const auto side = static_cast<float>(q.at[axis] - split.split);
-  // Where both halves touch the plane, what lies on it may be in either.
-  const bool lower_first = side < 0 || (side == 0 && q.place < tree.middle());
-  search(q, lower_first ? tree.lower() : tree.upper(), squared);
+  search(q, side < 0 ? below.lower() : below.upper(), squared);
   // The other half is as far as the plane along this axis, and as the node itself along the others.
   const float before = q.outside[axis];
   const float there = squared - before * before + side * side;
@@ -99,7 +167,7 @@ void SampleTree::search(Query& q, const Subtree& tree, float squared) const {
   constexpr float kSlack = 1 - 1e-5F;
   if (there * kSlack <= q.bound) {
     q.outside[axis] = side;
-    search(q, lower_first ? tree.upper() : tree.lower(), there);
+    search(q, side < 0 ? below.upper() : below.lower(), there);
     q.outside[axis] = before;
   }
 }

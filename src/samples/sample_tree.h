@@ -1,9 +1,10 @@
 // The nearest samples around a sample: a balanced kd-tree over the fixed-point positions of a window. Its own tree
 // beside edit/point_tree.h, which asks for the one nearest of any positions: here every sample asks for its k nearest,
-// so leaves hold a dozen samples side by side and distances are sums of floats.
+// so leaves hold a dozen samples side by side, lie four by four, and distances are sums of floats.
 #pragma once
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -34,13 +35,6 @@ class SampleTree {
   /// than the squared distance `bound`; nearest first, equally near ones by place. Returns how many there are.
   std::size_t nearest(std::uint32_t place, std::size_t k, float bound, Neighbour* found) const;
 
-  /// Calls visit(neighbour, offset) for every sample within the squared distance but the one at `place`, in the order
-  /// of places; `offset` is that of offset().
-  template <class Visit>
-  void within(std::uint32_t place, float squared, const Visit& visit) const {
-    if (!order_.empty()) within(place, squared, visit, whole());
-  }
-
   /// Four samples, as seen from a position; some may lie infinitely far away and be none.
   struct FourSamples {
     std::array<FourFloats, 3> offset;  ///< offset()
@@ -55,9 +49,15 @@ class SampleTree {
   /// Calls visit(four) until all samples of the shell have been visited, in the order of places. Others come with them.
   template <class Visit>
   void fours_within(const Shell& shell, const Visit& visit) const {
-    if (!order_.empty()) fours_within(shell, position(shell.place), visit, whole());
+    const std::array<std::int32_t, 3> at = position(shell.place);
+    for_blocks({ItemBox::of(at), shell.outer}, [&](const Block& block) {
+      unsigned leaves = block.within(ItemBox::of(at), shell.outer) & block.beyond(at, shell.inner);
+      for (; leaves != 0; leaves &= leaves - 1) {
+        const auto leaf = static_cast<std::size_t>(std::countr_zero(leaves));
+        fours_of(at, block.begin[leaf], block.begin[leaf + 1], visit);
+      }
+    });
   }
-
   /// Calls visit(four) for the samples at places [begin, end), as seen from a position.
   template <class Visit>
   void fours_of(const std::array<std::int32_t, 3>& at, std::size_t begin, std::size_t end, const Visit& visit) const {
@@ -73,19 +73,29 @@ class SampleTree {
     }
   }
 
-  /// Places [begin, end), which lie close together, and the box around them.
+  /// Four leaves side by side, a lane each, some of them empty in small trees: leaf i holds places
+  /// [begin[i], begin[i + 1]).
   struct Block {
-    std::uint32_t begin = 0, end = 0;
-    ItemBox box{};
+    std::array<FourInts, 3> low, high;
+    std::array<std::uint32_t, 5> begin;
+
+    /// A bit for each leaf that comes within a squared distance of a box.
+    [[nodiscard]] unsigned within(const ItemBox& box, float squared) const;
+    /// A bit for each leaf that reaches farther than a squared distance from a position.
+    [[nodiscard]] unsigned beyond(const std::array<std::int32_t, 3>& at, float squared) const;
+    [[nodiscard]] ItemBox box() const;
+    [[nodiscard]] bool holds(std::uint32_t place) const { return place >= begin.front() && place < begin.back(); }
   };
-  static constexpr std::size_t kMostInLeaf = 26;
-  /// A few leaves side by side, that of the place among them.
-  [[nodiscard]] Block block_of(std::uint32_t place) const;
-  /// Calls visit(leaf) for every leaf, a Block, that may hold samples within the squared distance of a box, in the
-  /// order of places.
+  [[nodiscard]] const Block& block_of(std::uint32_t place) const;
+  /// Within a squared distance of a box.
+  struct Around {
+    ItemBox box;
+    float squared;
+  };
+  /// Calls visit(block) for all blocks that may hold such samples, and maybe others, in the order of places.
   template <class Visit>
-  void around(const ItemBox& box, float squared, const Visit& visit) const {
-    if (!order_.empty()) around({&box, squared, {}}, visit, whole());
+  void for_blocks(const Around& around, const Visit& visit) const {
+    for_blocks(around, {}, visit, {0, 0});
   }
 
   [[nodiscard]] std::array<std::int32_t, 3> position(std::uint32_t place) const {
@@ -96,8 +106,6 @@ class SampleTree {
     return {static_cast<float>(at_[0][b] - at_[0][a]), static_cast<float>(at_[1][b] - at_[1][a]),
             static_cast<float>(at_[2][b] - at_[2][a])};
   }
-  [[nodiscard]] const std::vector<std::int32_t>& axis(int a) const { return at_[static_cast<std::size_t>(a)]; }
-  [[nodiscard]] PlacedAxes axes() const { return {at_[0].data(), at_[1].data(), at_[2].data()}; }
 
  private:
   struct Node {
@@ -105,93 +113,51 @@ class SampleTree {
     int axis = 0;
   };
   struct Query;
+  static constexpr std::size_t kMostInLeaf = 13;
 
-  /// What lies below a node: places [begin, end).
-  struct Subtree {
-    std::size_t node = 0, begin = 0, end = 0;
+  /// A node or, below all nodes, a block.
+  struct Below {
+    std::size_t node = 0;
     int depth = 0;
+    [[nodiscard]] Below lower() const { return {2 * node + 1, depth + 1}; }
+    [[nodiscard]] Below upper() const { return {2 * node + 2, depth + 1}; }
+  };
+  /// What is put in order below a node: places [begin, end).
+  struct Range {
+    std::size_t begin = 0, end = 0;
     [[nodiscard]] std::size_t middle() const { return begin + (end - begin) / 2; }
-    [[nodiscard]] Subtree lower() const { return {2 * node + 1, begin, middle(), depth + 1}; }
-    [[nodiscard]] Subtree upper() const { return {2 * node + 2, middle(), end, depth + 1}; }
   };
-  [[nodiscard]] Subtree whole() const { return {0, 0, order_.size(), 0}; }
 
-  void build(std::span<TreeItem> items, const Subtree& tree);
-  void search(Query& q, const Subtree& tree, float squared) const;
+  [[nodiscard]] const Block& block_at(const Below& below) const { return blocks_[below.node - nodes_.size()]; }
+  void build(std::span<TreeItem> items, const Range& range, const Below& below);
+  void build_block(std::span<TreeItem> items, const Range& range, Block& block);
+  void search(Query& q, const Below& below, float squared) const;
 
+  /// `outside`: by axis, how far below a node all lies outside of the box.
   template <class Visit>
-  void fours_within(const Shell& shell, const std::array<std::int32_t, 3>& at, const Visit& visit,
-                    const Subtree& tree) const {
-    if (tree.depth == depth_) {
-      const ItemBox& box = boxes_[tree.node - nodes_.size()];
-      if (box.squared_to(at) <= shell.outer && box.farthest_squared_to(at) > shell.inner)
-        fours_of(at, tree.begin, tree.end, visit);
+  void for_blocks(const Around& around, const std::array<float, 3>& outside, const Visit& visit,
+                  const Below& below) const {
+    if (below.depth == depth_) {
+      visit(block_at(below));
       return;
     }
-    const Node& n = nodes_[tree.node];
-    const auto side = static_cast<float>(at[static_cast<std::size_t>(n.axis)] - n.split);
-    if (side <= 0 || side * side <= shell.outer) fours_within(shell, at, visit, tree.lower());
-    if (side >= 0 || side * side <= shell.outer) fours_within(shell, at, visit, tree.upper());
-  }
-
-  /// A box, how far around it, and by axis how far the node in question lies outside of it.
-  struct Around {
-    const ItemBox* box;
-    float squared;
-    std::array<float, 3> outside;
-  };
-  template <class Visit>
-  void around(const Around& here, const Visit& visit, const Subtree& tree) const {
-    if (tree.depth == depth_) {
-      const ItemBox& box = boxes_[tree.node - nodes_.size()];
-      if (box.squared_to(*here.box) <= here.squared)
-        visit(Block{static_cast<std::uint32_t>(tree.begin), static_cast<std::uint32_t>(tree.end), box});
-      return;
-    }
-    const Node& n = nodes_[tree.node];
+    const Node& n = nodes_[below.node];
     const auto axis = static_cast<std::size_t>(n.axis);
-    const auto go = [&](std::int32_t past, const Subtree& half) {
-      Around there = here;
-      there.outside[axis] = std::max(there.outside[axis], static_cast<float>(past));
-      const auto& d = there.outside;
-      if (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] <= there.squared) around(there, visit, half);
+    const auto go = [&](std::int32_t past, const Below& half) {
+      std::array<float, 3> d = outside;
+      d[axis] = std::max(d[axis], static_cast<float>(past));
+      if (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] <= around.squared) for_blocks(around, d, visit, half);
     };
-    go(here.box->low[axis] - n.split, tree.lower());
-    go(n.split - here.box->high[axis], tree.upper());
-  }
-
-  template <class Visit>
-  void within(std::uint32_t place, float squared, const Visit& visit, const Subtree& tree) const {
-    if (tree.depth == depth_) {
-      // Distances of the whole leaf first: several at once.
-      const std::size_t n = tree.end - tree.begin;
-      std::array<std::array<float, kMostInLeaf>, 3> d;
-      std::array<float, kMostInLeaf> d2;
-      for (std::size_t a = 0; a < 3; ++a) {
-        const std::int32_t* const at = at_[a].data() + tree.begin;
-        const std::int32_t from = at_[a][place];
-        for (std::size_t i = 0; i < n; ++i) d[a][i] = static_cast<float>(at[i] - from);
-      }
-      for (std::size_t i = 0; i < n; ++i) d2[i] = d[0][i] * d[0][i] + d[1][i] * d[1][i] + d[2][i] * d[2][i];
-      for (std::size_t i = 0; i < n; ++i) {
-        if (d2[i] > squared || tree.begin + i == place) continue;
-        visit(Neighbour{d2[i], static_cast<std::uint32_t>(tree.begin + i)},
-              std::array<float, 3>{d[0][i], d[1][i], d[2][i]});
-      }
-      return;
-    }
-    const Node& n = nodes_[tree.node];
-    const auto side = static_cast<float>(at_[static_cast<std::size_t>(n.axis)][place] - n.split);
-    if (side <= 0 || side * side <= squared) within(place, squared, visit, tree.lower());
-    if (side >= 0 || side * side <= squared) within(place, squared, visit, tree.upper());
+    go(around.box.low[axis] - n.split, below.lower());
+    go(n.split - around.box.high[axis], below.upper());
   }
 
   /// By place; behind the last one there are some more numbers, so that four can be loaded from anywhere.
   std::array<std::vector<std::int32_t>, 3> at_;
   std::vector<std::uint32_t> order_;
-  std::vector<Node> nodes_;     ///< a heap: the children of i are 2 i + 1 and 2 i + 2; all leaves are at one depth
-  std::vector<ItemBox> boxes_;  ///< of the leaves
-  int depth_ = 0;
+  std::vector<Node> nodes_;  ///< a heap: the children of i are 2 i + 1 and 2 i + 2
+  std::vector<Block> blocks_;
+  int depth_ = 0;  ///< of all blocks
 };
 
 }  // namespace lamina
