@@ -1,5 +1,7 @@
 #include "edit/rows.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_pipeline.h>
 #include <tbb/parallel_sort.h>
 
@@ -118,11 +120,19 @@ void RecordSorter::spill() {
   sort_held();
   Run run;
   run.next = file_.size();
-  std::vector<std::byte> record(kKeyBytes + record_bytes_);
-  for (const Held& held : held_) {
-    std::memcpy(record.data(), &held.key, kKeyBytes);
-    std::memcpy(record.data() + kKeyBytes, record_of(held), record_bytes_);
-    file_.append(record, writer_);
+  const std::size_t whole = kKeyBytes + record_bytes_;
+  std::vector<std::byte> piece;
+  for (std::size_t first = 0; first < held_.size(); first += kRows) {
+    const std::size_t n = std::min<std::size_t>(kRows, held_.size() - first);
+    piece.resize(n * whole);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 2048), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+        const Held& held = held_[first + i];
+        std::memcpy(piece.data() + i * whole, &held.key, kKeyBytes);
+        std::memcpy(piece.data() + i * whole + kKeyBytes, record_of(held), record_bytes_);
+      }
+    });
+    file_.append(piece, writer_);
   }
   run.end = file_.size();
   runs_.push_back(std::move(run));

@@ -1,6 +1,8 @@
 #include "normals/row_normals.h"
 
 #include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -57,6 +59,11 @@ class WithRowNormals final : public WithNormals {
 
 }  // namespace
 
+void write_record(const RowRecord& record, std::byte* to) {
+  std::memcpy(to, record.code.data(), sizeof(NormalCode));
+  std::memcpy(to + sizeof(NormalCode), &record.node, sizeof record.node);
+}
+
 NormalCode code_of(const std::array<float, 3>& normal) {
   NormalCode code{};
   pack_normals({&normal[0], &normal[1], &normal[2]}, 1, {&code[0], &code[1], &code[2]});
@@ -68,6 +75,7 @@ RowNormals::RowNormals(edit::RecordSorter& records, const PatchSigns& signs, std
     : file_(directory) {
   BackgroundWriter writer(SpillFile::kBufferBytes, 4);
   std::vector<NormalCode> codes;
+  std::vector<NormalCode> signed_codes;
   std::uint64_t next = 0;
   const auto write = [&] {
     file_.append(std::as_bytes(std::span(codes)), writer);
@@ -82,10 +90,16 @@ RowNormals::RowNormals(edit::RecordSorter& records, const PatchSigns& signs, std
   };
   records.drain(kRowsAtOnce, [&](std::span<const std::uint64_t> keys, const std::byte* bytes) {
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
+    signed_codes.resize(keys.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, keys.size(), 1024), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+        const RowRecord r = record_at(bytes + i * kRecordBytes);
+        signed_codes[i] = r.node != kNoNode && signs.sign[r.node] < 0 ? turned(r.code) : r.code;
+      }
+    });
     for (std::size_t i = 0; i < keys.size(); ++i) {
       skip_to(keys[i]);
-      const RowRecord r = record_at(bytes + i * kRecordBytes);
-      codes.push_back(r.node != kNoNode && signs.sign[r.node] < 0 ? turned(r.code) : r.code);
+      codes.push_back(signed_codes[i]);
       if (codes.size() == kRowsAtOnce) write();
     }
     if (run.progress) run.progress({"signs", next, rows, 0, 0});

@@ -34,6 +34,7 @@ struct RowRecord {
   std::uint32_t node = 0;
 };
 inline constexpr std::size_t kRecordBytes = 10;
+void write_record(const RowRecord& record, std::byte* to);
 
 class RowNormals {
  public:

@@ -32,10 +32,23 @@ void append_all(const WindowSamples& from, WindowSamples& to) {
               [](const auto& source, auto& target) { target.insert(target.end(), source.begin(), source.end()); });
 }
 
+/// Of the samples with z in low..high.
+std::vector<std::uint32_t> places_between(const WindowSamples& samples, std::int64_t low, std::int64_t high) {
+  std::vector<std::uint32_t> places;
+  for (std::uint32_t i = 0; i < samples.size(); ++i) {
+    if (samples.z[i] >= low && samples.z[i] <= high) places.push_back(i);
+  }
+  return places;
+}
+
 }  // namespace
 
-void WindowSamples::append(const WindowSamples& from, std::size_t i) {
-  for_columns(from, *this, [i](const auto& source, auto& target) { target.push_back(source[i]); });
+void WindowSamples::append(const WindowSamples& from, std::span<const std::uint32_t> which) {
+  for_columns(from, *this, [which](const auto& source, auto& target) {
+    const std::size_t before = target.size();
+    target.resize(before + which.size());
+    for (std::size_t i = 0; i < which.size(); ++i) target[before + i] = source[which[i]];
+  });
 }
 
 void WindowSamples::gather(const WindowSamples& from, std::span<const std::uint32_t> order) {
@@ -102,11 +115,8 @@ void SampleWindow::load(std::size_t bucket) {
 
 /// Drops samples below the halo of the slab.
 void SampleWindow::keep_what_is_near() {
-  WindowSamples kept;
-  for (std::size_t i = 0; i < samples_.size(); ++i) {
-    if (samples_.z[i] >= slab_.low - settings_.halo && samples_.z[i] < slab_.low) kept.append(samples_, i);
-  }
-  before_ = std::move(kept);
+  before_ = {};
+  before_.append(samples_, places_between(samples_, slab_.low - settings_.halo, slab_.low - 1));
 }
 
 bool SampleWindow::advance() {
@@ -127,9 +137,7 @@ bool SampleWindow::advance() {
   }
   const std::size_t end = all.size();
   for (const WindowSamples& bucket : ahead_) {
-    for (std::size_t i = 0; i < bucket.size(); ++i) {
-      if (bucket.z[i] <= slab_.high + settings_.halo) all.append(bucket, i);
-    }
+    all.append(bucket, places_between(bucket, std::numeric_limits<std::int32_t>::min(), slab_.high + settings_.halo));
   }
   done_ += end - begin;
   tree_ = std::make_unique<SampleTree>(all.x, all.y, all.z);

@@ -30,7 +30,7 @@ struct WindowSamples {
 
   [[nodiscard]] std::size_t size() const { return x.size(); }
   [[nodiscard]] bool has_normal(std::size_t i) const { return nx[i] != 0 || ny[i] != 0 || nz[i] != 0; }
-  void append(const WindowSamples& from, std::size_t i);
+  void append(const WindowSamples& from, std::span<const std::uint32_t> which);
   /// Sample i becomes from[order[i]].
   void gather(const WindowSamples& from, std::span<const std::uint32_t> order);
 };

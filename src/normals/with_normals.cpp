@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <cmath>
@@ -178,32 +180,40 @@ class Job {
 
   void hand_over(const WindowSamples& s, const Links& links, const std::vector<std::array<float, 3>>& given,
                  edit::RecordSorter& records) {
-    std::vector<std::uint64_t> rows;
-    std::vector<std::byte> bytes;
-    rows.reserve(links.core.size());
-    bytes.reserve(links.core.size() * kRecordBytes);
-    for (std::size_t i = 0; i < links.core.size(); ++i) {
-      const std::uint32_t p = links.core[i];
-      if (!s.has_normal(p)) ++report_.without;
-      if (settings_.mode == NormalsMode::check || (settings_.mode == NormalsMode::complete && s.given[p] != 0))
-        continue;
-      RowRecord r{kNoNormal, s.node[p]};
-      if (s.has_normal(p)) {
-        if (s.given[p] != 0) {
-          r.code = s.nx[p] * given[i][0] + s.ny[p] * given[i][1] + s.nz[p] * given[i][2] < 0 ? kTurn : kKeep;
-          count_given(r);
-        } else {
+    if (settings_.mode == NormalsMode::check) {
+      for (const std::uint32_t p : links.core) report_.without += s.has_normal(p) ? 0 : 1;
+      return;
+    }
+    std::vector<std::uint64_t> rows(links.core.size());
+    std::vector<RowRecord> made(links.core.size());
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, rows.size(), 4096), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+        const std::uint32_t p = links.core[i];
+        rows[i] = s.row[p];
+        made[i] = {kNoNormal, s.node[p]};
+        if (!s.has_normal(p)) continue;
+        if (s.given[p] == 0) {
           const Eigen::Vector3d n = turn_ * Eigen::Vector3d(s.nx[p], s.ny[p], s.nz[p]);
-          r.code = code_of({static_cast<float>(n.x()), static_cast<float>(n.y()), static_cast<float>(n.z())});
-          ++report_.estimated;
+          made[i].code = code_of({static_cast<float>(n.x()), static_cast<float>(n.y()), static_cast<float>(n.z())});
+        } else if (settings_.mode == NormalsMode::reorient) {
+          const auto& g = given[i];
+          made[i].code = s.nx[p] * g[0] + s.ny[p] * g[1] + s.nz[p] * g[2] < 0 ? kTurn : kKeep;
         }
       }
-      rows.push_back(s.row[p]);
-      const std::size_t at = bytes.size();
-      bytes.resize(at + kRecordBytes);
-      std::memcpy(bytes.data() + at, r.code.data(), sizeof(NormalCode));
-      std::memcpy(bytes.data() + at + sizeof(NormalCode), &r.node, sizeof r.node);
+    });
+    std::vector<std::byte> bytes(rows.size() * kRecordBytes);
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const std::uint32_t p = links.core[i];
+      const bool has = s.has_normal(p);
+      if (!has) ++report_.without;
+      if (settings_.mode == NormalsMode::complete && s.given[p] != 0) continue;
+      if (has && s.given[p] != 0) count_given(made[i]);
+      if (has && s.given[p] == 0) ++report_.estimated;
+      rows[n] = rows[i];
+      write_record(made[i], bytes.data() + kRecordBytes * n++);
     }
+    rows.resize(n);
     records.add(rows, bytes.data());
   }
 

@@ -1,5 +1,7 @@
 #include "samples/sample_tree.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
 #include <tbb/parallel_invoke.h>
 
 #include <algorithm>
@@ -24,17 +26,23 @@ SampleTree::SampleTree(std::span<const std::int32_t> x, std::span<const std::int
   static_assert(kMostInLeaf > kLeaf);
   const std::size_t n = x.size();
   std::vector<TreeItem> items(n);
-  for (std::size_t i = 0; i < n; ++i) items[i] = {{x[i], y[i], z[i]}, static_cast<std::uint32_t>(i)};
+  const tbb::blocked_range<std::size_t> all(0, n, kParallel);
+  tbb::parallel_for(all, [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i)
+      items[i] = {{x[i], y[i], z[i]}, static_cast<std::uint32_t>(i)};
+  });
   while ((n >> depth_) > 4 * kLeaf) ++depth_;
   nodes_.resize((std::size_t{1} << depth_) - 1);
   blocks_.resize(nodes_.size() + 1);
   build(items, {0, n}, {0, 0});
   order_.resize(n);
   for (auto& axis : at_) axis.resize(n + 3);
-  for (std::size_t i = 0; i < n; ++i) {
-    order_[i] = items[i].number;
-    for (std::size_t a = 0; a < 3; ++a) at_[a][i] = items[i].at[a];
-  }
+  tbb::parallel_for(all, [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      order_[i] = items[i].number;
+      for (std::size_t a = 0; a < 3; ++a) at_[a][i] = items[i].at[a];
+    }
+  });
 }
 
 void SampleTree::build(std::span<TreeItem> items, const Range& range, const Below& below) {
