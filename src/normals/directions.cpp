@@ -81,9 +81,6 @@ int look_across(const SampleTree& tree, std::uint32_t place, std::size_t count, 
 /// Of samples outside the slab, and of those whose normals are given.
 constexpr std::uint8_t kNoLevel = 255;
 
-/// Samples that follow one another, neighbours nearly always: what level the first of them needs serves all.
-constexpr std::size_t kSharing = 2;
-
 class DirectionFinder {
  public:
   DirectionFinder(const SampleTree& tree, const DirectionSettings& settings, WindowSamples& samples, Links& links)
@@ -99,13 +96,9 @@ class DirectionFinder {
   }
 
   void run() {
-    const std::size_t n = links_.core.size();
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, (n + kSharing - 1) / kSharing, 256), [&](const auto& range) {
+    tbb::parallel_for(blocks_of_core(), [&](const auto& range) {
       NearestSearch nearest(tree_);
-      for (std::size_t group = range.begin(); group < range.end(); ++group) {
-        std::uint8_t level = kNoLevel;
-        for (std::size_t i = kSharing * group; i < std::min(kSharing * (group + 1), n); ++i) search(i, nearest, level);
-      }
+      for (std::size_t i = range.begin(); i < range.end(); ++i) search(i, nearest);
     });
     // Noise is no matter of single samples: levels that neighbours do not share are chance.
     const std::vector<std::uint8_t> chosen = level_;
@@ -115,13 +108,13 @@ class DirectionFinder {
  private:
   template <class Work>
   void for_core(const Work& work) {
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, links_.core.size(), 512), [&](const auto& range) {
+    tbb::parallel_for(blocks_of_core(), [&](const auto& range) {
       for (std::size_t i = range.begin(); i < range.end(); ++i) work(i);
     });
   }
+  [[nodiscard]] tbb::blocked_range<std::size_t> blocks_of_core() const { return {0, links_.core.size(), 512}; }
 
-  /// `level` is that of the samples before which share it, if one of them has asked for any.
-  void search(std::size_t i, NearestSearch& nearest, std::uint8_t& level) {
+  void search(std::size_t i, NearestSearch& nearest) {
     const auto k = static_cast<std::size_t>(settings_.k);
     const std::uint32_t place = links_.core[i];
     std::array<Neighbour, SampleTree::kMostNeighbours> found;
@@ -153,10 +146,7 @@ class DirectionFinder {
       plane = plane_of_ball(place, plane);
     } else if (taken > 0) {
       reach_[i] = plane.valid() ? squared : 0.0F;
-      const FirstFit first{place, plane, static_cast<double>(taken + 1), reach_[i], bound_};
-      const bool uncertain = is_uncertain(first);
-      if (uncertain && level == kNoLevel) level = choose_level(tree_, first);
-      level_[place] = uncertain ? level : 0;
+      level_[place] = choose_level(tree_, {place, plane, static_cast<double>(taken + 1), reach_[i], bound_});
     }
     set_normal(place, plane);
   }
@@ -245,14 +235,10 @@ bool is_slim(const Plane& plane, double samples) {
 
 }  // namespace
 
-bool is_uncertain(const FirstFit& first) {
-  return first.plane.valid() && tilt_variance(first.plane, first.samples) > kUncertain * kUncertain;
-}
-
 std::uint8_t choose_level(const SampleTree& tree, const FirstFit& first) {
-  if (!is_uncertain(first)) return 0;
   std::array<Estimate, kMostLevel + 1> estimates;
   estimates[0] = {first.plane, tilt_variance(first.plane, first.samples)};
+  if (!first.plane.valid() || estimates[0].tilt <= kUncertain * kUncertain) return 0;
   BallMoments around(tree, first.place);
   std::uint8_t level = 0;
   while (level < kMostLevel && estimates[level].tilt > kCertain * kCertain) {

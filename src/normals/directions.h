@@ -22,8 +22,8 @@ struct DirectionSettings {
 
 /// Finds the links of the samples links.core names, and the normals of those that have none. Where the nearest samples
 /// lie on a line, as those of one scan line do, twice and four times as many are taken; where they are noisy, as many
-/// as the noise asks for and the shape allows (choose_level(), asked for every second sample), about the same at
-/// neighbouring samples. A sample whose neighbours make no plane is left without a normal.
+/// as the noise asks for and the shape allows (choose_level()), about the same at neighbouring samples. A sample
+/// whose neighbours make no plane is left without a normal.
 void find_directions(const SampleTree& tree, const DirectionSettings& settings, WindowSamples& samples, Links& links);
 
 // How far around a sample its plane must reach: among noise the nearest samples say little about the surface's
@@ -41,9 +41,6 @@ struct FirstFit {
   float squared = 0;   ///< distance of the farthest of them, steps^2
   float bound = 0;     ///< likewise: farther samples are no neighbours
 };
-
-/// Whether noise of the first plane's samples leaves its direction open by more than a few degrees.
-bool is_uncertain(const FirstFit& first);
 
 /// The level from which on the direction is certain to a degree or two, or the last one that agrees with those before
 /// it: a plane of more samples must lie within the uncertainty of the planes of fewer (Lepski's rule), its residual
