@@ -228,14 +228,28 @@ struct Side {
   }
 };
 
+void add_sides(const std::vector<PlaneTriangle>& triangles, std::uint32_t t, std::vector<Side>& sides) {
+  for (std::size_t k = 0; k < 3; ++k) sides.push_back({edge_of(triangles[t][k], triangles[t][(k + 1) % 3]), t});
+}
+
 std::vector<Side> sides_of(const std::vector<PlaneTriangle>& triangles) {
   std::vector<Side> sides;
   sides.reserve(3 * triangles.size());
-  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
-    for (std::size_t k = 0; k < 3; ++k) sides.push_back({edge_of(triangles[t][k], triangles[t][(k + 1) % 3]), t});
-  }
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) add_sides(triangles, t, sides);
   std::sort(sides.begin(), sides.end());
   return sides;
+}
+
+/// Those of some triangles anew; the others keep their order.
+void renew_sides(const std::vector<PlaneTriangle>& triangles, const std::vector<bool>& changed,
+                 std::vector<Side>& sides) {
+  std::erase_if(sides, [&](const Side& s) { return changed[s.triangle]; });
+  const auto kept = static_cast<std::ptrdiff_t>(sides.size());
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    if (changed[t]) add_sides(triangles, t, sides);
+  }
+  std::sort(sides.begin() + kept, sides.end());
+  std::inplace_merge(sides.begin(), sides.begin() + kept, sides.end());
 }
 
 std::uint32_t opposite(const PlaneTriangle& t, const Edge& e) {
@@ -245,10 +259,9 @@ std::uint32_t opposite(const PlaneTriangle& t, const Edge& e) {
   return t[0];
 }
 
-/// Flips what it can in one pass; false: all edges are Delaunay's.
-bool flip_once(const std::vector<Vec2>& points, std::vector<PlaneTriangle>& triangles,
+/// Flips what it can in one pass over the triangles' sides; false: all edges are Delaunay's.
+bool flip_once(const std::vector<Vec2>& points, std::vector<PlaneTriangle>& triangles, std::vector<Side>& sides,
                const std::function<bool(std::uint32_t, std::uint32_t)>& allowed) {
-  const std::vector<Side> sides = sides_of(triangles);
   const auto is_edge = [&](const Edge& e) {
     const auto at = std::lower_bound(sides.begin(), sides.end(), Side{e, 0});
     return at != sides.end() && at->edge == e;
@@ -271,13 +284,15 @@ bool flip_once(const std::vector<Vec2>& points, std::vector<PlaneTriangle>& tria
     triangles[right] = {d, e[1], c};
     touched[left] = touched[right] = true;
   }
+  if (!made.empty()) renew_sides(triangles, touched, sides);
   return !made.empty();
 }
 
 void flip_all(const std::vector<Vec2>& points, std::vector<PlaneTriangle>& triangles,
               const std::function<bool(std::uint32_t, std::uint32_t)>& allowed) {
   constexpr int kMostPasses = 50;
-  for (int pass = 0; pass < kMostPasses && flip_once(points, triangles, allowed);) ++pass;
+  std::vector<Side> sides = sides_of(triangles);
+  for (int pass = 0; pass < kMostPasses && flip_once(points, triangles, sides, allowed);) ++pass;
 }
 
 /// Splits edges within that are not allowed in their middle.
