@@ -22,6 +22,7 @@ class NearestSearch {
 
  private:
   void gather(std::uint32_t place, std::size_t k, float bound);
+
   const SampleTree& tree_;
   const SampleTree::Block* block_ = nullptr;
   std::size_t k_ = 0;

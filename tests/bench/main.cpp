@@ -32,6 +32,7 @@ int main(int argc, char** argv) {
   const bench::Scene coloured = bench::make_scene("bumpy-sphere", samples, true, folder.path());
   bench::add_input_benches(plain, "");
   bench::add_input_benches(coloured, "/colour");
+  bench::add_normal_benches(plain);
   bench::add_kernel_benches();
   bench::add_project_benches(plain, "");
   bench::add_project_benches(coloured, "/colour");

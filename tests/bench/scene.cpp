@@ -65,8 +65,8 @@ Scene make_scene(const std::string& shape, std::uint64_t count, bool colours, co
   const Frame frame = choose_frame(survey, s.settings.frame.value_or(FrameMode::pca));
   s.cloud =
       std::make_unique<StoredCloud>(StoredCloud{s.source->info(), frame, ingest(*s.source, survey, frame, folder, {})});
-  s.plan =
-      make_plan(s.settings, *s.cloud, {survey_radii(s.cloud->ingested.store, kSurveySamples, s.settings.density), {}});
+  s.plan = make_plan(s.settings, *s.cloud,
+                     {survey_radii(s.cloud->ingested.store, kSurveySamples, s.settings.density), false, {}});
   return s;
 }
 
