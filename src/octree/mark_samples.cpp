@@ -21,7 +21,7 @@ void set_bits(BlockMask& mask, int layer, std::uint64_t bits) {
 
 typedef std::int16_t FourRows __attribute__((vector_size(8)));  // NOLINT(modernize-use-using)
 
-/// FourFloats rows of 16 bits, from the lowest bits up.
+/// Four rows of 16 bits, from the lowest bits up.
 using RowWord = std::uint64_t;
 
 /// A sample as its cell sees it: all in cells, from the cell's low corner.

@@ -12,6 +12,7 @@
 namespace lamina {
 namespace {
 
+constexpr std::size_t kMostWanted = 16;  ///< more of them are left to the tree, with all that the guess lets in
 constexpr std::size_t kMostBlocks = 24;  ///< from more of them on the tree is faster
 constexpr float kGuessedReach = 1.2F;    ///< of the distance to the k-th neighbour of the sample before
 constexpr float kGatheredReach = 1.6F;   ///< likewise: farther ones are left to the tree
@@ -144,7 +145,7 @@ void NearestSearch::gather(std::uint32_t place, std::size_t k, float bound) {
   k_ = k;
   bound_ = bound;
   around_.clear();
-  std::array<Neighbour, NearestFew::kFew> found;
+  std::array<Neighbour, kMostWanted> found;
   if (k == 0 || k > found.size()) return;
   const std::size_t count = tree_.nearest(place, k, bound, found.data());
   farthest_ = std::sqrt(count == k ? found[k - 1].squared : bound);

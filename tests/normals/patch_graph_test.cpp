@@ -123,6 +123,29 @@ RC_GTEST_PROP(PatchSigns, FindHiddenSigns, ()) {
   RC_ASSERT(s.components == components);
 }
 
+// Each patch of a small body is looked from; of a large one some, which stand for as many as there are.
+TEST(Looks, StandForAllPatchesOfTheirBody) {
+  constexpr std::uint32_t kSmall = 100;
+  constexpr std::uint32_t kLarge = 50'000;
+  std::vector<std::uint32_t> root{0, 0};  // the fixed node, and one that is joined to it
+  root.insert(root.end(), kSmall, 2);
+  root.insert(root.end(), kLarge, 2 + kSmall);
+  const std::vector<float> looks = choose_looks(root);
+  ASSERT_EQ(looks.size(), root.size());
+  EXPECT_EQ(looks[0], 0);
+  EXPECT_EQ(looks[1], 0);
+  for (std::size_t i = 2; i < 2 + kSmall; ++i) EXPECT_EQ(looks[i], 1);
+  double sum = 0;
+  std::size_t looked = 0;
+  for (std::size_t i = 2 + kSmall; i < looks.size(); ++i) {
+    sum += double{looks[i]};
+    looked += looks[i] > 0 ? 1 : 0;
+  }
+  EXPECT_NEAR(sum, kLarge, 0.001 * kLarge);
+  EXPECT_LT(looked, kLarge / 10);
+  EXPECT_GT(looked, 2000U);
+}
+
 RC_GTEST_PROP(SignedUnionFind, KeepsSignsRelativeToTheRoot, ()) {
   constexpr std::uint32_t kMany = 40;
   const auto hidden = *rc::gen::container<std::vector<int>>(kMany, rc::gen::element(-1, 1));
