@@ -22,6 +22,9 @@ inline FourInts load_four(const std::int32_t* from) {
 inline FourFloats to_floats(const FourInts& v) {
   return __builtin_convertvector(v, FourFloats);
 }
+inline FourFloats floor_of(const FourFloats& v) {
+  return std::bit_cast<FourFloats>(_mm_floor_ps(std::bit_cast<__m128>(v)));
+}
 /// A bit for each of the four that a comparison holds for.
 inline unsigned bits_of(const FourInts& mask) {
   return static_cast<unsigned>(_mm_movemask_ps(std::bit_cast<__m128>(mask)));

@@ -33,13 +33,15 @@ class TileExtender {
     level_ = level;
     leaf_ = t.leaf;
     layers_ = layers;
-    gathered_ = false;
-    std::array<std::uint64_t, 8> spread{};  // corners beside trusted ones
-    bits::dilate_layers<-1, 1>(trusted_around(), layers.begin, layers.end, &spread[layers.begin]);
+    std::array<std::uint64_t, 8> beside{};  // corners beside trusted ones, not trusted themselves
+    bits::dilate_layers<-1, 1>(trusted_around(), layers.begin, layers.end, &beside[layers.begin]);
+    std::uint64_t any = 0;
+    for (int z = layers.begin; z < layers.end; ++z) any |= beside[z] &= wanted(z);
+    if (any != 0) gather_field(beside);
     for (int z = layers.begin; z < layers.end; ++z) {
       const std::uint64_t corners = leaf_->corners.words[z];
       if (corners == 0) continue;
-      const Signs signs = signs_of_layer(t, z, spread[z]);
+      const Signs signs = signs_of_layer(t, z, beside[z]);
       leaf_->outside.words[z] = signs.outside & corners;
       leaf_->defined.words[z] = signs.defined & corners;
       leaf_->supported.words[z] = signs.supported & corners;
@@ -47,7 +49,12 @@ class TileExtender {
   }
 
  private:
-  Signs signs_of_layer(const Tile& t, int z, std::uint64_t beside_trusted) {
+  /// Corners of the layer that have no trusted value of their own.
+  [[nodiscard]] std::uint64_t wanted(int z) const {
+    return leaf_->corners.words[z] & ~leaf_->shared.words[z] & ~leaf_->trusted.words[z];
+  }
+
+  Signs signs_of_layer(const Tile& t, int z, std::uint64_t beside) const {
     const std::uint64_t shared = leaf_->shared.words[z];
     const std::uint64_t trusted = leaf_->trusted.words[z];
     const std::uint64_t own = leaf_->outside.words[z];  // as projection left them
@@ -56,11 +63,11 @@ class TileExtender {
     signs.outside |= own & trusted & ~shared;
     signs.defined |= trusted & ~shared;
     signs.supported |= leaf_->seen.words[z] & ~shared;
-    if (const std::uint64_t wanted = leaf_->corners.words[z] & ~shared & ~trusted; wanted != 0) {
+    if (const std::uint64_t all = wanted(z); all != 0) {
       Signs extended;
-      if (const std::uint64_t beside = wanted & beside_trusted; beside != 0) extended = extended_signs(z, beside);
+      if (beside != 0) extended = extended_signs(z, beside);
       // Nobody to extend from.
-      const std::uint64_t lone = wanted & ~extended.defined;
+      const std::uint64_t lone = all & ~extended.defined;
       std::uint64_t alone = lone & leaf_->seen.words[z];
       if (alone != 0) alone &= ~beyond(z, kOwnOffset);
       signs.outside |= (extended.outside & extended.defined) | (lone & ~alone) | (own & alone);
@@ -85,9 +92,7 @@ class TileExtender {
   }
 
   /// Of the layer's corners in `wanted`, by the planes of their trusted neighbours.
-  Signs extended_signs(int z, std::uint64_t wanted) {
-    if (!gathered_) gather_field();
-    gathered_ = true;
+  [[nodiscard]] Signs extended_signs(int z, std::uint64_t wanted) const {
     const auto cell = static_cast<float>(window_.lattice().cell_size(level_));
     Signs out;
     for (int y = 0; y < 8; ++y) {
@@ -128,28 +133,41 @@ class TileExtender {
     std::int8_t x, y, z;
   };
 
-  /// Records lie anywhere in memory: all are asked for before the first is looked at.
-  void gather_field() {
+  /// Of the trusted corners those beside corners in `beside`, layer by layer. Records lie anywhere in memory: all are
+  /// asked for before the first is looked at.
+  void gather_field(const std::array<std::uint64_t, 8>& beside) {
+    const auto layer = [&](int z) { return z >= 0 && z < 8 ? beside[z] : 0; };
     found_count_ = 0;
     for (int z = layers_.begin - 1; z <= layers_.end; ++z) {
+      const std::uint64_t near = layer(z - 1) | layer(z) | layer(z + 1);
+      if (near == 0) continue;
       for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) find_records(dx, dy, z);
+        for (int dx = -1; dx <= 1; ++dx) find_records(dx, dy, z, along_x(along_y(near, dy), dx));
       }
     }
     field_.clear(layers_.begin, layers_.end);
     for (const Found& f : std::span(found_.data(), found_count_)) field_.put(f.x, f.y, f.z, plane_of(f.record));
   }
 
-  /// Of layer z, in [-1, 8], of the block's neighbour at (dx, dy) across the sweep axis.
-  void find_records(int dx, int dy, int z) {
+  /// The corners beside those of a layer, in the block `dx` (`dy`) blocks away.
+  static std::uint64_t along_x(std::uint64_t w, int dx) {
+    constexpr std::uint64_t kFirst = 0x0101010101010101ULL, kLast = 0x8080808080808080ULL;
+    if (dx < 0) return (w & kFirst) << 7;
+    if (dx > 0) return (w & kLast) >> 7;
+    return w | (w & ~kLast) << 1 | (w & ~kFirst) >> 1;
+  }
+  static std::uint64_t along_y(std::uint64_t w, int dy) {
+    if (dy < 0) return w << 56;
+    if (dy > 0) return w >> 56;
+    return w | w << 8 | w >> 8;
+  }
+
+  /// Trusted ones among `wanted`, of layer z, in [-1, 8], of the block's neighbour at (dx, dy) across the sweep axis.
+  void find_records(int dx, int dy, int z, std::uint64_t wanted) {
     const CornerBlock* const from = leaf_->around[CornerBlock::towards(dx, dy, z >> 3)];
-    if (from == nullptr) return;
+    if (from == nullptr || wanted == 0) return;
     const int layer = z & 7;
-    std::uint64_t w = from->trusted.words[layer];
-    if (dx < 0) w &= 0x8080808080808080ULL;
-    if (dx > 0) w &= 0x0101010101010101ULL;
-    if (dy < 0) w &= 0xFF00000000000000ULL;
-    if (dy > 0) w &= 0x00000000000000FFULL;
+    std::uint64_t w = from->trusted.words[layer] & wanted;
     if (w == 0) return;
     const CornerValues& values = from->values[window_.slab_in_leaf(level_, layer)];
     if (values.count == 0) return;
@@ -172,7 +190,6 @@ class TileExtender {
   int level_ = 0;
   CornerBlock* leaf_ = nullptr;
   LeafLayers layers_{0, 0};
-  bool gathered_ = false;  ///< the tile's field
   std::array<Found, 1000> found_;
   std::size_t found_count_ = 0;
 };

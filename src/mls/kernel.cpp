@@ -10,7 +10,8 @@
 namespace lamina {
 
 void TileSamples::resize(std::size_t n, std::size_t attribute_count) {
-  for (std::vector<float>* v : {&x, &y, &z, &nx, &ny, &nz, &support, &inv_support2, &inv_band2, &weight}) v->resize(n);
+  all.resize(n);
+  for (std::vector<float>* v : {&x, &y, &z, &inv_support2}) v->resize(n);
   attributes.resize(attribute_count);
   for (std::vector<float>& a : attributes) a.resize(n);
 }

@@ -34,15 +34,28 @@ enum Sum : int {
 inline constexpr std::size_t kResidualSums = 2;
 
 /// Samples of a tile, structure of arrays, in cells of the level relative to the tile's origin.
+struct TileSample {
+  float x, y, z;
+  float inv_support2;  ///< 1 / R^2
+  float nx, ny, nz;
+  float weight;     ///< q_i
+  float support;    ///< R
+  float inv_band2;  ///< 1 / band^2
+};
+
 struct TileSamples {
-  std::vector<float> x, y, z, nx, ny, nz;
-  std::vector<float> support;       ///< R
-  std::vector<float> inv_support2;  ///< 1 / R^2
-  std::vector<float> inv_band2;     ///< 1 / band^2
-  std::vector<float> weight;        ///< q_i
-  bool banded = true;               ///< some sample's band is narrower than its support
+  std::vector<TileSample> all;               ///< what sums take: a sample, and all of it
+  std::vector<float> x, y, z, inv_support2;  ///< what tells those near a box, several samples at once
+  bool banded = true;                        ///< some sample's band is narrower than its support
   std::vector<std::vector<float>> attributes;
   void resize(std::size_t n, std::size_t attribute_count);
+  void put(std::size_t i, const TileSample& s) {
+    all[i] = s;
+    x[i] = s.x;
+    y[i] = s.y;
+    z[i] = s.z;
+    inv_support2[i] = s.inv_support2;
+  }
 };
 
 struct SampleRange {

@@ -1,8 +1,8 @@
 // The kernel's sums over the samples of a sheet (mls/creases.h); included by kernel_source.h, inside its namespace. No
 // include guard on purpose.
 
-/// Calls add(i, dx, dy, dz, d2, w) for the samples that act on the queries' box; w > 0 in the lanes in whose region
-/// they are.
+/// Calls add(sample, dx, dy, dz, d2, w) for the samples that act on the queries' box; w > 0 in the lanes in whose
+/// region they are.
 template <typename Add>
 void for_region(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query,
                 const NormalRegion& region, const Add& add) {
@@ -12,20 +12,20 @@ void for_region(const TileSamples& s, const SampleRange* ranges, int count, cons
   std::array<std::uint32_t, Picker::kMost> picked;
   while (const int n = picker.next(picked.data())) {
     for (int k = 0; k < n; ++k) {
-      const std::uint32_t i = picked[k];
-      const Vec dx = splat(s.x[i]) - vec(query.x);
-      const Vec dy = splat(s.y[i]) - vec(query.y);
-      const Vec dz = splat(s.z[i]) - vec(query.z);
+      const TileSample& p = s.all[picked[k]];
+      const Vec dx = splat(p.x) - vec(query.x);
+      const Vec dy = splat(p.y) - vec(query.y);
+      const Vec dz = splat(p.z) - vec(query.z);
       const Vec d2 = dx * dx + dy * dy + dz * dz;
       const auto along = [&](const Queries& axis) {
-        return splat(s.nx[i]) * vec(axis.x) + splat(s.ny[i]) * vec(axis.y) + splat(s.nz[i]) * vec(axis.z);
+        return splat(p.nx) * vec(axis.x) + splat(p.ny) * vec(axis.y) + splat(p.nz) * vec(axis.z);
       };
-      Vec t = one - d2 * splat(s.inv_support2[i]);
+      Vec t = one - d2 * splat(p.inv_support2);
       t = along(region.first) >= vec(region.first_least) ? t : zero;
       t = along(region.second) >= vec(region.second_least) ? t : zero;
       const Vec phi = t > zero ? t : zero;
       const Vec phi2 = phi * phi;
-      add(i, dx, dy, dz, d2, splat(s.weight[i]) * (phi2 * phi2));
+      add(p, dx, dy, dz, d2, splat(p.weight) * (phi2 * phi2));
     }
   }
 }
@@ -36,11 +36,11 @@ inline void accumulate_sheet(const TileSamples& s, const SampleRange* ranges, in
   for (int k = 0; k < kSheetSums; ++k) sum[k] = vec(sums[k]);
   for_region(
       s, ranges, count, query, region,
-      [&](std::uint32_t i, const Vec& dx, const Vec& dy, const Vec& dz, const Vec& d2, const Vec& w)
+      [&](const TileSample& p, const Vec& dx, const Vec& dy, const Vec& dz, const Vec& d2, const Vec& w)
           __attribute__((always_inline)) {
-            const Vec nx = splat(s.nx[i]);
-            const Vec ny = splat(s.ny[i]);
-            const Vec nz = splat(s.nz[i]);
+            const Vec nx = splat(p.nx);
+            const Vec ny = splat(p.ny);
+            const Vec nz = splat(p.nz);
             const Vec pn = dx * nx + dy * ny + dz * nz;
             sum[kW] += w;
             sum[kPx] += w * dx;
@@ -51,7 +51,7 @@ inline void accumulate_sheet(const TileSamples& s, const SampleRange* ranges, in
             sum[kNz] += w * nz;
             sum[kPP] += w * d2;
             sum[kPN] += w * pn;
-            sum[kWR] += w * splat(s.support[i]);
+            sum[kWR] += w * splat(p.support);
             sum[kThickness] += w * pn * pn;
           });
   for (int k = 0; k < kSheetSums; ++k) vec(sums[k]) = sum[k];
@@ -63,11 +63,11 @@ inline void accumulate_moments(const TileSamples& s, const SampleRange* ranges, 
   for (int k = 0; k <= kMoments; ++k) sum[k] = vec(moments[k]);
   for_region(
       s, ranges, count, query, region,
-      [&](std::uint32_t i, const Vec&, const Vec&, const Vec&, const Vec&, const Vec& w)
+      [&](const TileSample& p, const Vec&, const Vec&, const Vec&, const Vec&, const Vec& w)
           __attribute__((always_inline)) {
-            const Vec nx = splat(s.nx[i]);
-            const Vec ny = splat(s.ny[i]);
-            const Vec nz = splat(s.nz[i]);
+            const Vec nx = splat(p.nx);
+            const Vec ny = splat(p.ny);
+            const Vec nz = splat(p.nz);
             sum[0] += w * (nx * nx);
             sum[1] += w * (nx * ny);
             sum[2] += w * (nx * nz);

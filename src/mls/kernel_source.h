@@ -123,22 +123,22 @@ void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count,
   while (const int n = picker.next(picked.data())) {
     for (int k = 0; k < n; ++k) {
       const std::uint32_t i = picked[k];
-      const Vec dx = splat(s.x[i]) - qx;
-      const Vec dy = splat(s.y[i]) - qy;
-      const Vec dz = splat(s.z[i]) - qz;
+      const TileSample& p = s.all[i];
+      const Vec dx = splat(p.x) - qx;
+      const Vec dy = splat(p.y) - qy;
+      const Vec dz = splat(p.z) - qz;
       const Vec d2 = dx * dx + dy * dy + dz * dz;
-      Vec t = one - d2 * splat(s.inv_support2[i]);
+      Vec t = one - d2 * splat(p.inv_support2);
       if constexpr (F) {
-        const Vec along =
-            splat(s.nx[i]) * vec(facing.x) + splat(s.ny[i]) * vec(facing.y) + splat(s.nz[i]) * vec(facing.z);
+        const Vec along = splat(p.nx) * vec(facing.x) + splat(p.ny) * vec(facing.y) + splat(p.nz) * vec(facing.z);
         t = along >= zero ? t : zero;
       }
       const Vec phi = t > zero ? t : zero;
       const Vec phi2 = phi * phi;
-      const Vec w = splat(s.weight[i]) * (phi2 * phi2);
-      const Vec snx = splat(s.nx[i]);
-      const Vec sny = splat(s.ny[i]);
-      const Vec snz = splat(s.nz[i]);
+      const Vec w = splat(p.weight) * (phi2 * phi2);
+      const Vec snx = splat(p.nx);
+      const Vec sny = splat(p.ny);
+      const Vec snz = splat(p.nz);
       w_sum += w;
       px += w * dx;
       py += w * dy;
@@ -148,11 +148,11 @@ void accumulate_body(const TileSamples& s, const SampleRange* ranges, int count,
       nz += w * snz;
       pp += w * d2;
       pn += w * (dx * snx + dy * sny + dz * snz);
-      wr += w * splat(s.support[i]);
+      wr += w * splat(p.support);
       seen += t > zero ? one : zero;
       if constexpr (B) {
         // Only samples that contribute: which others are looked at is a matter of tiles and rows.
-        const Vec near = t > zero ? d2 * splat(s.inv_band2[i]) : far;
+        const Vec near = t > zero ? d2 * splat(p.inv_band2) : far;
         nearest = near < nearest ? near : nearest;
       }
       if constexpr (A >= 0) {

@@ -54,7 +54,7 @@ ClusteredBatch Projector::Scratch::load(const NumberedBuckets& batch, SampleFeed
   std::vector<std::shared_ptr<ClusteredBucket>> out(batch.size());
   std::vector<std::size_t> missing;
   std::size_t kept = 0;
-  for (const auto& [number, bucket] : clustered) kept += bucket->x.size();
+  for (const auto& [number, bucket] : clustered) kept += bucket->samples.size();
   for (std::size_t b = 0; b < batch.size(); ++b) {
     const auto known = clustered.find(batch[b]);
     if (known == clustered.end()) {
@@ -72,7 +72,7 @@ ClusteredBatch Projector::Scratch::load(const NumberedBuckets& batch, SampleFeed
   tbb::parallel_for(std::size_t{0}, missing.size(),
                     [&](std::size_t m) { cluster_samples(*loaded[m], lattice, clustering.local(), *out[missing[m]]); });
   for (const std::size_t b : missing) {
-    kept += out[b]->x.size();
+    kept += out[b]->samples.size();
     if (kept <= kKeep) clustered.emplace(batch[b], out[b]);
   }
   return {out.begin(), out.end()};

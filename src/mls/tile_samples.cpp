@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstddef>
+#include <cstring>
 #include <limits>
 #include <tuple>
 
@@ -89,8 +92,7 @@ const std::vector<Keyed>& in_order(const ActiveBucket& bucket, const Lattice& la
   return keyed;
 }
 
-template <typename T>
-void pick(const std::vector<T>& from, const std::vector<Keyed>& order, std::vector<T>& out) {
+void pick(const std::vector<float>& from, const std::vector<Keyed>& order, std::vector<float>& out) {
   resize_anew(out, order.size());
   for (std::size_t k = 0; k < order.size(); ++k) out[k] = from[order[k].sample];
 }
@@ -100,9 +102,9 @@ std::int32_t bounded(double steps) {
 }
 
 /// Widens the cluster's box by a sample's support.
-void include(const ClusteredBucket& b, std::size_t i, SampleCluster& c) {
-  const double radius = static_cast<double>(b.support[i]);
-  const std::array<std::int32_t, 3> p{b.x[i], b.y[i], b.z[i]};
+void include(const ClusterSample& s, SampleCluster& c) {
+  const double radius = static_cast<double>(s.support);
+  const std::array<std::int32_t, 3> p{s.x, s.y, s.z};
   for (int axis = 0; axis < 3; ++axis) {
     c.low[axis] = std::min(c.low[axis], bounded(std::floor(p[axis] - radius)));
     c.high[axis] = std::max(c.high[axis], bounded(std::ceil(p[axis] + radius)));
@@ -119,6 +121,32 @@ std::int32_t ceil_cell(double x) {
 }
 std::int32_t floor_cell(double x) {
   return static_cast<std::int32_t>(std::floor(x));
+}
+
+typedef std::uint32_t FourWords __attribute__((vector_size(16)));  // NOLINT(modernize-use-using)
+
+std::uint32_t word(std::int32_t v) {
+  return static_cast<std::uint32_t>(v);
+}
+
+/// How far a sample lies from a place, in steps; the fourth number is anything. In integers: exact however far both lie
+/// from the frame's origin.
+FourInts from_origin(const ClusterSample& s, const FourWords& origin) {
+  FourWords at;
+  static_assert(offsetof(ClusterSample, y) == 4 && offsetof(ClusterSample, z) == 8);
+  std::memcpy(&at, &s, sizeof(at));
+  return std::bit_cast<FourInts>(at - origin);
+}
+
+/// The row of cells that a sample lies in. By the very coordinates the sums use: what ranges() cuts off lies beyond the
+/// support in these, too.
+std::int32_t row_of(const FourFloats& at) {
+  const FourFloats zero{};
+  const FourFloats last = zero + static_cast<float>(RowSamples::kRows - 1);
+  FourFloats row = floor_of(at) - static_cast<float>(RowSamples::kLow);
+  row = row > zero ? row : zero;
+  const FourInts place = __builtin_convertvector(row < last ? row : last, FourInts);
+  return place[2] * RowSamples::kRows + place[1];
 }
 
 /// Finds tiles by their block: in a dense table of their box where that is not much larger than their number.
@@ -210,15 +238,12 @@ void cluster_samples(const ActiveBucket& bucket, const Lattice& lattice, Cluster
                      ClusteredBucket& out) {
   const std::vector<Keyed>& order = in_order(bucket, lattice, scratch);
   const LocalSamples& s = bucket.samples;
-  pick(s.x, order, out.x);
-  pick(s.y, order, out.y);
-  pick(s.z, order, out.z);
-  pick(s.nx, order, out.nx);
-  pick(s.ny, order, out.ny);
-  pick(s.nz, order, out.nz);
-  pick(bucket.support, order, out.support);
-  pick(bucket.weight, order, out.weight);
-  pick(bucket.band, order, out.band);
+  resize_anew(out.samples, order.size());
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const std::uint32_t i = order[k].sample;
+    out.samples[k] = {s.x[i],  s.y[i],  s.z[i],           bucket.support[i], s.nx[i],
+                      s.ny[i], s.nz[i], bucket.weight[i], bucket.band[i]};
+  }
   out.attributes.resize(s.attributes.size() + (bucket.residual.empty() ? 0 : kResidualSums));
   for (std::size_t a = 0; a < s.attributes.size(); ++a) pick(s.attributes[a], order, out.attributes[a]);
   if (!bucket.residual.empty()) {
@@ -233,7 +258,7 @@ void cluster_samples(const ActiveBucket& bucket, const Lattice& lattice, Cluster
       if (k > 0) out.clusters.back().end = static_cast<std::uint32_t>(k);
       out.clusters.push_back({static_cast<std::uint32_t>(k), 0, {kMost, kMost, kMost}, {kLeast, kLeast, kLeast}});
     }
-    include(out, k, out.clusters.back());
+    include(out.samples[k], out.clusters.back());
   }
   if (!order.empty()) out.clusters.back().end = static_cast<std::uint32_t>(order.size());
 }
@@ -269,61 +294,29 @@ void RowSamples::gather(const Lattice& lattice, const QueryLayers& layers, const
 
 void RowSamples::select(const Lattice& lattice, const QueryLayers& layers, const Block& block,
                         std::span<const Run> runs) {
-  constexpr std::size_t kStrip = 64;
   const std::int32_t a = lattice.cell_size(layers.level);
   const float inv = 1.0F / static_cast<float>(a);
-  // Differences are taken in integers: exact however far the tile lies from the origin.
-  const auto origin = [a](std::int32_t b) {
-    return static_cast<std::uint32_t>(b) * 8U * static_cast<std::uint32_t>(a);
-  };
-  const std::uint32_t ox = origin(block.x);
-  const std::uint32_t oy = origin(block.y);
-  const std::uint32_t oz = origin(block.z);
+  const FourWords origin = FourWords{word(block.x), word(block.y), word(block.z), 0} * (8U * word(a));
   // Points of the block: their middle, and how far they lie from it at most, rounding included.
   const float margin = layers.margin * inv + 1e-4F;
   const auto z_first = static_cast<float>(std::max(layers.first - block.z * 8, 0)) + layers.shift;
   const auto z_last = static_cast<float>(std::min(layers.end - 1 - block.z * 8, 7)) + layers.shift;
-  const float middle = 3.5F + layers.shift;
   const float half = 3.5F + margin;
-  const float z_middle = 0.5F * (z_first + z_last);
-  const float z_half = 0.5F * (z_last - z_first) + margin;
+  const FourFloats middle{3.5F + layers.shift, 3.5F + layers.shift, 0.5F * (z_first + z_last), 0};
+  const FourFloats reach{half, half, 0.5F * (z_last - z_first) + margin, 0};
 
   std::size_t n = 0;
-  struct Strip {
-    std::array<float, kStrip> x, y, z, support;
-    std::array<std::int32_t, kStrip> row, keep;
-  } p;
   for (std::uint32_t r = 0; r < runs.size(); ++r) {
-    const ClusteredBucket& from = *runs[r].from;
-    for (std::size_t begin = runs[r].begin; begin < runs[r].end; begin += kStrip) {
-      const std::size_t count = std::min<std::size_t>(kStrip, runs[r].end - begin);
-      const std::int32_t* const px = from.x.data() + begin;
-      const std::int32_t* const py = from.y.data() + begin;
-      const std::int32_t* const pz = from.z.data() + begin;
-      const float* const ps = from.support.data() + begin;
-      for (std::size_t i = 0; i < count; ++i) {
-        const float x = static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(px[i]) - ox)) * inv;
-        const float y = static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(py[i]) - oy)) * inv;
-        const float z = static_cast<float>(static_cast<std::int32_t>(static_cast<std::uint32_t>(pz[i]) - oz)) * inv;
-        const float s = ps[i] * inv;
-        p.x[i] = x;
-        p.y[i] = y;
-        p.z[i] = z;
-        p.support[i] = s;
-        p.keep[i] = static_cast<int>(std::abs(x - middle) <= half + s) &
-                    static_cast<int>(std::abs(y - middle) <= half + s) &
-                    static_cast<int>(std::abs(z - z_middle) <= z_half + s);
-        // Rows by the very coordinates the sums use: what ranges() cuts off lies beyond the support in these, too.
-        constexpr float kLast = kRows - 1;
-        const float row_y = std::min(std::max(std::floor(y) - static_cast<float>(kLow), 0.0F), kLast);
-        const float row_z = std::min(std::max(std::floor(z) - static_cast<float>(kLow), 0.0F), kLast);
-        p.row[i] = static_cast<std::int32_t>(row_z) * kRows + static_cast<std::int32_t>(row_y);
-      }
-      if (n + count > found_.size()) found_.resize(2 * found_.size() + count);
-      for (std::size_t i = 0; i < count; ++i) {
-        found_[n] = {p.x[i], p.y[i], p.z[i], p.support[i], p.row[i], r, static_cast<std::uint32_t>(begin + i)};
-        n += static_cast<std::size_t>(p.keep[i]);
-      }
+    const std::size_t count = runs[r].end - runs[r].begin;
+    if (n + count > found_.size()) found_.resize(2 * found_.size() + count);
+    for (const ClusterSample& s : std::span(runs[r].from->samples).subspan(runs[r].begin, count)) {
+      FourFloats at = to_floats(from_origin(s, origin)) * inv;
+      const float support = s.support * inv;
+      const FourFloats off = at - middle;
+      const bool keep = (bits_of((off > -off ? off : -off) <= reach + support) & 7U) == 7U;
+      at[3] = support;
+      found_[n] = {at, &s, row_of(at), r};
+      n += keep ? 1 : 0;
     }
   }
   count_ = n;
@@ -341,34 +334,29 @@ void RowSamples::place(const Lattice& lattice, int level, std::span<const Run> r
   std::array<std::uint32_t, kRows * kRows> cursor{};
   std::copy_n(row_begin_.begin(), kRows * kRows, cursor.begin());
   max_support_ = 0;
+  samples_.banded = false;
   for (const Found& f : found) {
     const std::uint32_t to = cursor[static_cast<std::size_t>(f.row)]++;
-    const ClusteredBucket& from = *runs[f.run].from;
-    samples_.x[to] = f.x;
-    samples_.y[to] = f.y;
-    samples_.z[to] = f.z;
-    samples_.nx[to] = from.nx[f.sample];
-    samples_.ny[to] = from.ny[f.sample];
-    samples_.nz[to] = from.nz[f.sample];
-    samples_.support[to] = f.support;
-    samples_.weight[to] = from.weight[f.sample];
-    samples_.inv_band2[to] = from.band[f.sample];
-    for (std::size_t c = 0; c < attributes; ++c) samples_.attributes[c][to] = from.attributes[c][f.sample];
-    max_support_ = std::max(max_support_, f.support);
-  }
-  samples_.banded = false;
-  for (std::size_t k = 0; k < count_; ++k) {
-    const float limit = samples_.inv_band2[k] * inv;
-    samples_.inv_support2[k] = 1.0F / (samples_.support[k] * samples_.support[k]);
-    samples_.inv_band2[k] = 1.0F / (limit * limit);
-    samples_.banded |= limit < samples_.support[k];
+    const ClusterSample& s = *f.sample;
+    const float support = f.at[3], band = s.band * inv;
+    const FourFloats squares{support * support, band * band, 1, 1};
+    const FourFloats inverse = 1.0F / squares;
+    samples_.put(to, {f.at[0], f.at[1], f.at[2], inverse[0], s.nx, s.ny, s.nz, s.weight, support, inverse[1]});
+    for (std::size_t c = 0; c < attributes; ++c) {
+      const ClusteredBucket& from = *runs[f.run].from;
+      samples_.attributes[c][to] = from.attributes[c][static_cast<std::size_t>(&s - from.samples.data())];
+    }
+    max_support_ = std::max(max_support_, support);
+    samples_.banded |= band < support;
   }
 }
 
 void RowSamples::scale_supports(float factor) {
   for (std::size_t k = 0; k < count_; ++k) {
-    samples_.support[k] *= factor;
-    samples_.inv_support2[k] = 1.0F / (samples_.support[k] * samples_.support[k]);
+    TileSample s = samples_.all[k];
+    s.support *= factor;
+    s.inv_support2 = 1.0F / (s.support * s.support);
+    samples_.put(k, s);
   }
   max_support_ *= factor;
 }

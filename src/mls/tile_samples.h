@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "base/four.h"
 #include "mls/kernel.h"
 #include "octree/window.h"
 #include "samples/sample_feed.h"
@@ -19,11 +20,17 @@ struct SampleCluster {
   std::array<std::int32_t, 3> low{}, high{};
 };
 
-/// What projection needs of a bucket's samples; those without a support are left out.
+/// What projection needs of a sample.
+struct ClusterSample {
+  std::int32_t x, y, z;  ///< steps
+  float support;         ///< as in ActiveBucket, like the last two
+  float nx, ny, nz;      ///< unit normal
+  float weight, band;
+};
+
+/// A bucket's samples in clusters; those without a support are left out.
 struct ClusteredBucket {
-  std::vector<std::int32_t> x, y, z;         ///< steps
-  std::vector<float> nx, ny, nz;             ///< unit normals
-  std::vector<float> support, weight, band;  ///< as in ActiveBucket
+  std::vector<ClusterSample> samples;
   /// One array per attribute and, where residuals are known, two more: the residual (steps) and its square.
   std::vector<std::vector<float>> attributes;
   std::vector<SampleCluster> clusters;
@@ -99,11 +106,12 @@ class RowSamples {
   int ranges(float y_lo, float y_hi, float z_lo, float z_hi, SampleRange* out) const;
 
  private:
-  /// A sample on its way into its row; lengths in cells, relative to the tile.
+  /// A sample on its way into its row.
   struct Found {
-    float x, y, z, support;
+    FourFloats at;  ///< x, y, z and the support: cells, relative to the tile
+    const ClusterSample* sample;
     std::int32_t row;
-    std::uint32_t run, sample;
+    std::uint32_t run;
   };
   void select(const Lattice& lattice, const QueryLayers& layers, const Block& block, std::span<const Run> runs);
   void place(const Lattice& lattice, int level, std::span<const Run> runs);

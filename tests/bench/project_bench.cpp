@@ -20,16 +20,8 @@ TileSamples random_samples(std::size_t n, std::size_t attributes) {
   TileSamples s;
   s.resize(n, attributes);
   for (std::size_t i = 0; i < n; ++i) {
-    s.x[i] = 8 * unit(rng);
-    s.y[i] = 2 * unit(rng);
-    s.z[i] = 2 * unit(rng);
-    s.nx[i] = 0.6F;
-    s.ny[i] = 0.0F;
-    s.nz[i] = 0.8F;
-    s.support[i] = 1.5F;
-    s.inv_support2[i] = 1 / (1.5F * 1.5F);
-    s.inv_band2[i] = 1 / (1.75F * 1.75F);
-    s.weight[i] = 1;
+    const float x = 8 * unit(rng), y = 2 * unit(rng), z = 2 * unit(rng);
+    s.put(i, {x, y, z, 1 / (1.5F * 1.5F), 0.6F, 0.0F, 0.8F, 1, 1.5F, 1 / (1.75F * 1.75F)});
     for (auto& a : s.attributes) a[i] = unit(rng);
   }
   return s;

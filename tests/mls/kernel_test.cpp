@@ -26,12 +26,14 @@ TileSamples random_samples(std::mt19937_64& random, std::size_t n, std::size_t a
     return static_cast<float>(std::uniform_real_distribution<double>(low, high)(random));
   };
   for (std::size_t i = 0; i < n; ++i) {
-    for (auto* v : {&s.x, &s.y, &s.z}) (*v)[i] = number(-3, 11);
-    for (auto* v : {&s.nx, &s.ny, &s.nz}) (*v)[i] = number(-1, 1);
-    s.support[i] = number(1, 4);
-    s.inv_support2[i] = 1.0F / (s.support[i] * s.support[i]);
-    s.inv_band2[i] = 1.0F / (1.75F * 1.75F);
-    s.weight[i] = number(0.1, 2);
+    TileSample one{};
+    for (float* v : {&one.x, &one.y, &one.z}) *v = number(-3, 11);
+    for (float* v : {&one.nx, &one.ny, &one.nz}) *v = number(-1, 1);
+    one.support = number(1, 4);
+    one.inv_support2 = 1.0F / (one.support * one.support);
+    one.inv_band2 = 1.0F / (1.75F * 1.75F);
+    one.weight = number(0.1, 2);
+    s.put(i, one);
     for (auto& a : s.attributes) a[i] = number(0, 255);
   }
   return s;
@@ -70,29 +72,30 @@ TEST_P(KernelSums, AreTheDefinition) {
       int seen = 0;
       for (const SampleRange& r : ranges) {
         for (std::uint32_t i = r.begin; i < r.end; ++i) {
-          const double dx = static_cast<double>(s.x[i]) - q.x[l];
-          const double dy = static_cast<double>(s.y[i]) - q.y[l];
-          const double dz = static_cast<double>(s.z[i]) - q.z[l];
+          const double dx = static_cast<double>(s.all[i].x) - q.x[l];
+          const double dy = static_cast<double>(s.all[i].y) - q.y[l];
+          const double dz = static_cast<double>(s.all[i].z) - q.z[l];
           const double d2 = dx * dx + dy * dy + dz * dz;
-          const double t = 1 - d2 / (static_cast<double>(s.support[i]) * s.support[i]);
+          const double t = 1 - d2 / (static_cast<double>(s.all[i].support) * s.all[i].support);
           if (t <= 0) continue;
           ++seen;
-          const double w = s.weight[i] * std::pow(t, 4);
+          const double w = s.all[i].weight * std::pow(t, 4);
           nearest = std::min(nearest, d2 / (1.75 * 1.75));
           const auto add = [&](int sum, double value) {
             expected[sum] += w * value;
-            magnitude[sum] += w * std::abs(value) + s.weight[i] * 1e-2;  // far samples weigh little, with larger errors
+            magnitude[sum] +=
+                w * std::abs(value) + s.all[i].weight * 1e-2;  // far samples weigh little, with larger errors
           };
           add(kW, 1);
           add(kPx, dx);
           add(kPy, dy);
           add(kPz, dz);
-          add(kNx, s.nx[i]);
-          add(kNy, s.ny[i]);
-          add(kNz, s.nz[i]);
+          add(kNx, s.all[i].nx);
+          add(kNy, s.all[i].ny);
+          add(kNz, s.all[i].nz);
           add(kPP, d2);
-          add(kPN, dx * s.nx[i] + dy * s.ny[i] + dz * s.nz[i]);
-          add(kWR, s.support[i]);
+          add(kPN, dx * s.all[i].nx + dy * s.all[i].ny + dz * s.all[i].nz);
+          add(kWR, s.all[i].support);
           for (std::size_t a = 0; a < attributes; ++a) add(kSums + static_cast<int>(a), s.attributes[a][i]);
         }
       }
@@ -132,17 +135,18 @@ TEST(Kernel, SheetsAreSumsOverARegionOfNormals) {
     std::vector<double> expected(kSheetSums + kMoments + 1, 0.0);
     for (const SampleRange& r : ranges) {
       for (std::uint32_t i = r.begin; i < r.end; ++i) {
-        const std::array<double, 3> d{double{s.x[i]} - q.x[l], double{s.y[i]} - q.y[l], double{s.z[i]} - q.z[l]};
-        const std::array<double, 3> n{s.nx[i], s.ny[i], s.nz[i]};
+        const std::array<double, 3> d{double{s.all[i].x} - q.x[l], double{s.all[i].y} - q.y[l],
+                                      double{s.all[i].z} - q.z[l]};
+        const std::array<double, 3> n{s.all[i].nx, s.all[i].ny, s.all[i].nz};
         const auto along = [&](const Queries& a) { return n[0] * a.x[l] + n[1] * a.y[l] + n[2] * a.z[l]; };
         const double d2 = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];
-        const double t = 1 - d2 / (double{s.support[i]} * s.support[i]);
+        const double t = 1 - d2 / (double{s.all[i].support} * s.all[i].support);
         if (t <= 0 || along(region.first) < region.first_least[l] || along(region.second) < region.second_least[l])
           continue;
-        const double w = s.weight[i] * std::pow(t, 4);
+        const double w = s.all[i].weight * std::pow(t, 4);
         const double pn = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
         const std::array<double, kSheetSums> own{w,        w * d[0], w * d[1],   w * d[2], w * n[0],
-                                                 w * n[1], w * n[2], w * d2,     w * pn,   w * s.support[i],
+                                                 w * n[1], w * n[2], w * d2,     w * pn,   w * s.all[i].support,
                                                  0,        0,        w * pn * pn};
         for (std::size_t k = 0; k < own.size(); ++k) expected[k] += own[k];
         const std::array<double, kMoments + 1> moments{
@@ -171,14 +175,10 @@ TEST(Kernel, SamplesThatFaceAwayDoNotCount) {
       TileSamples kept;
       kept.resize(0, 1);
       for (std::uint32_t i = 0; i < 120; ++i) {
-        if (s.nx[i] * facing.x[l] + s.ny[i] * facing.y[l] + s.nz[i] * facing.z[l] < 0) continue;
+        if (s.all[i].nx * facing.x[l] + s.all[i].ny * facing.y[l] + s.all[i].nz * facing.z[l] < 0) continue;
         const auto n = kept.x.size();
         kept.resize(n + 1, 1);
-        for (auto member :
-             {&TileSamples::x, &TileSamples::y, &TileSamples::z, &TileSamples::nx, &TileSamples::ny, &TileSamples::nz,
-              &TileSamples::support, &TileSamples::inv_support2, &TileSamples::inv_band2, &TileSamples::weight}) {
-          (kept.*member)[n] = (s.*member)[i];
-        }
+        kept.put(n, s.all[i]);
         kept.attributes[0][n] = s.attributes[0][i];
       }
       const auto expected = sums_of(kernel, kept, {{0, static_cast<std::uint32_t>(kept.x.size())}}, q);
@@ -193,10 +193,12 @@ TEST(Kernel, SamplesOutOfReachChangeNothing) {
   TileSamples s = random_samples(random, 100, 1);
   const Queries q{random_lanes(random, 3, 5), random_lanes(random, 3, 5), random_lanes(random, 3, 5)};
   for (std::size_t i = 50; i < 100; ++i) {
-    s.x[i] = 4 + (i % 2 == 0 ? 3.0F : -3.0F);  // two to four cells away: in the band at most
-    s.support[i] = 1.5F;
-    s.inv_support2[i] = 1.0F / (1.5F * 1.5F);
-    s.inv_band2[i] = 1.0F / 25.0F;
+    TileSample one = s.all[i];
+    one.x = 4 + (i % 2 == 0 ? 3.0F : -3.0F);  // two to four cells away: in the band at most
+    one.support = 1.5F;
+    one.inv_support2 = 1.0F / (1.5F * 1.5F);
+    one.inv_band2 = 1.0F / 25.0F;
+    s.put(i, one);
   }
   for (const Kernel& kernel : available_kernels()) {
     const auto with = sums_of(kernel, s, {{0, 100}}, q);

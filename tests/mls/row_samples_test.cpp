@@ -66,7 +66,7 @@ TEST(Clumps, HoldEverySampleOnceInsideTheirBox) {
     for (std::size_t i = 0; i < bucket.samples.size(); ++i) {
       if (bucket.support[i] > 0) left[name_of(bucket.samples.attributes, i)] = i;
     }
-    ASSERT_EQ(c.x.size(), left.size());
+    ASSERT_EQ(c.samples.size(), left.size());
     std::uint32_t end = 0;
     for (const SampleCluster& k : c.clusters) {
       ASSERT_EQ(k.begin, end);
@@ -80,19 +80,19 @@ TEST(Clumps, HoldEverySampleOnceInsideTheirBox) {
         left.erase(found);
         ASSERT_TRUE(!before || *before < s) << "order";
         before = s;
-        EXPECT_EQ(c.x[i], bucket.samples.x[s]);
-        EXPECT_EQ(c.nz[i], bucket.samples.nz[s]);
-        EXPECT_EQ(c.support[i], bucket.support[s]);
-        EXPECT_EQ(c.weight[i], bucket.weight[s]);
-        EXPECT_EQ(c.band[i], bucket.band[s]);
-        const std::array<std::int32_t, 3> p{c.x[i], c.y[i], c.z[i]};
+        EXPECT_EQ(c.samples[i].x, bucket.samples.x[s]);
+        EXPECT_EQ(c.samples[i].nz, bucket.samples.nz[s]);
+        EXPECT_EQ(c.samples[i].support, bucket.support[s]);
+        EXPECT_EQ(c.samples[i].weight, bucket.weight[s]);
+        EXPECT_EQ(c.samples[i].band, bucket.band[s]);
+        const std::array<std::int32_t, 3> p{c.samples[i].x, c.samples[i].y, c.samples[i].z};
         for (int a = 0; a < 3; ++a) {
-          EXPECT_LE(k.low[a], static_cast<double>(p[a]) - static_cast<double>(c.support[i]));
-          EXPECT_GE(k.high[a], static_cast<double>(p[a]) + static_cast<double>(c.support[i]));
+          EXPECT_LE(k.low[a], static_cast<double>(p[a]) - static_cast<double>(c.samples[i].support));
+          EXPECT_GE(k.high[a], static_cast<double>(p[a]) + static_cast<double>(c.samples[i].support));
         }
       }
     }
-    EXPECT_EQ(end, c.x.size());
+    EXPECT_EQ(end, c.samples.size());
     EXPECT_TRUE(left.empty());
   }
 }
@@ -113,10 +113,10 @@ TEST(Clumps, OfAbsurdExtentsAndCells) {
       bucket.level.push_back(static_cast<std::uint8_t>(i % lattice.levels));
     }
     const ClusteredBucket c = cluster_samples(bucket, lattice);
-    EXPECT_EQ(c.x.size(), 16U);
+    EXPECT_EQ(c.samples.size(), 16U);
     EXPECT_EQ(c.clusters.back().end, 16U);
     for (const SampleCluster& k : c.clusters) {
-      for (std::uint32_t i = k.begin; i < k.end; ++i) EXPECT_LE(k.low[0], c.x[i]);
+      for (std::uint32_t i = k.begin; i < k.end; ++i) EXPECT_LE(k.low[0], c.samples[i].x);
     }
   }
 }
@@ -234,16 +234,19 @@ TEST(TileSamples, RowsHoldSamplesInCells) {
       const double support = static_cast<double>(bucket->support[i]) / a;
       const double band = static_cast<double>(bucket->band[i]) / a;
       largest = std::max(largest, support);
+      const TileSample& record = t.all[k];
+      EXPECT_TRUE(record.x == t.x[k] && record.y == t.y[k] && record.z == t.z[k]);
+      EXPECT_EQ(record.inv_support2, t.inv_support2[k]);
       EXPECT_NEAR(t.x[k], bucket->samples.x[i] / a - block.x * 8, 1e-5);
       EXPECT_NEAR(t.y[k], bucket->samples.y[i] / a - block.y * 8, 1e-5);
       EXPECT_NEAR(t.z[k], bucket->samples.z[i] / a - block.z * 8, 1e-5);
-      EXPECT_EQ(t.nx[k], bucket->samples.nx[i]);
-      EXPECT_EQ(t.ny[k], bucket->samples.ny[i]);
-      EXPECT_EQ(t.nz[k], bucket->samples.nz[i]);
-      EXPECT_NEAR(t.support[k], support, 1e-6 * support);
+      EXPECT_EQ(record.nx, bucket->samples.nx[i]);
+      EXPECT_EQ(record.ny, bucket->samples.ny[i]);
+      EXPECT_EQ(record.nz, bucket->samples.nz[i]);
+      EXPECT_NEAR(record.support, support, 1e-6 * support);
       EXPECT_NEAR(t.inv_support2[k], 1 / (support * support), 1e-6 / (support * support));
-      EXPECT_NEAR(t.inv_band2[k], 1 / (band * band), 1e-6 / (band * band));
-      EXPECT_EQ(t.weight[k], bucket->weight[i]);
+      EXPECT_NEAR(record.inv_band2, 1 / (band * band), 1e-6 / (band * band));
+      EXPECT_EQ(record.weight, bucket->weight[i]);
     }
     for (int round = 0; round < 200; ++round) {
       const auto number = [&](double low, double high) {
