@@ -129,10 +129,18 @@ bool TileSteps::sees_two_sheets(const Lanes* sums, int l) const {
   return n2 > 0 && n2 < rule_.settings.sheets * rule_.settings.sheets * w2;
 }
 
+bool TileSteps::any_sees_two_sheets(const Lanes* sums) const {
+  bool any = false;
+  for (int l = 0; l < kLanes; ++l) any |= sees_two_sheets(sums, l);
+  return any;
+}
+
 /// Finds those of a group's points that go on, and where.
 void TileSteps::advance_group(std::size_t g, std::size_t count, int pass, Next& next) const {
   const QueryBatch& from = state_.stepped ? state_.moved : state_.all;
   const Lanes* const sums = &from.sums[g * rule_.channels];
+  // Most groups, where one step is all.
+  if (!state_.stepped && pass >= rule_.settings.steps && !any_sees_two_sheets(sums)) return;
   FitOutput fit{};
   bool fitted = false;
   for (std::size_t i = g * kLanes; i < std::min(count, (g + 1) * kLanes); ++i) {

@@ -90,6 +90,7 @@ class TileSteps {
   }
   void advance_group(std::size_t g, std::size_t count, int pass, Next& next) const;
   [[nodiscard]] bool sees_two_sheets(const Lanes* sums, int l) const;
+  [[nodiscard]] bool any_sees_two_sheets(const Lanes* sums) const;
   [[nodiscard]] bool is_apart(const Lanes* all, int lane, const Lanes* own_side, int l) const;
 
   const ProjectRule& rule_;
