@@ -70,6 +70,16 @@ void list_missing(const Tile& t, const BlockMask& m, std::pair<std::int32_t, std
   }
 }
 
+/// Blocks to be made, as threads find them.
+using Missing = tbb::combinable<std::vector<Block>>;
+
+/// In any order: the window puts its tiles in order.
+void make(Window& window, int level, Missing& missing) {
+  missing.combine_each([&](const std::vector<Block>& blocks) {
+    for (const Block& b : blocks) window.touch(level, b);
+  });
+}
+
 /// Makes the blocks that the slab's part of the marked cells, moved by up to [lo, hi]^3, can fall into.
 template <auto kMask>
 void touch_around(Window& window, int level, std::int32_t slab, int lo, int hi) {
@@ -78,7 +88,7 @@ void touch_around(Window& window, int level, std::int32_t slab, int lo, int hi) 
   const std::int32_t end = first + lattice.layers(level);
   const std::int32_t slab_lo = lattice.slab_of_layer(level, first - hi);
   const std::int32_t slab_hi = lattice.slab_of_layer(level, end - 1 - lo);
-  tbb::combinable<std::vector<Block>> missing;
+  Missing missing;
   std::int32_t done = std::numeric_limits<std::int32_t>::min();
   for (std::int32_t s = slab_lo; s <= slab_hi; ++s) {
     const Tiles tiles = window.tiles(level, s);
@@ -90,10 +100,7 @@ void touch_around(Window& window, int level, std::int32_t slab, int lo, int hi) 
     });
     done = (lattice.first_layer(level, s) + lattice.layers(level) - 1) >> 3;
   }
-  // In any order: the window puts its tiles in order.
-  missing.combine_each([&](const std::vector<Block>& blocks) {
-    for (const Block& b : blocks) window.touch(level, b);
-  });
+  make(window, level, missing);
 }
 
 Block parent_block(const Block& b) {
@@ -106,22 +113,15 @@ std::uint64_t from_parent(const BlockMask& parent, const Block& child, int z) {
 }
 
 void split_parents(Window& window, int level, std::int32_t slab) {
-  Block last{};
-  bool known = false;  // that `last` is there: neighbours mostly have the same parent
-  const Tiles tiles = window.tiles(level, slab);
-  for (std::size_t i = 0; i < tiles.size(); ++i) {
-    ask_ahead<BlockParts<&CornerBlock::touched, &CornerBlock::split>>(tiles, i);
-    const Tile& t = tiles[i];
-    const LeafLayers layers = leaf_layers(window, level, slab, t.block);
-    const Block parent = parent_block(t.block);
-    if (known && parent == last) continue;
-    std::uint64_t any = 0;
-    for (int z = layers.begin; z < layers.end; ++z) any |= t.leaf->touched.words[z] | t.leaf->split.words[z];
-    if (any == 0) continue;
-    window.touch(level + 1, parent);
-    last = parent;
-    known = true;
-  }
+  Missing parents;
+  for_tiles<BlockParts<&CornerBlock::touched, &CornerBlock::split>>(
+      window, level, slab, [&](const Tile& t, int begin, int end) {
+        std::uint64_t any = 0;
+        for (int z = begin; z < end; ++z) any |= t.leaf->touched.words[z] | t.leaf->split.words[z];
+        const Block parent = parent_block(t.block);
+        if (any != 0 && std::as_const(window).probe(level + 1, parent) == nullptr) parents.local().push_back(parent);
+      });
+  make(window, level + 1, parents);
   for_tiles<BlockParts<&CornerBlock::split>>(window, level + 1, slab, [&](const Tile& t, int begin, int end) {
     for (int octant = 0; octant < 8; ++octant) {
       const int ox = octant & 1;
@@ -144,19 +144,20 @@ void split_parents(Window& window, int level, std::int32_t slab) {
 /// Hands what coarser samples reach, and where they are close, down to the children of split cells.
 void inherit(Window& window, int level, std::int32_t slab) {
   const int parent_level = level + 1;
-  for (const Tile& t : window.tiles(parent_level, slab)) {
-    const LeafLayers layers = leaf_layers(window, parent_level, slab, t.block);
-    std::array<std::uint64_t, 2> nodes{};  // of the lower and of the upper half's layers, one above the other
-    for (int z = layers.begin; z < layers.end; ++z) {
-      nodes[z >> 2] |= t.leaf->split.words[z] & t.leaf->reached.words[z];
-    }
-    for (int octant = 0; octant < 8; ++octant) {
-      const std::uint64_t quarter = std::uint64_t{0x0F0F0F0F} << (4 * (octant & 1) + 32 * ((octant >> 1) & 1));
-      if ((nodes[octant >> 2] & quarter) == 0) continue;
-      window.touch(level,
-                   {t.block.x * 2 + (octant & 1), t.block.y * 2 + ((octant >> 1) & 1), t.block.z * 2 + (octant >> 2)});
-    }
-  }
+  Missing children;
+  for_tiles<BlockParts<&CornerBlock::split, &CornerBlock::reached>>(
+      window, parent_level, slab, [&](const Tile& t, int begin, int end) {
+        std::array<std::uint64_t, 2> nodes{};  // of the lower and of the upper half's layers, one above the other
+        for (int z = begin; z < end; ++z) nodes[z >> 2] |= t.leaf->split.words[z] & t.leaf->reached.words[z];
+        for (int octant = 0; octant < 8; ++octant) {
+          const std::uint64_t quarter = std::uint64_t{0x0F0F0F0F} << (4 * (octant & 1) + 32 * ((octant >> 1) & 1));
+          if ((nodes[octant >> 2] & quarter) == 0) continue;
+          const Block child{t.block.x * 2 + (octant & 1), t.block.y * 2 + ((octant >> 1) & 1),
+                            t.block.z * 2 + (octant >> 2)};
+          if (std::as_const(window).probe(level, child) == nullptr) children.local().push_back(child);
+        }
+      });
+  make(window, level, children);
   for_tiles<BlockParts<&CornerBlock::split, &CornerBlock::home, &CornerBlock::around, &CornerBlock::close>>(
       window, parent_level, slab, [&](const Tile& t, int begin, int end) {
         std::uint64_t split = 0;
