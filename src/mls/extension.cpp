@@ -142,24 +142,18 @@ class TileExtender {
       const std::uint64_t near = layer(z - 1) | layer(z) | layer(z + 1);
       if (near == 0) continue;
       for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) find_records(dx, dy, z, along_x(along_y(near, dy), dx));
+        for (int dx = -1; dx <= 1; ++dx) find_records(dx, dy, z, beside_in(near, dx, dy));
       }
     }
     field_.clear(layers_.begin, layers_.end);
     for (const Found& f : std::span(found_.data(), found_count_)) field_.put(f.x, f.y, f.z, plane_of(f.record));
   }
 
-  /// The corners beside those of a layer, in the block `dx` (`dy`) blocks away.
-  static std::uint64_t along_x(std::uint64_t w, int dx) {
-    constexpr std::uint64_t kFirst = 0x0101010101010101ULL, kLast = 0x8080808080808080ULL;
-    if (dx < 0) return (w & kFirst) << 7;
-    if (dx > 0) return (w & kLast) >> 7;
-    return w | (w & ~kLast) << 1 | (w & ~kFirst) >> 1;
-  }
-  static std::uint64_t along_y(std::uint64_t w, int dy) {
-    if (dy < 0) return w << 56;
-    if (dy > 0) return w >> 56;
-    return w | w << 8 | w >> 8;
+  /// The corners beside those of a word, and those, as the block (dx, dy) blocks away has them in its word.
+  static std::uint64_t beside_in(std::uint64_t w, int dx, int dy) {
+    const auto when = [&](bool holds) { return holds ? w : 0; };
+    w = bits::spread_y<-1, 1>(when(dy > 0), when(dy == 0), when(dy < 0));
+    return bits::spread_x<-1, 1>(when(dx > 0), when(dx == 0), when(dx < 0));
   }
 
   /// Trusted ones among `wanted`, of layer z, in [-1, 8], of the block's neighbour at (dx, dy) across the sweep axis.

@@ -33,7 +33,7 @@ enum Sum : int {
 /// Of these the last two where samples have residuals: the residual, and its square.
 inline constexpr std::size_t kResidualSums = 2;
 
-/// Samples of a tile, structure of arrays, in cells of the level relative to the tile's origin.
+/// A sample as sums take it; lengths in cells of the level, places relative to the tile's origin.
 struct TileSample {
   float x, y, z;
   float inv_support2;  ///< 1 / R^2
@@ -43,8 +43,9 @@ struct TileSample {
   float inv_band2;  ///< 1 / band^2
 };
 
+/// Samples of a tile, set by put(): records, and some of their numbers once more as arrays.
 struct TileSamples {
-  std::vector<TileSample> all;               ///< what sums take: a sample, and all of it
+  std::vector<TileSample> all;
   std::vector<float> x, y, z, inv_support2;  ///< what tells those near a box, several samples at once
   bool banded = true;                        ///< some sample's band is narrower than its support
   std::vector<std::vector<float>> attributes;

@@ -74,7 +74,7 @@ void list_missing(const Tile& t, const BlockMask& m, std::pair<std::int32_t, std
 using Missing = tbb::combinable<std::vector<Block>>;
 
 /// In any order: the window puts its tiles in order.
-void make(Window& window, int level, Missing& missing) {
+void make_blocks(Window& window, int level, Missing& missing) {
   missing.combine_each([&](const std::vector<Block>& blocks) {
     for (const Block& b : blocks) window.touch(level, b);
   });
@@ -100,7 +100,7 @@ void touch_around(Window& window, int level, std::int32_t slab, int lo, int hi) 
     });
     done = (lattice.first_layer(level, s) + lattice.layers(level) - 1) >> 3;
   }
-  make(window, level, missing);
+  make_blocks(window, level, missing);
 }
 
 Block parent_block(const Block& b) {
@@ -121,7 +121,7 @@ void split_parents(Window& window, int level, std::int32_t slab) {
         const Block parent = parent_block(t.block);
         if (any != 0 && std::as_const(window).probe(level + 1, parent) == nullptr) parents.local().push_back(parent);
       });
-  make(window, level + 1, parents);
+  make_blocks(window, level + 1, parents);
   for_tiles<BlockParts<&CornerBlock::split>>(window, level + 1, slab, [&](const Tile& t, int begin, int end) {
     for (int octant = 0; octant < 8; ++octant) {
       const int ox = octant & 1;
@@ -157,7 +157,7 @@ void inherit(Window& window, int level, std::int32_t slab) {
           if (std::as_const(window).probe(level, child) == nullptr) children.local().push_back(child);
         }
       });
-  make(window, level, children);
+  make_blocks(window, level, children);
   for_tiles<BlockParts<&CornerBlock::split, &CornerBlock::home, &CornerBlock::around, &CornerBlock::close>>(
       window, parent_level, slab, [&](const Tile& t, int begin, int end) {
         std::uint64_t split = 0;
