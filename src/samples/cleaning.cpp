@@ -1,6 +1,8 @@
 #include "samples/cleaning.h"
 
 #include <fmt/format.h>
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <bit>
@@ -215,21 +217,28 @@ class Noted {
 Extent extent_of(const SlabStore& store) {
   constexpr std::int32_t kMax = std::numeric_limits<std::int32_t>::max();
   constexpr std::int32_t kMin = std::numeric_limits<std::int32_t>::min();
-  Extent e{{kMax, kMin, kMax, kMin}, kMax, kMin};
-  LocalSamples samples;
-  for (std::size_t b = 0; b < store.buckets(); ++b) {
-    if (store.count(b) == 0) continue;
-    store.read(b, samples);
-    const auto [x_min, x_max] = std::minmax_element(samples.x.begin(), samples.x.end());
-    const auto [y_min, y_max] = std::minmax_element(samples.y.begin(), samples.y.end());
-    e.x_min = std::min(e.x_min, *x_min);
-    e.x_max = std::max(e.x_max, *x_max);
-    e.y_min = std::min(e.y_min, *y_min);
-    e.y_max = std::max(e.y_max, *y_max);
-    e.z_min = std::min(e.z_min, store.z_lower(b));
-    e.z_max = std::max(e.z_max, store.z_upper(b));
-  }
-  return e;
+  const auto both = [](Extent a, const Extent& b) {
+    a.x_min = std::min(a.x_min, b.x_min);
+    a.x_max = std::max(a.x_max, b.x_max);
+    a.y_min = std::min(a.y_min, b.y_min);
+    a.y_max = std::max(a.y_max, b.y_max);
+    a.z_min = std::min(a.z_min, b.z_min);
+    a.z_max = std::max(a.z_max, b.z_max);
+    return a;
+  };
+  const auto add = [&](const tbb::blocked_range<std::size_t>& buckets, Extent e) {
+    LocalSamples samples;
+    for (std::size_t b = buckets.begin(); b < buckets.end(); ++b) {
+      if (store.count(b) == 0) continue;
+      store.read(b, samples);
+      const auto [x_min, x_max] = std::minmax_element(samples.x.begin(), samples.x.end());
+      const auto [y_min, y_max] = std::minmax_element(samples.y.begin(), samples.y.end());
+      e = both(e, {{*x_min, *x_max, *y_min, *y_max}, store.z_lower(b), store.z_upper(b)});
+    }
+    return e;
+  };
+  return tbb::parallel_reduce(tbb::blocked_range<std::size_t>(0, store.buckets()),
+                              Extent{{kMax, kMin, kMax, kMin}, kMax, kMin}, add, both);
 }
 
 }  // namespace

@@ -184,6 +184,7 @@ Neighbourhoods::Neighbourhoods(const SlabStore& store, const KeepMasks& masks, f
       end_(first_) {}
 
 bool Neighbourhoods::advance() {
+  read_least();
   std::uint64_t samples = 0;
   std::int64_t begin = end_;
   while (samples < kStraySlab || end_ - begin < kLeastLayers) {
@@ -207,15 +208,32 @@ std::size_t Neighbourhoods::next_filled() const {
   return bucket;
 }
 
+/// What a slab takes however full its layers are: the more there is to read at once, the more threads have work.
+void Neighbourhoods::read_least() {
+  const auto known = layers_.lower_bound(end_);
+  const std::size_t next = next_filled();
+  if (known == layers_.end() && next == store_.buckets()) return;
+  const std::int64_t first = known != layers_.end() ? known->first : cell_of_(store_.z_lower(next));
+  read_below((first + kLeastLayers + kAround) * side_);
+}
+
+/// The buckets that begin below z.
 void Neighbourhoods::read_below(std::int64_t z) {
-  while (next_filled() < store_.buckets() && store_.z_lower(next_filled()) < z) read_next();
+  for (;;) {
+    std::size_t n = 0;
+    for (; n < arriving_.size() && (next_ = next_filled()) < store_.buckets() && store_.z_lower(next_) < z; ++next_) {
+      if (!masks_[next_].empty()) arriving_[n++].bucket = next_;
+    }
+    if (n == 0) return;
+    take_in(std::span(arriving_).first(n));
+  }
 }
 
 /// The lowest layer with samples from this one on, all of which have been read.
 std::optional<std::int64_t> Neighbourhoods::complete_layer_from(std::int64_t layer) {
   auto found = layers_.lower_bound(layer);
   while (found == layers_.end() && next_filled() < store_.buckets()) {
-    read_next();
+    read_below(std::int64_t{store_.z_lower(next_filled())} + 1);
     found = layers_.lower_bound(layer);
   }
   if (found == layers_.end()) return std::nullopt;
@@ -223,29 +241,52 @@ std::optional<std::int64_t> Neighbourhoods::complete_layer_from(std::int64_t lay
   return found->first;
 }
 
-void Neighbourhoods::read_next() {
-  const std::size_t bucket = next_filled();
-  next_ = bucket + 1;
-  if (masks_[bucket].empty()) return;
-  store_.read(bucket, local_);
-  Layer* layer = nullptr;
-  std::int32_t z = 0;  // of that layer
-  for (std::size_t i = 0; i < local_.size(); ++i) {
-    if (!masks_[bucket][i]) continue;
-    if (const std::int32_t own = cell_of_(local_.z[i]); layer == nullptr || own != z) {
-      z = own;
-      if (!layers_.contains(z) && !spare_.empty()) {
-        spare_.back().key() = z;
-        layers_.insert(std::move(spare_.back()));
-        spare_.pop_back();
+/// Buckets read, and their samples put to those that wait in their layers, in the order of the buckets.
+void Neighbourhoods::take_in(std::span<Arriving> buckets) {
+  const auto each_sample = [&](Arriving& from, const auto& use) {
+    Places* places = nullptr;
+    std::int32_t z = 0;  // of their layer
+    for (std::size_t i = 0; i < from.samples.size(); ++i) {
+      if (!masks_[from.bucket][i]) continue;
+      if (const std::int32_t own = cell_of_(from.samples.z[i]); places == nullptr || own != z) {
+        z = own;
+        places = &from.by_layer[z];
       }
-      layer = &layers_[z];
+      use(*places, i);
     }
-    layer->waiting.push_back({{local_.x[i], local_.y[i], local_.z[i]},
-                              {local_.nx[i], local_.ny[i], local_.nz[i]},
-                              static_cast<std::uint32_t>(bucket),
-                              static_cast<std::uint32_t>(i)});
+  };
+  tbb::parallel_for(std::size_t{0}, buckets.size(), [&](std::size_t b) {
+    Arriving& from = buckets[b];
+    store_.read(from.bucket, from.samples);
+    from.by_layer.clear();
+    each_sample(from, [](Places& places, std::size_t) { ++places.count; });
+  });
+  for (Arriving& from : buckets) {
+    for (auto& [z, places] : from.by_layer) {
+      places.layer = &layer_at(z);
+      places.next = places.layer->waiting.size();
+      places.layer->waiting.resize(places.next + places.count);
+    }
   }
+  tbb::parallel_for(std::size_t{0}, buckets.size(), [&](std::size_t b) {
+    Arriving& from = buckets[b];
+    const LocalSamples& s = from.samples;
+    each_sample(from, [&](Places& places, std::size_t i) {
+      places.layer->waiting[places.next++] = {{s.x[i], s.y[i], s.z[i]},
+                                              {s.nx[i], s.ny[i], s.nz[i]},
+                                              static_cast<std::uint32_t>(from.bucket),
+                                              static_cast<std::uint32_t>(i)};
+    });
+  });
+}
+
+Neighbourhoods::Layer& Neighbourhoods::layer_at(std::int64_t z) {
+  if (!layers_.contains(z) && !spare_.empty()) {
+    spare_.back().key() = z;
+    layers_.insert(std::move(spare_.back()));
+    spare_.pop_back();
+  }
+  return layers_[z];
 }
 
 void Neighbourhoods::forget_below(std::int64_t layer) {

@@ -150,8 +150,23 @@ class Neighbourhoods {
   };
   using Layers = std::map<std::int64_t, Layer>;
 
-  void read_next();
+  /// Where a bucket's samples of a layer go: places in the layer's `waiting`.
+  struct Places {
+    Layer* layer = nullptr;
+    std::size_t count = 0, next = 0;
+  };
+  /// A bucket on its way from the store to the layers.
+  struct Arriving {
+    std::size_t bucket = 0;
+    LocalSamples samples;
+    std::map<std::int64_t, Places> by_layer;
+  };
+  static constexpr std::size_t kReadAtOnce = 16;  ///< buckets
+
+  void read_least();
   void read_below(std::int64_t z);
+  void take_in(std::span<Arriving> buckets);
+  Layer& layer_at(std::int64_t z);
   [[nodiscard]] std::size_t next_filled() const;
   std::optional<std::int64_t> complete_layer_from(std::int64_t layer);
   void forget_below(std::int64_t layer);
@@ -168,7 +183,7 @@ class Neighbourhoods {
   std::int64_t first_ = 0, end_ = 0;  ///< layers of the slab
   Layers layers_;                     ///< read, while they are wanted; none is empty
   std::vector<Layers::node_type> spare_;
-  LocalSamples local_;
+  std::vector<Arriving> arriving_ = std::vector<Arriving>(kReadAtOnce);
   tbb::enumerable_thread_specific<CellLayer::Scratch> scratch_;
   Placed samples_;
   std::vector<std::uint8_t> doubtful_;  ///< by place

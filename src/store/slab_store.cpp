@@ -1,6 +1,7 @@
 #include "store/slab_store.h"
 
 #include <fmt/format.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -106,17 +107,17 @@ void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
 }
 
 void SlabStore::keep_only(std::vector<std::vector<bool>> keep) {
-  LocalSamples samples;
-  for (std::size_t b = 0; b < keep.size(); ++b) {
-    if (std::find(keep[b].begin(), keep[b].end(), false) == keep[b].end()) continue;
+  tbb::enumerable_thread_specific<LocalSamples> read_by_thread;
+  tbb::parallel_for(std::size_t{0}, keep.size(), [&](std::size_t b) {
+    if (std::find(keep[b].begin(), keep[b].end(), false) == keep[b].end()) return;
     BucketIndex& index = impl_->buckets[b];
-    impl_->total -= index.count;
     if (index.keep.empty()) {
       index.keep = std::move(keep[b]);
     } else {
       std::size_t n = 0;
       for (auto&& stays : index.keep) stays = stays && keep[b][n++];
     }
+    LocalSamples samples = std::move(read_by_thread.local());  // read() may have this thread take another bucket
     read(b, samples);
     index.count = samples.size();
     const BucketIndex none;
@@ -126,8 +127,10 @@ void SlabStore::keep_only(std::vector<std::vector<bool>> keep) {
       index.z_lower = std::min(index.z_lower, z);
       index.z_upper = std::max(index.z_upper, z);
     }
-    impl_->total += index.count;
-  }
+    read_by_thread.local() = std::move(samples);
+  });
+  impl_->total = 0;
+  for (const BucketIndex& index : impl_->buckets) impl_->total += index.count;
 }
 
 void SlabStore::will_read(std::size_t bucket) const {
