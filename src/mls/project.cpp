@@ -2,6 +2,7 @@
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
 #include <limits>
@@ -27,9 +28,27 @@ struct Projector::Scratch {
     ProjectCounts counts;  ///< of the slab
   };
   tbb::enumerable_thread_specific<Local> local;
-  std::map<std::size_t, std::shared_ptr<ClusteredBucket>> clustered;  ///< by number of the bucket
-  std::vector<std::shared_ptr<ClusteredBucket>> spare;                ///< storage of forgotten ones
+  using Clustered = std::map<std::size_t, std::shared_ptr<ClusteredBucket>>;  ///< by number of the bucket
+  Clustered clustered;
+  std::vector<std::shared_ptr<ClusteredBucket>> spare;  ///< storage of forgotten ones
+  Clustered begun;                                      ///< by tasks
+  Batch loaded;                                         ///< what these are made of
+  tbb::enumerable_thread_specific<ClusterScratch> clustering;
+  tbb::task_group tasks;
 
+  Scratch() = default;
+  Scratch(const Scratch&) = delete;
+  Scratch& operator=(const Scratch&) = delete;
+  ~Scratch() {
+    tasks.cancel();
+    try {
+      tasks.wait();
+    } catch (...) {  // the caller has its own reason to leave
+    }
+  }
+
+  /// Begins to put the buckets of a batch in clusters, those that are not.
+  void begin(const NumberedBuckets& batch, SampleFeed& feed, const Lattice& lattice);
   /// The buckets of a batch in clusters; kept for the next levels, steps and slabs while they are few.
   ClusteredBatch load(const NumberedBuckets& batch, SampleFeed& feed, const Lattice& lattice);
   /// The sweep goes up: what no batch of a slab wants, none of the next ones will.
@@ -49,33 +68,41 @@ struct Projector::Scratch {
   }
 };
 
+void Projector::Scratch::begin(const NumberedBuckets& batch, SampleFeed& feed, const Lattice& lattice) {
+  NumberedBuckets missing;
+  for (const std::size_t number : batch) {
+    if (!clustered.contains(number) && !begun.contains(number)) missing.push_back(number);
+  }
+  for (std::size_t m = 0; const std::shared_ptr<const ActiveBucket>& bucket : feed.load(missing)) {
+    const std::shared_ptr<ClusteredBucket> out = empty_bucket();
+    begun.emplace(missing[m++], out);
+    loaded.push_back(bucket);
+    tasks.run([this, lattice, &from = *bucket, &to = *out] { cluster_samples(from, lattice, clustering.local(), to); });
+  }
+}
+
 ClusteredBatch Projector::Scratch::load(const NumberedBuckets& batch, SampleFeed& feed, const Lattice& lattice) {
   constexpr std::size_t kKeep = std::size_t{1} << 20;  // samples: a batch, or other levels would cluster it anew
-  std::vector<std::shared_ptr<ClusteredBucket>> out(batch.size());
-  std::vector<std::size_t> missing;
+  begin(batch, feed, lattice);
+  tasks.wait();
   std::size_t kept = 0;
   for (const auto& [number, bucket] : clustered) kept += bucket->samples.size();
-  for (std::size_t b = 0; b < batch.size(); ++b) {
-    const auto known = clustered.find(batch[b]);
-    if (known == clustered.end()) {
-      missing.push_back(b);
-    } else {
-      out[b] = known->second;
+  ClusteredBatch out;
+  out.reserve(batch.size());
+  for (const std::size_t number : batch) {
+    if (const auto known = clustered.find(number); known != clustered.end()) {
+      out.push_back(known->second);
+      continue;
     }
+    const std::shared_ptr<ClusteredBucket>& bucket = begun.at(number);
+    kept += bucket->samples.size();
+    if (kept <= kKeep) clustered.emplace(number, bucket);
+    out.push_back(bucket);
   }
-  NumberedBuckets numbers;
-  numbers.reserve(missing.size());
-  for (const std::size_t b : missing) numbers.push_back(batch[b]);
-  const Batch loaded = feed.load(numbers);
-  for (const std::size_t b : missing) out[b] = empty_bucket();
-  tbb::enumerable_thread_specific<ClusterScratch> clustering;  // large: not kept
-  tbb::parallel_for(std::size_t{0}, missing.size(),
-                    [&](std::size_t m) { cluster_samples(*loaded[m], lattice, clustering.local(), *out[missing[m]]); });
-  for (const std::size_t b : missing) {
-    kept += out[b]->samples.size();
-    if (kept <= kKeep) clustered.emplace(batch[b], out[b]);
-  }
-  return {out.begin(), out.end()};
+  begun.clear();
+  loaded.clear();
+  clustering.clear();  // large
+  return out;
 }
 
 namespace {
@@ -290,10 +317,20 @@ float Projector::margin(const Lattice& lattice) const {
   return settings_.steps > 1 ? kStepLimit * static_cast<float>(lattice.cell_size(lattice.levels - 1)) : 0.0F;
 }
 
-void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
-  const Lattice& lattice = window.lattice();
+std::vector<NumberedBuckets> Projector::batches_of(const Lattice& lattice, std::int32_t slab,
+                                                   const SampleFeed& feed) const {
   const std::int64_t height = lattice.slab_height();
-  const auto batches = feed.batches(slab * height, (slab + 1) * height, margin(lattice));
+  return feed.batches(slab * height, (slab + 1) * height, margin(lattice));
+}
+
+void Projector::begin(const Lattice& lattice, std::int32_t slab, SampleFeed& feed) {
+  const auto batches = batches_of(lattice, slab, feed);
+  scratch_->forget_below(batches);
+  if (batches.size() == 1) scratch_->begin(batches.front(), feed, lattice);
+}
+
+void Projector::project(Window& window, std::int32_t slab, SampleFeed& feed) {
+  const auto batches = batches_of(window.lattice(), slab, feed);
   scratch_->forget_below(batches);
   for (int level = 0; level < window.levels(); ++level) Level(*this, window, slab, level, feed).project(batches);
   add_counts(slab);

@@ -50,6 +50,9 @@ class Projector {
   ~Projector();
   Projector(const Projector&) = delete;
   Projector& operator=(const Projector&) = delete;
+  /// Says that a slab is next: what can be done before its corners are placed begins in the background. The feed must
+  /// be ready as for project().
+  void begin(const Lattice& lattice, std::int32_t slab, SampleFeed& feed);
   /// Fills the values, `seen` and `trusted` of the slab's active corners. Its corners must be placed and the feed be
   /// ready to slab end + largest support (twice that for steps > 1).
   void project(Window& window, std::int32_t slab, SampleFeed& feed);
@@ -60,6 +63,8 @@ class Projector {
  private:
   class Level;
   struct Scratch;
+  [[nodiscard]] std::vector<std::vector<std::size_t>> batches_of(const Lattice& lattice, std::int32_t slab,
+                                                                 const SampleFeed& feed) const;
   void add_counts(std::int32_t slab);
   ProjectSettings settings_;
   Kernel kernel_;

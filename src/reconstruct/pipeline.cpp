@@ -137,6 +137,7 @@ void Pipeline::run(const RunContext& run, Stopwatch& watch) {
     watch.time("radii", [&] {
       feed_.prepare(std::max(marked, needed), [&](const ActiveBucket& b) { watch.time("mark", [&] { mark(b); }); });
     });
+    if (projected_ < stages_.of(Stage::project).end) projector_.begin(plan_.lattice, projected_, feed_);
     watch.time("refine", [&] { refine_to(ahead(Stage::refine)); });
     watch.time("project", [&] { project_to(ahead(Stage::project)); });
     watch.time("extend", [&] { extend_to(ahead(Stage::extend)); });
