@@ -109,8 +109,6 @@ class PatchGrower {
     forest_.emplace(order_.size());
   }
 
-  [[nodiscard]] bool is_root(std::size_t slot) { return forest_->find(static_cast<std::uint32_t>(slot)) == slot; }
-
   struct Link {
     std::uint32_t from, to;  ///< slots
     bool opposite;
@@ -151,14 +149,20 @@ class PatchGrower {
     return d;
   }
 
-  /// Joins samples of the cell along their links, the strongest first.
+  /// Joins samples of the cell along their links, the strongest first, until there is nothing left to join: mostly the
+  /// strongest links do it all.
   void grow(Cell& cell) {
-    std::array<std::vector<Link>, kStrengths>& by_strength = by_strength_.local();
-    for (std::vector<Link>& links : by_strength) links.clear();
-    for (std::size_t s = cell.begin; s < cell.end; ++s) {
+    const auto takes_part = [&](std::uint32_t place) { return !is_fixed(place) && samples_.has_normal(place); };
+    for (std::size_t s = cell.begin; s < cell.end; ++s) cell.patches += takes_part(links_.core[order_[s]]) ? 1 : 0;
+    const auto join = [&](const Link& link) {
+      if (forest_->unite(link.from, link.to, static_cast<std::int8_t>(link.opposite ? -1 : 1))) --cell.patches;
+    };
+    std::array<std::vector<Link>, kStrengths>& weaker = by_strength_.local();
+    for (std::vector<Link>& links : weaker) links.clear();
+    for (std::size_t s = cell.begin; s < cell.end && cell.patches > 1; ++s) {
       const std::uint32_t i = order_[s];
       const std::uint32_t place = links_.core[i];
-      if (is_fixed(place) || !samples_.has_normal(place)) continue;
+      if (!takes_part(place)) continue;
       for (std::size_t l = 0; l < Links::kMost; ++l) {
         const float w = judged_[i].agreement[l];
         const float strength = std::min(std::abs(w), 1.0F);
@@ -166,17 +170,16 @@ class PatchGrower {
         const std::uint32_t other = links_.neighbours[i][l];
         if (other == place || cell_of_[other] != cell_of_[place] || is_fixed(other)) continue;
         const auto bin = std::min(kStrengths - 1, static_cast<int>((1 - strength) / (1 - kWeakest) * kStrengths));
-        by_strength[static_cast<std::size_t>(bin)].push_back({static_cast<std::uint32_t>(s), slot_[other], w < 0});
+        const Link link{static_cast<std::uint32_t>(s), slot_[other], w < 0};
+        if (bin == 0) {
+          join(link);
+        } else {
+          weaker[static_cast<std::size_t>(bin)].push_back(link);
+        }
       }
     }
-    for (const std::vector<Link>& links : by_strength) {
-      for (const Link& link : links) {
-        forest_->unite(link.from, link.to, static_cast<std::int8_t>(link.opposite ? -1 : 1));
-      }
-    }
-    for (std::size_t s = cell.begin; s < cell.end; ++s) {
-      const std::uint32_t place = links_.core[order_[s]];
-      if (is_root(s) && !is_fixed(place) && samples_.has_normal(place)) ++cell.patches;
+    for (const std::vector<Link>& links : weaker) {
+      for (std::size_t l = 0; l < links.size() && cell.patches > 1; ++l) join(links[l]);
     }
   }
 
