@@ -41,7 +41,7 @@ struct TileSpan {
 std::vector<Placed> place(const LocalSamples& s, std::int32_t cell) {
   const FloorDivider divide(cell);
   std::vector<Placed> out(s.size());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, s.size(), 8192), [&](const auto& range) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, s.size(), kSampleGrain), [&](const auto& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       const std::array<std::int32_t, 3> c{divide(s.x[i]), divide(s.y[i]), divide(s.z[i])};
       // Cubes of two cells, so that successive samples see about the same rows.

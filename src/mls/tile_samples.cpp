@@ -199,11 +199,19 @@ Points points_of(const SampleCluster& c, int axis, const QueryLayers& layers, do
   return {ceil_cell(low - static_cast<double>(layers.shift)), floor_cell(high - static_cast<double>(layers.shift))};
 }
 
-void bin_bucket(const Lattice& lattice, const QueryLayers& layers, const ClusteredBucket& bucket,
-                std::span<const Block> tiles, const TileTable& table, std::vector<Entry>& out) {
+/// Some clusters of a bucket with the tiles they reach.
+struct Bin {
+  const ClusteredBucket* bucket;
+  std::uint32_t begin, end;  ///< clusters
+  std::vector<Entry> entries;
+};
+
+void find_tiles(const Lattice& lattice, const QueryLayers& layers, std::span<const Block> tiles, const TileTable& table,
+                Bin& bin) {
   const double inv = 1.0 / lattice.cell_size(layers.level);
-  for (std::uint32_t i = 0; i < bucket.clusters.size(); ++i) {
-    const SampleCluster& c = bucket.clusters[i];
+  std::vector<Entry>& out = bin.entries;
+  for (std::uint32_t i = bin.begin; i < bin.end; ++i) {
+    const SampleCluster& c = bin.bucket->clusters[i];
     const Points z = points_of(c, 2, layers, inv);
     const std::int32_t z0 = std::max(z.first, layers.first);
     const std::int32_t z1 = std::min(z.last, layers.end - 1);
@@ -266,24 +274,30 @@ void cluster_samples(const ActiveBucket& bucket, const Lattice& lattice, Cluster
 TileRuns bin_clusters(const Lattice& lattice, const QueryLayers& layers, const ClusteredBatch& batch,
                       std::span<const Block> tiles) {
   const TileTable table(tiles);
-  std::vector<std::vector<Entry>> entries(batch.size());
-  tbb::parallel_for(std::size_t{0}, batch.size(),
-                    [&](std::size_t b) { bin_bucket(lattice, layers, *batch[b], tiles, table, entries[b]); });
-  TileRuns bins;
-  bins.begin.assign(tiles.size() + 1, 0);
-  for (const auto& bucket : entries) {
-    for (const Entry& e : bucket) ++bins.begin[e.tile + 1];
+  constexpr std::uint32_t kClusters = 1024;  // so few of a bucket that all threads have work
+  std::vector<Bin> bins;
+  for (const auto& bucket : batch) {
+    const auto all = static_cast<std::uint32_t>(bucket->clusters.size());
+    for (std::uint32_t begin = 0; begin < all; begin += kClusters)
+      bins.push_back({bucket.get(), begin, std::min(begin + kClusters, all), {}});
   }
-  for (std::size_t t = 0; t < tiles.size(); ++t) bins.begin[t + 1] += bins.begin[t];
-  bins.runs.resize(bins.begin.back());
-  std::vector<std::uint32_t> cursor(bins.begin.begin(), bins.begin.end() - 1);
-  for (std::size_t b = 0; b < batch.size(); ++b) {
-    for (const Entry& e : entries[b]) {
-      const SampleCluster& c = batch[b]->clusters[e.cluster];
-      bins.runs[cursor[e.tile]++] = {batch[b].get(), c.begin, c.end};
+  tbb::parallel_for(std::size_t{0}, bins.size(),
+                    [&](std::size_t b) { find_tiles(lattice, layers, tiles, table, bins[b]); });
+  TileRuns out;
+  out.begin.assign(tiles.size() + 1, 0);
+  for (const Bin& bin : bins) {
+    for (const Entry& e : bin.entries) ++out.begin[e.tile + 1];
+  }
+  for (std::size_t t = 0; t < tiles.size(); ++t) out.begin[t + 1] += out.begin[t];
+  out.runs.resize(out.begin.back());
+  std::vector<std::uint32_t> cursor(out.begin.begin(), out.begin.end() - 1);
+  for (const Bin& bin : bins) {
+    for (const Entry& e : bin.entries) {
+      const SampleCluster& c = bin.bucket->clusters[e.cluster];
+      out.runs[cursor[e.tile]++] = {bin.bucket, c.begin, c.end};
     }
   }
-  return bins;
+  return out;
 }
 
 void RowSamples::gather(const Lattice& lattice, const QueryLayers& layers, const Block& block,

@@ -36,7 +36,7 @@ Pipeline::Pipeline(const ReconstructionPlan& plan, SampleFeed& feed, const SlabS
 }
 
 void Pipeline::mark(const ActiveBucket& bucket) {
-  constexpr std::size_t kPiece = 2048;
+  constexpr std::size_t kPiece = 1024;
   const std::size_t n = bucket.samples.size();
   const auto [low, high] = std::minmax_element(bucket.samples.z.begin(), bucket.samples.z.end());
   for (covered_ = std::min(covered_, plan_.lattice.slab_of(*low) - 1); covered_ <= plan_.lattice.slab_of(*high) + 2;

@@ -87,7 +87,7 @@ void CellBlocks::rebuild(std::size_t slots) {
 namespace {
 
 /// Samples counted by one task.
-constexpr std::size_t kChunk = 8192;
+constexpr std::size_t kChunk = 2048;
 
 constexpr int kHalo = kBlockSide + 2;
 /// A block's cells with one more on every side.

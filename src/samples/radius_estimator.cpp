@@ -87,7 +87,7 @@ void RadiusEstimator::push(const LocalSamples& samples) {
     }
     bucket.refs.resize(n);
     for (auto* cells : {&s.x, &s.y, &s.z}) cells->resize(n);
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 8192), [&](const auto& range) {
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, kSampleGrain), [&](const auto& range) {
       for (std::size_t i = range.begin(); i < range.end(); ++i) s.x[i] = cell(samples.x[i]);
       for (std::size_t i = range.begin(); i < range.end(); ++i) s.y[i] = cell(samples.y[i]);
       for (std::size_t i = range.begin(); i < range.end(); ++i) s.z[i] = cell(samples.z[i]);
@@ -110,7 +110,7 @@ bool RadiusEstimator::pop(std::vector<float>& radii) {
   const WaitingBucket& bucket = s.waiting.front();
   if (!bucket.refs.empty() && bucket.high >= s.final) return false;
   radii.resize(bucket.refs.size());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, radii.size(), 8192), [&](const auto& range) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, radii.size(), kSampleGrain), [&](const auto& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) radii[i] = s.octree.radius(bucket.refs[i]);
   });
   s.waiting.pop_front();

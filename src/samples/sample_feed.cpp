@@ -240,7 +240,7 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
     out.samples.nz = known.normals.z;
   }
   out.residual = known.normals.residual;
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, 8192), [&](const auto& range) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, kSampleGrain), [&](const auto& range) {
     SupportField::Cursor* const local = settings_.support ? &settings_.support->cursor() : nullptr;
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       const float r = known.radius[i];
@@ -252,7 +252,7 @@ void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {
       out.weight[i] = q * q * (has_quality ? out.samples.quality[i] : 1.0F);
       out.level[i] = fixed ? std::uint8_t{0}
                            : level_for(static_cast<double>(r) * (cell_ratio * (follows ? blend : 1.0F)), lattice_);
-      if (!known.finer.empty() && known.finer[i]) --out.level[i];
+      if (!known.finer.empty() && known.finer[i] != 0) --out.level[i];
       out.band[i] = std::max(settings_.band_cells * static_cast<float>(lattice_.cell_size(out.level[i])),
                              settings_.band_radii * r);
     }

@@ -135,8 +135,8 @@ class SampleFeed {
   struct Known {
     std::vector<float> radius;  ///< r_i, steps
     float max_support = 0;
-    FilteredNormals normals;  ///< where they are filtered
-    std::vector<bool> finer;  ///< which samples take a level less; empty: none
+    FilteredNormals normals;          ///< where they are filtered
+    std::vector<std::uint8_t> finer;  ///< 1: the sample takes a level less; empty: none does
   };
   void annotate(std::size_t bucket, ActiveBucket& out) const;
   /// The next bucket with samples from `bucket` on, the number of buckets when there is none.

@@ -1,9 +1,11 @@
 #include "samples/sheet_refinement.h"
 
 #include <tbb/blocked_range.h>
+#include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstddef>
@@ -207,27 +209,36 @@ std::uint64_t SheetRefinement::cancelling(std::uint64_t wanted, const Around& ar
   return out;
 }
 
-bool SheetRefinement::pop(std::int64_t pushed_below, std::vector<bool>& finer) {
+bool SheetRefinement::pop(std::int64_t pushed_below, std::vector<std::uint8_t>& finer) {
   if (waiting_.empty() || waiting_.front().high > pushed_below) return false;
   const WaitingBucket bucket = std::move(waiting_.front());
   waiting_.pop_front();
+  tbb::enumerable_thread_specific<std::vector<std::uint32_t>> found;
+  const tbb::blocked_range<std::size_t> samples(0, bucket.cell_of.size(), kSampleGrain);
+  tbb::parallel_for(samples, [&](const auto& range) {
+    std::vector<std::uint32_t>& blocks = found.local();
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      const std::uint32_t cell = bucket.cell_of[i];
+      if (cell == kNone) continue;
+      Findings& block = findings_[cell / kCells];
+      const std::uint64_t bit = std::uint64_t{1} << cell % kCells;
+      const std::atomic_ref<std::uint64_t> wanted(block.wanted);
+      if (((block.decided | wanted.load(std::memory_order_relaxed)) & bit) != 0) continue;
+      if (wanted.fetch_or(bit, std::memory_order_relaxed) == 0) blocks.push_back(cell / kCells);
+    }
+  });
   std::vector<std::uint32_t> undecided;
-  for (const std::uint32_t cell : bucket.cell_of) {
-    if (cell == kNone) continue;
-    Findings& block = findings_[cell / kCells];
-    const std::uint64_t bit = std::uint64_t{1} << cell % kCells;
-    if (((block.decided | block.wanted) & bit) != 0) continue;
-    if (block.wanted == 0) undecided.push_back(cell / kCells);
-    block.wanted |= bit;
-  }
+  for (const auto& blocks : found) undecided.insert(undecided.end(), blocks.begin(), blocks.end());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, undecided.size(), 64), [&](const auto& range) {
     for (std::size_t k = range.begin(); k < range.end(); ++k) decide(undecided[k]);
   });
-  finer.assign(bucket.cell_of.size(), false);
-  for (std::size_t i = 0; i < finer.size(); ++i) {
-    const std::uint32_t cell = bucket.cell_of[i];
-    finer[i] = cell != kNone && (findings_[cell / kCells].finer >> cell % kCells & 1U) != 0;
-  }
+  finer.resize(bucket.cell_of.size());
+  tbb::parallel_for(samples, [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      const std::uint32_t cell = bucket.cell_of[i];
+      finer[i] = cell != kNone && (findings_[cell / kCells].finer >> cell % kCells & 1U) != 0 ? 1 : 0;
+    }
+  });
   needed_from_ = pushed_below;
   for (const WaitingBucket& w : waiting_) needed_from_ = std::min(needed_from_, w.low);
   return true;

@@ -99,9 +99,9 @@ class SheetRefinement {
   explicit SheetRefinement(const Lattice& lattice);
   /// The next bucket's samples with the levels they ask for; `support` 0: left out.
   void push(const LocalSamples& samples, const std::vector<std::uint8_t>& level, const std::vector<float>& support);
-  /// Which samples of the next pushed bucket take a level less. False while samples around them may be missing: all
-  /// those below `pushed_below` have been pushed.
-  bool pop(std::int64_t pushed_below, std::vector<bool>& finer);
+  /// Which samples of the next pushed bucket take a level less: 1 for them, else 0. False while samples around them may
+  /// be missing: all those below `pushed_below` have been pushed.
+  bool pop(std::int64_t pushed_below, std::vector<std::uint8_t>& finer);
 
  private:
   static constexpr std::uint32_t kNone = CellTable::kNone;

@@ -22,6 +22,9 @@ struct LocalSamples {
   void reserve(std::size_t n);  ///< positions, normals and the attributes there are
 };
 
+/// Samples of a bucket that a thread takes at a time: few enough that a dozen threads have work.
+inline constexpr std::size_t kSampleGrain = 2048;
+
 struct StoreLayout {
   bool has_radius = false;
   bool has_quality = false;

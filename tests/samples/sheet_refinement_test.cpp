@@ -38,9 +38,9 @@ std::vector<std::uint8_t> levels_of(const LocalSamples& samples, std::vector<std
                                     const std::vector<float>& radius) {
   SheetRefinement sheets(kSheetLattice);
   sheets.push(samples, levels, radius);
-  std::vector<bool> finer;
+  std::vector<std::uint8_t> finer;
   EXPECT_TRUE(sheets.pop(kAll, finer));
-  for (std::size_t i = 0; i < levels.size(); ++i) levels[i] = static_cast<std::uint8_t>(levels[i] - (finer[i] ? 1 : 0));
+  for (std::size_t i = 0; i < levels.size(); ++i) levels[i] = static_cast<std::uint8_t>(levels[i] - finer[i]);
   return levels;
 }
 
@@ -159,7 +159,7 @@ TEST(SheetRefinement, DoesNotDependOnWhereBucketsAreCut) {
   EXPECT_NE(whole, wanted);
   for (const std::size_t size : {1U, 7U, 100U, 1111U}) {
     SheetRefinement sheets(kSheetLattice);
-    std::vector<bool> finer;
+    std::vector<std::uint8_t> finer;
     std::size_t popped = 0;
     std::size_t most_waiting = 0;
     const auto pop_all = [&](std::int64_t pushed_below) {
