@@ -84,33 +84,70 @@ SheetRefinement::Directions SheetRefinement::directions_near(float x, float y, f
 void SheetRefinement::push(const LocalSamples& samples, const std::vector<std::uint8_t>& level,
                            const std::vector<float>& support) {
   WaitingBucket& bucket = waiting_.emplace_back();
-  bucket.cell_of.assign(samples.size(), kNone);
+  bucket.cell_of.resize(samples.size());
+  // Which blocks there are is found by all threads, their indices by one, and what lies in them by all again.
+  std::vector<Piece> pieces((samples.size() + kSampleGrain - 1) / kSampleGrain);
+  for (std::size_t p = 0; p < pieces.size(); ++p) {
+    pieces[p].begin = p * kSampleGrain;
+    pieces[p].end = std::min(samples.size(), pieces[p].begin + kSampleGrain);
+  }
+  const auto for_pieces = [&](const auto& use) {
+    tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t p) { use(pieces[p]); });
+  };
+  for_pieces([&](Piece& piece) { list_blocks(samples, level, support, bucket, piece); });
+  for (Piece& piece : pieces) {
+    for (Visit& visit : piece.visits) visit.index = touch(visit.block, visit.level);
+    bucket.low = std::min(bucket.low, piece.low);
+    bucket.high = std::max(bucket.high, piece.high);
+  }
+  for_pieces([&](const Piece& piece) {
+    for (std::size_t i = piece.begin; i < piece.end; ++i) {
+      std::uint32_t& cell = bucket.cell_of[i];
+      if (cell != kNone) cell = piece.visits[cell / kCells].index * kCells + cell % kCells;
+    }
+  });
+  tbb::parallel_for(std::uint32_t{0}, kShares, [&](std::uint32_t share) { add(samples, bucket, share); });
+}
+
+/// The blocks of a piece's samples; until these have indices, cells count from the piece's list of them.
+void SheetRefinement::list_blocks(const LocalSamples& samples, const std::vector<std::uint8_t>& level,
+                                  const std::vector<float>& support, WaitingBucket& bucket, Piece& piece) const {
   // Of the last sample's block, by level: successive samples lie close to each other.
   std::vector<std::uint32_t> last(to_cell_.size(), kNone);
-  for (std::size_t i = 0; i < samples.size(); ++i) {
+  for (std::size_t i = piece.begin; i < piece.end; ++i) {
+    bucket.cell_of[i] = kNone;
     if (!(support[i] > 0) || level[i] == 0) continue;
     const FloorDivider& to_cell = to_cell_[level[i]];
     const Cell cell{to_cell(samples.x[i]), to_cell(samples.y[i]), to_cell(samples.z[i])};
     const Cell block{cell.x >> kSideBits, cell.y >> kSideBits, cell.z >> kSideBits};
-    std::uint32_t& index = last[level[i]];
-    if (index == kNone || blocks_[index].at != block) index = touch(block, level[i]);
+    std::uint32_t& visit = last[level[i]];
+    if (visit == kNone || piece.visits[visit].block != block) {
+      visit = static_cast<std::uint32_t>(piece.visits.size());
+      piece.visits.push_back({block, level[i], kNone});
+    }
     constexpr int kLast = kSide - 1;
-    const std::uint32_t in_block = index_in_block(cell.x & kLast, cell.y & kLast, cell.z & kLast);
-    Block& to = blocks_[index];
-    Findings& findings = findings_[index];
+    bucket.cell_of[i] = visit * kCells + index_in_block(cell.x & kLast, cell.y & kLast, cell.z & kLast);
+    piece.low = std::min(piece.low, std::int64_t{samples.z[i]});
+    piece.high = std::max(piece.high, (std::int64_t{cell.z} + 2) * lattice_.cell_size(level[i]));
+  }
+}
+
+/// The samples in every kShares-th block, which no other thread adds to.
+void SheetRefinement::add(const LocalSamples& samples, const WaitingBucket& bucket, std::uint32_t share) {
+  for (std::size_t i = 0; i < bucket.cell_of.size(); ++i) {
+    const std::uint32_t cell = bucket.cell_of[i];
+    if (cell == kNone || cell / kCells % kShares != share) continue;
+    Findings& findings = findings_[cell / kCells];
     if (const Directions near = directions_near(samples.nx[i], samples.ny[i], samples.nz[i]);
         (findings.shared & ~near) != 0) {
       findings.shared &= near;
-      districts_[findings.district] &= near;
+      std::atomic_ref(districts_[findings.district]).fetch_and(near, std::memory_order_relaxed);
     }
-    CellNormals& c = to.cells[in_block];
+    CellNormals& c = blocks_[cell / kCells].cells[cell % kCells];
     ++c.samples;
     c.x += in_units(samples.nx[i]);
     c.y += in_units(samples.ny[i]);
     c.z += in_units(samples.nz[i]);
-    bucket.cell_of[i] = index * kCells + in_block;
-    bucket.low = std::min(bucket.low, std::int64_t{samples.z[i]});
-    bucket.high = std::max(bucket.high, (std::int64_t{cell.z} + 2) * lattice_.cell_size(level[i]));
   }
 }
 

@@ -142,6 +142,24 @@ class SheetRefinement {
     std::int64_t low = std::numeric_limits<std::int64_t>::max();   ///< least z of the samples that count
     std::int64_t high = std::numeric_limits<std::int64_t>::min();  ///< upper end of the cells around them
   };
+  /// A block among successive samples.
+  struct Visit {
+    Cell block;
+    std::uint8_t level;
+    std::uint32_t index;
+  };
+  /// Successive samples of a bucket that is pushed, [begin, end).
+  struct Piece {
+    std::size_t begin = 0, end = 0;
+    std::vector<Visit> visits;
+    std::int64_t low = std::numeric_limits<std::int64_t>::max();   ///< as of WaitingBucket
+    std::int64_t high = std::numeric_limits<std::int64_t>::min();  ///< likewise
+  };
+  static constexpr std::uint32_t kShares = 16;  ///< of the blocks: each is filled by one thread
+
+  void list_blocks(const LocalSamples& samples, const std::vector<std::uint8_t>& level,
+                   const std::vector<float>& support, WaitingBucket& bucket, Piece& piece) const;
+  void add(const LocalSamples& samples, const WaitingBucket& bucket, std::uint32_t share);
   [[nodiscard]] bool is_needed(const Cell& at, int cells, std::uint8_t level) const;
   std::uint32_t touch(const Cell& block, std::uint8_t level);
   [[nodiscard]] Directions shared_around(const Block& block) const;
