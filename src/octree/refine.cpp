@@ -76,8 +76,9 @@ using Missing = tbb::combinable<std::vector<Block>>;
 /// In any order: the window puts its tiles in order.
 void make_blocks(Window& window, int level, Missing& missing) {
   missing.combine_each([&](const std::vector<Block>& blocks) {
-    for (const Block& b : blocks) window.touch(level, b);
+    for (const Block& b : blocks) window.touch_shared(level, b);
   });
+  window.introduce();
 }
 
 /// Makes the blocks that the slab's part of the marked cells, moved by up to [lo, hi]^3, can fall into.
@@ -219,6 +220,7 @@ void close_cells(const CornerBlock& leaf, int begin, int end, std::uint64_t* out
 
 void refine_slab(Window& window, std::int32_t slab) {
   const int levels = window.levels();
+  window.introduce();  // the blocks of samples marked since
   for (int level = 0; level < levels; ++level) {
     touch_around<&CornerBlock::home>(window, level, slab, -kRefinedCells, kRefinedCells);
     for_tiles<BlockParts<&CornerBlock::around, &CornerBlock::home, &CornerBlock::touched>>(

@@ -1,6 +1,10 @@
 #include "octree/window.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
+#include <atomic>
 #include <deque>
 #include <limits>
 #include <mutex>
@@ -66,6 +70,12 @@ struct Window::Trees {
   std::vector<std::unique_ptr<CornerLeaf>> spare;  ///< retired leaves, used again: leaves come and go all the time
   SparePages spare_pages;
   std::mutex creation;
+  /// A leaf that does not know its neighbours, nor they it.
+  struct Stranger {
+    int level;
+    Tile tile;
+  };
+  std::vector<Stranger> strangers;
 
   /// The lookup table that knows of the block, null where none does.
   static LayerTable* table(Level& level, const Block& b) {
@@ -106,7 +116,7 @@ struct Window::Trees {
     level.tree.addLeaf(leaf);
     CornerBlock& block = leaf->block;
     level.layers[b.z - level.z_base].tiles.push_back({b, &block});
-    introduce(l, b, block);
+    strangers.push_back({l, {b, &block}});
     if (LayerTable* known = table(level, b)) known->set(b.x, b.y, &block, spare_pages);
     return block;
   }
@@ -128,12 +138,18 @@ struct Window::Trees {
     spare.emplace_back(level.tree.stealNode<CornerLeaf>(leaf_origin(t.block), false, false));
   }
 
-  /// Stages look at a leaf's neighbours far more often than leaves come and go.
-  void introduce(int l, const Block& b, CornerBlock& block) {
+  /// Stages look at a leaf's neighbours far more often than leaves come and go. Two strangers write the same.
+  void introduce(const Stranger& stranger) {
+    const auto& [b, block] = stranger.tile;
+    const auto set = [](CornerBlock*& to, CornerBlock* other) {
+      std::atomic_ref(to).store(other, std::memory_order_relaxed);
+    };
     for (int i = 0; i < 27; ++i) {
-      CornerBlock* other = i == 13 ? &block : find(l, {b.x + i % 3 - 1, b.y + i / 3 % 3 - 1, b.z + i / 9 - 1});
-      block.around[i] = other;
-      if (other != nullptr) other->around[26 - i] = &block;
+      const Block at{b.x + i % 3 - 1, b.y + i / 3 % 3 - 1, b.z + i / 9 - 1};
+      CornerBlock* const other = i == 13 ? block : find(stranger.level, at);
+      if (other == nullptr) continue;
+      set(block->around[i], other);
+      set(other->around[26 - i], block);
     }
   }
 
@@ -191,7 +207,9 @@ CornerBlock* Window::probe(int level, const Block& b) {
 
 CornerBlock& Window::touch(int level, const Block& b) {
   if (CornerBlock* block = trees_->find(level, b)) return *block;
-  return trees_->create(level, b);
+  CornerBlock& made = trees_->create(level, b);
+  introduce();
+  return made;
 }
 
 void Window::cover(std::int32_t slab) {
@@ -207,7 +225,17 @@ CornerBlock& Window::touch_shared(int level, const Block& b) {
     if (CornerBlock* block = table->find(b.x, b.y)) return *block;
   }
   const std::lock_guard lock(trees_->creation);
-  return touch(level, b);
+  CornerBlock* const there = trees_->find(level, b);
+  return there != nullptr ? *there : trees_->create(level, b);
+}
+
+void Window::introduce() {
+  constexpr std::size_t kAtOnce = 64;
+  const auto& strangers = trees_->strangers;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, strangers.size(), kAtOnce), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) trees_->introduce(strangers[i]);
+  });
+  trees_->strangers.clear();
 }
 
 Tiles Window::tiles(int level, std::int32_t slab) const {
@@ -237,6 +265,7 @@ void Window::retire_values(std::int32_t slab) {
 }
 
 void Window::retire_below(std::int32_t slab) {
+  introduce();
   for (int l = 0; l < levels(); ++l) {
     Trees::Level& level = trees_->levels[l];
     const std::int32_t first = lattice_.first_layer(l, slab);

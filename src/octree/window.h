@@ -76,8 +76,11 @@ class Window {
   CornerBlock& touch(int level, const Block& b);
   /// Makes room for the leaves of a slab, before touch_shared() there.
   void cover(std::int32_t slab);
-  /// touch() from several threads at once (all of them through this function, nobody probing), in covered slabs.
+  /// touch() from several threads at once (all of them through this function, nobody probing), in covered slabs. Leaves
+  /// that are made so have no neighbours (CornerBlock::around), nor are they anyone's, until introduce().
   CornerBlock& touch_shared(int level, const Block& b);
+  /// Gives the leaves made by touch_shared() their neighbours, by all threads.
+  void introduce();
   /// The level's leaves that hold layers of a slab. One thread at a time.
   [[nodiscard]] Tiles tiles(int level, std::int32_t slab) const;
   /// Frees the values of a slab's corners; masks stay.

@@ -95,6 +95,7 @@ TEST(Window, LeavesComeAndGoLikeAModel) {
         const auto found = leaves.find(key_of(beside));
         RC_ASSERT(window.probe(level, beside) == (found == leaves.end() ? nullptr : found->second));
       }
+      window.introduce();
       expect_model(window, model, -22, 12);
       if (between(0, 1) == 0) continue;
       floor = between(floor, 8);
@@ -213,6 +214,15 @@ TEST(Window, ThreadsTouchTheSameLeaves) {
       ASSERT_EQ(window.probe(level, block), first[i]);
     }
     EXPECT_EQ(window.leaf_count(), leaves.size());
+    window.introduce();
+    for (const auto& [at, block] : leaves) {
+      const auto& [level, key] = at;
+      for (int i = 0; i < 27; ++i) {
+        const auto& [z, y, x] = key;
+        const auto beside = leaves.find({level, {z + i / 9 - 1, y + i / 3 % 3 - 1, x + i % 3 - 1}});
+        ASSERT_EQ(block->around[static_cast<std::size_t>(i)], beside == leaves.end() ? nullptr : beside->second);
+      }
+    }
   }
 }
 
