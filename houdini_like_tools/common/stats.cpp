@@ -127,13 +127,16 @@ nlohmann::ordered_json stats_json(const SurfaceStats& s, const SurfaceSettings& 
   j["radius"] = {{"p01", s.plan.radius_low}, {"median", s.plan.radius_median}, {"p99", s.plan.radius_high}};
   j["wall_seconds"] = s.wall;
   j["cpu_seconds"] = s.cpu;
+  j["threads"] = s.threads;
+  j["partly_idle_seconds"] = s.partly_idle;
   j["peak_memory_bytes"] = s.peak_memory;
   j["expected_memory_bytes"] = s.plan.memory_bytes;
   j["temporary_disk_bytes"] = s.disk_bytes;
   j["expected_disk_bytes"] = s.plan.disk_bytes;
   j["expected_seconds"] = s.plan.seconds;
   j["stages"] = nlohmann::ordered_json::array();
-  for (const StageTime& t : s.stages) j["stages"].push_back({{"stage", t.stage}, {"wall", t.wall}, {"cpu", t.cpu}});
+  for (const StageTime& t : s.stages)
+    j["stages"].push_back({{"stage", t.stage}, {"wall", t.wall}, {"cpu", t.cpu}, {"partly_idle", t.partly_idle}});
   j["rejected"] = nlohmann::ordered_json::array();
   for (const Rejected& r : s.rejected) {
     nlohmann::ordered_json entry{{"reason", r.reason}, {"count", r.count}};

@@ -166,8 +166,9 @@ struct SurfacePlan {
 
 struct StageTime {
   std::string stage;
-  double wall = 0;  ///< seconds
-  double cpu = 0;   ///< seconds, all threads
+  double wall = 0;         ///< seconds
+  double cpu = 0;          ///< seconds, all threads
+  double partly_idle = 0;  ///< seconds of `wall` in which fewer than all threads had work
 };
 
 struct Rejected {
@@ -209,6 +210,8 @@ struct SurfaceStats {
   TileStats tiles;                       ///< where they were asked for
   std::vector<StageTime> stages;
   double wall = 0, cpu = 0;
+  int threads = 1;
+  double partly_idle = 0;         ///< as of StageTime
   std::uint64_t peak_memory = 0;  ///< bytes, of the process
   std::uint64_t disk_bytes = 0;   ///< temporary: the most that the samples' store and the faces took at once
 };

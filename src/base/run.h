@@ -18,10 +18,10 @@ void require_memory(const RunContext& run, std::uint64_t needed, const std::stri
 std::uint64_t machine_memory();
 
 /// Runs work on as many threads as the run was told. `threads` 0: as many as the machine has. More than it has are
-/// granted too: a test of identity wants them.
+/// granted too: a test of identity wants them. Where so many are at work already, they do this, too.
 template <class Work>
 void with_threads(int threads, Work&& work) {
-  if (threads <= 0) {
+  if (threads <= 0 || threads == tbb::this_task_arena::max_concurrency()) {
     std::forward<Work>(work)();
     return;
   }

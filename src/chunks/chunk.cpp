@@ -247,7 +247,7 @@ ChunkStats reconstruct_chunk(const SurfaceSettings& settings, const Chunk& chunk
   }
   Job job(run);
   ChunkStats stats;
-  run_in_arena(run, [&] { stats = run_chunk(settings, chunk, job); });
+  run_in_arena(job, [&] { stats = run_chunk(settings, chunk, job); });
   return stats;
 }
 

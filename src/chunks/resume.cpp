@@ -297,7 +297,7 @@ SurfaceStats reconstruct_resumable(const SurfaceSettings& settings, const Checkp
   require_two_files(settings);
   for (const std::string& output : output_names(settings)) const OutputFile trial(output, run.tmp_dir);
   Job job(run);
-  run_in_arena(run, [&] { ResumableRun(settings, checkpoint, job).finish(); });
+  run_in_arena(job, [&] { ResumableRun(settings, checkpoint, job).finish(); });
   return job.stats;
 }
 

@@ -159,17 +159,34 @@ void note_input(const StoredCloud& cloud, SurfaceStats& stats) {
 
 void Job::finish() {
   stats.stages = watch.stages();
+  stats.partly_idle = watch.partly_idle();
   const Stopwatch::Moment ended = Stopwatch::now();
   stats.wall = ended.wall - began.wall;
   stats.cpu = ended.cpu - began.cpu;
+  stats.threads = tbb::this_task_arena::max_concurrency();
   stats.peak_memory = peak_memory();
 }
 
-void run_in_arena(const RunContext& run, const std::function<void()>& work) {
+namespace {
+
+/// `watch`: sees how well the threads are used; none: nobody wants to know.
+void work_in_arena(const RunContext& run, Stopwatch* watch, const std::function<void()>& work) {
   const int threads = run.threads > 0 ? run.threads : tbb::this_task_arena::max_concurrency();
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, static_cast<std::size_t>(threads));
   tbb::task_arena arena(threads);
+  std::optional<ThreadWatch> watched;
+  if (watch != nullptr) watch->watch(watched.emplace(arena, threads));
   arena.execute(work);
+}
+
+}  // namespace
+
+void run_in_arena(const RunContext& run, const std::function<void()>& work) {
+  work_in_arena(run, nullptr, work);
+}
+
+void run_in_arena(Job& job, const std::function<void()>& work) {
+  work_in_arena(job.run, &job.watch, work);
 }
 
 ReconstructionPlan plan_surface(const SurfaceSettings& settings, const StoredCloud& cloud, Job& job) {

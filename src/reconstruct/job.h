@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "base/thread_watch.h"
 #include "lamina/points.h"
 #include "lamina/run.h"
 #include "lamina/surface.h"
@@ -26,6 +27,10 @@ class Stopwatch {
   struct Moment {
     double wall, cpu;
   };
+  /// Asks `threads`, which must outlive the last time(), how well they are used.
+  void watch(const ThreadWatch& threads) { threads_ = &threads; }
+  [[nodiscard]] double partly_idle() const { return threads_ == nullptr ? 0 : threads_->partly_idle(); }
+
   static Moment now() {
     timespec t{};
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
@@ -38,9 +43,12 @@ class Stopwatch {
   template <typename Work>
   void time(std::string_view stage, Work&& work) {
     const Moment before = now();
+    const double idle_before = partly_idle();
     work();
+    const double idle = partly_idle() - idle_before;
     const Moment after = now();
     StageTime& s = find(stage);
+    s.partly_idle += idle;
     s.wall += after.wall - before.wall;
     s.cpu += after.cpu - before.cpu;
   }
@@ -51,9 +59,10 @@ class Stopwatch {
     for (StageTime& s : stages_) {
       if (s.stage == stage) return s;
     }
-    return stages_.emplace_back(StageTime{std::string(stage), 0, 0});
+    return stages_.emplace_back(StageTime{std::string(stage), 0, 0, 0});
   }
   std::vector<StageTime> stages_;
+  const ThreadWatch* threads_ = nullptr;
 };
 
 /// One run of a job: where it reports to, what it has taken, what it has counted.
@@ -74,8 +83,10 @@ struct Job {
   void finish();
 };
 
-/// Runs `work` with the threads and in the arena of a job.
+/// Runs `work` with the threads and in the arena of a run.
 void run_in_arena(const RunContext& run, const std::function<void()>& work);
+/// The same, and the job's stopwatch sees how well the threads are used.
+void run_in_arena(Job& job, const std::function<void()>& work);
 
 /// The cloud's plan, told to the user and in job.stats. Throws Error(empty) where the samples lie too far apart,
 /// Error(budget) where they need too much memory, and what make_plan() throws.

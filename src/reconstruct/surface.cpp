@@ -155,7 +155,7 @@ SurfaceStats reconstruct_surface(const SurfaceSettings& settings, const RunConte
   check_settings(settings);
   require_two_files(settings);
   Job job(run);
-  run_in_arena(run, [&] { reconstruct(settings, job); });
+  run_in_arena(job, [&] { reconstruct(settings, job); });
   return job.stats;
 }
 

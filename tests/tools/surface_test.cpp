@@ -223,6 +223,8 @@ TEST_F(SurfaceTool, StatsTellEverything) {
   EXPECT_EQ(j["leaf_cells_by_level"].size(), 4u);
   EXPECT_GT(j["wall_seconds"], 0);
   EXPECT_GT(j["cpu_seconds"], 0);
+  EXPECT_GE(j["threads"], 1);
+  EXPECT_LE(j["partly_idle_seconds"], j["wall_seconds"]);
   EXPECT_GT(j["peak_memory_bytes"], 1 << 20);
   EXPECT_GT(j["expected_memory_bytes"], 1 << 20);
   EXPECT_GE(j["temporary_disk_bytes"], 13 * mesh.triangles.size());
@@ -232,6 +234,7 @@ TEST_F(SurfaceTool, StatsTellEverything) {
     stages.insert(stage["stage"]);
     EXPECT_GE(stage["wall"], 0);
     EXPECT_GE(stage["cpu"], 0);
+    EXPECT_LE(stage["partly_idle"], stage["wall"]);
     if (stage["stage"] != "mark") wall += stage["wall"].get<double>();  // part of another
   }
   EXPECT_LE(wall, j["wall_seconds"].get<double>() * 1.0001);
