@@ -218,12 +218,7 @@ Extent extent_of(const SlabStore& store) {
   constexpr std::int32_t kMax = std::numeric_limits<std::int32_t>::max();
   constexpr std::int32_t kMin = std::numeric_limits<std::int32_t>::min();
   const auto both = [](Extent a, const Extent& b) {
-    a.x_min = std::min(a.x_min, b.x_min);
-    a.x_max = std::max(a.x_max, b.x_max);
-    a.y_min = std::min(a.y_min, b.y_min);
-    a.y_max = std::max(a.y_max, b.y_max);
-    a.z_min = std::min(a.z_min, b.z_min);
-    a.z_max = std::max(a.z_max, b.z_max);
+    widen(a, b);
     return a;
   };
   const auto add = [&](const tbb::blocked_range<std::size_t>& buckets, Extent e) {
@@ -233,7 +228,7 @@ Extent extent_of(const SlabStore& store) {
       store.read(b, samples);
       const auto [x_min, x_max] = std::minmax_element(samples.x.begin(), samples.x.end());
       const auto [y_min, y_max] = std::minmax_element(samples.y.begin(), samples.y.end());
-      e = both(e, {{*x_min, *x_max, *y_min, *y_max}, store.z_lower(b), store.z_upper(b)});
+      widen(e, {{*x_min, *x_max, *y_min, *y_max}, store.z_lower(b), store.z_upper(b)});
     }
     return e;
   };

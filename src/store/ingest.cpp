@@ -185,6 +185,8 @@ void to_local(IngestPiece& piece, const AttributeLayout& layout, const Frame& fr
   std::tie(piece.extent.z_min, piece.extent.z_max) = range_of(out.z);
 }
 
+}  // namespace
+
 void widen(Extent& b, const Extent& by) {
   b.x_min = std::min(b.x_min, by.x_min);
   b.x_max = std::max(b.x_max, by.x_max);
@@ -193,6 +195,8 @@ void widen(Extent& b, const Extent& by) {
   b.z_min = std::min(b.z_min, by.z_min);
   b.z_max = std::max(b.z_max, by.z_max);
 }
+
+namespace {
 
 StoreSettings store_settings(const Survey& survey, const Frame& frame, const StorePlace& place) {
   // The rotated bounding box bounds the samples' z.

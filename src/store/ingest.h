@@ -165,4 +165,7 @@ class RowIdSource final : public PointSource {
 std::uint64_t row_of(const LocalSamples& samples, std::size_t i);
 bool has_given_normal(const LocalSamples& samples, std::size_t i);
 
+/// Makes an extent hold another, too.
+void widen(Extent& b, const Extent& by);
+
 }  // namespace lamina
