@@ -11,10 +11,11 @@
 namespace {
 
 /// Large arrays go back to the system when they are freed. By default the C library raises the size from which they do
-/// with the first one freed, and keeps gaps between what lives long: a fifth of the memory at 16 million samples.
+/// with the first one freed, and keeps gaps between what lives long: a fifth of the memory at 16 million samples. From
+/// an eighth of this size on it would be 2 % less memory, and up to a tenth more time for pages cleared anew.
 void return_large_arrays() {
 #ifdef __GLIBC__
-  constexpr int kLarge = 128 << 10;
+  constexpr int kLarge = 1 << 20;
   mallopt(M_MMAP_THRESHOLD, kLarge);
 #endif
 }

@@ -26,12 +26,13 @@ Tracker::Tracker(const OldMesh& old)
       under_(old.triangles.size()),
       homes_(old.triangles.size()) {
   for (std::uint32_t i = 0; i < old.triangles.size(); ++i) {
-    back_[i] = old.errors[i].back;
+    const auto& [corners, twins, errors] = old.triangles[i];
+    back_[i] = errors.back;
     room_[i] = static_cast<float>(kUsed * old.bound);
-    spare_[i] = static_cast<float>(old.bound) - std::max(old.errors[i].out, old.errors[i].back);
+    spare_[i] = static_cast<float>(old.bound) - std::max(errors.out, errors.back);
     under_[i] = homes_[i] = i;
-    for (std::uint32_t k = 0; k < 3; ++k) {
-      if (old.twins[3 * i + k] == kNone) add_rim(old.triangles[i][k], old.triangles[i][(k + 1) % 3]);
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (twins[k] == kNone) add_rim(corners[k], corners[(k + 1) % 3]);
     }
   }
 }
@@ -215,7 +216,7 @@ std::uint32_t Proof::home_of(std::uint32_t number) {
   for (std::size_t next = 0; next < queue_.size(); ++next) {
     const std::uint32_t home = tracker_.home(queue_[next]);
     if (now_.stars.alive(home)) return home;
-    for (const std::uint32_t v : old_.triangles[queue_[next]]) {
+    for (const std::uint32_t v : old_.triangles[queue_[next]].corners) {
       for (const std::uint32_t other : old_.around(v)) {
         if (searched_[other] == search_) continue;
         searched_[other] = search_;
@@ -230,10 +231,10 @@ std::uint32_t Proof::home_of(std::uint32_t number) {
 /// near what is around these?
 void Proof::prove_old(std::uint32_t number) {
   OldProof& proof = proofs_[number];
-  const Triangle& t = old_.triangles[number];
-  const auto error = static_cast<double>(old_.errors[number].out);
+  const Triangle& t = old_.triangles[number].corners;
+  const auto error = static_cast<double>(old_.triangles[number].errors.out);
   if (now_.stars.alive(number) && !changed(number)) {
-    keep(proof, old_.errors[number].out, std::span(&number, 1));
+    keep(proof, old_.triangles[number].errors.out, std::span(&number, 1));
     return;
   }
   const Corners corners{old_.positions[t[0]], old_.positions[t[1]], old_.positions[t[2]]};
@@ -289,7 +290,7 @@ void Proof::keep(OldProof& proof, float error, std::span<const std::uint32_t> fa
 
 void Proof::prove_face(std::uint32_t face) {
   if (!changed(face)) {
-    back_[face] = old_.errors[face].back;
+    back_[face] = old_.triangles[face].errors.back;
     return;
   }
   NearOld& near_old = tracker_.near_old();

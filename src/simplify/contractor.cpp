@@ -21,7 +21,8 @@ Contractor::Contractor(Piece piece)
       size_(stars_.triangles().size()),
       version_(piece_.positions.size()) {
   if (piece_.bound > 0) {
-    old_.emplace(piece_.positions, stars_.triangles(), std::move(piece_.errors), piece_.bound);
+    old_.emplace(piece_.positions, stars_.triangles(), piece_.errors, piece_.bound);
+    piece_.errors = {};
     tracker_.emplace(*old_);
     change_.assign(size_, kNone);
   }
@@ -158,7 +159,7 @@ void Contractor::prove() {
   if (!steps_.empty()) {
     keep_bound();
   } else {
-    errors_ = std::move(old_->errors);
+    for (const OldTriangle& t : old_->triangles) errors_.push_back(t.errors);
   }
   std::erase_if(merges_, [](const Merge& merge) { return merge.u == kNone; });
   heap_ = {};

@@ -21,11 +21,11 @@ struct OldView {
   const OldMesh& old;
   bool both_ways;
   [[nodiscard]] const Vec3& position(std::uint32_t v) const { return old.positions[v]; }
-  [[nodiscard]] const Triangle& triangle(std::uint32_t t) const { return old.triangles[t]; }
-  [[nodiscard]] std::uint32_t twin(std::uint32_t side) const { return old.twins[side]; }
-  [[nodiscard]] double error(std::uint32_t t) const { return static_cast<double>(old.errors[t].back); }
+  [[nodiscard]] const Triangle& triangle(std::uint32_t t) const { return old.triangles[t].corners; }
+  [[nodiscard]] std::uint32_t twin(std::uint32_t side) const { return old.triangles[side / 3].twins[side % 3]; }
+  [[nodiscard]] double error(std::uint32_t t) const { return static_cast<double>(old.triangles[t].errors.back); }
   [[nodiscard]] double needs(std::uint32_t t) const {
-    const Errors& e = old.errors[t];
+    const Errors& e = old.triangles[t].errors;
     return static_cast<double>(both_ways ? std::max(e.back, e.out) : e.back);
   }
 };
@@ -114,7 +114,7 @@ void NearOld::search(const Corners& triangle, std::uint32_t begin) {
   search_[begin] = ++searches_;
   for (std::size_t next = 0; next < queue_.size() && found_.size() <= kManyFacets; ++next) {
     const std::uint32_t number = queue_[next];
-    const Triangle& t = old_.triangles[number];
+    const Triangle& t = old_.triangles[number].corners;
     const bool meets = box.meets(old_.positions[t[0]], old_.positions[t[1]], old_.positions[t[2]]);
     if (meets) found_.push_back(facet(number));
     if (!meets && next > kAnyAround) continue;
@@ -130,10 +130,10 @@ void NearOld::search(const Corners& triangle, std::uint32_t begin) {
 
 const Facet* NearOld::facet(std::uint32_t number) {
   if (facets_[number] == nullptr) {
-    const Triangle& t = old_.triangles[number];
+    const Triangle& t = old_.triangles[number].corners;
     Facet& facet = made_.emplace_back(
         make_facet(old_.positions[t[0]], old_.positions[t[1]], old_.positions[t[2]], extent_.origin));
-    facet.error = static_cast<double>(old_.errors[number].back);
+    facet.error = static_cast<double>(old_.triangles[number].errors.back);
     facet.id = number;
     facets_[number] = &facet;
   }

@@ -22,26 +22,38 @@ struct Errors {
   float back = 0;  ///< every point of the triangle is within `back` of that mesh
 };
 
+/// A triangle with what is asked of it together: in one line of the cache.
+struct OldTriangle {
+  Triangle corners;
+  std::array<std::uint32_t, 3>
+      twins;  ///< of the sides (Overlay): the same one of the other triangle; kNone: a boundary
+  Errors errors;
+};
+
 struct OldMesh {
-  OldMesh(std::vector<meshes::Vec3> places, std::vector<Triangle> corners, std::vector<Errors> of_triangles,
+  OldMesh(std::vector<meshes::Vec3> places, const std::vector<Triangle>& corners, const std::vector<Errors>& errors,
           double most)
       : positions(std::move(places)),
-        triangles(std::move(corners)),
-        errors(std::move(of_triangles)),
         bound((1 - kRounding) * most),
         begins(positions.size() + 1),
-        listed(3 * triangles.size()) {
-    for (const Triangle& t : triangles) {
+        listed(3 * corners.size()) {
+    for (const Triangle& t : corners) {
       for (const std::uint32_t v : t) ++begins[v];
     }
     std::uint32_t end = 0;
     for (std::uint32_t& begin : begins) begin = end += begin;
-    for (std::uint32_t i = 0; i < triangles.size(); ++i) {
-      for (const std::uint32_t v : triangles[i]) listed[--begins[v]] = i;
+    for (std::uint32_t i = 0; i < corners.size(); ++i) {
+      for (const std::uint32_t v : corners[i]) listed[--begins[v]] = i;
     }
-    twins.reserve(listed.size());
-    for (std::uint32_t side = 0; side < listed.size(); ++side)
-      twins.push_back(find_twin(triangles, side, around(triangles[side / 3][side % 3])));
+    triangles.reserve(corners.size());
+    for (std::uint32_t i = 0; i < corners.size(); ++i)
+      triangles.push_back({corners[i], {kNone, kNone, kNone}, errors[i]});
+    for (std::uint32_t side = 0; side < listed.size(); ++side) {
+      std::uint32_t& twin = triangles[side / 3].twins[side % 3];
+      if (twin != kNone) continue;
+      twin = find_twin(corners, side, around(corners[side / 3][side % 3]));
+      if (twin != kNone) triangles[twin / 3].twins[twin % 3] = side;
+    }
   }
 
   /// The triangles at a vertex.
@@ -52,11 +64,9 @@ struct OldMesh {
   static constexpr double kRounding = 1e-6;  ///< of the bound: what arithmetic may cost
 
   std::vector<meshes::Vec3> positions;
-  std::vector<Triangle> triangles;
-  std::vector<Errors> errors;  ///< of the triangles
+  std::vector<OldTriangle> triangles;
   double bound;
   std::vector<std::uint32_t> begins, listed;
-  std::vector<std::uint32_t> twins;  ///< of the sides (Overlay): the same one of the other triangle; kNone: a boundary
 };
 
 /// The middle of the vertices, more or less, and how far any of them lies from there.

@@ -43,8 +43,9 @@ class Overlay {
     ++proof_;
     answer_ = Answer::near;
     open_.clear();
-    const Errors errors = visit(mesh, begin_, first_);
-    for (std::uint32_t k = 0; k < 3; ++k) offer(3 * begin_ + k, errors, first_[k], first_[(k + 1) % 3]);
+    seen_.assign(first_.begin(), first_.end());
+    visit(mesh, begin_, first_);
+    for (std::uint32_t k = 0; k < 3; ++k) offer(3 * begin_ + k, k, (k + 1) % 3);
     while (going_on() && !open_.empty()) cross(mesh);
     return going_on() && corners_found_ != 7 ? Answer::unclear : answer_;
   }
@@ -63,17 +64,13 @@ class Overlay {
   /// A place seen from the triangle: shares of its corners (barycentric coordinates) and the height over it.
   struct Seen {
     double first, second, third, height;
+    unsigned outside;  ///< a bit for each share that is no more than kTouching: of which sides it is not inside
   };
   using Corners = std::array<Seen, 3>;
-  struct Errors {
-    double error, needs;
-  };
   /// Of a visited triangle: a part of it is over the triangle.
   struct Open {
-    std::uint32_t side;
-    Errors errors;
-    Seen from, to;
-    double height;  ///< the greatest
+    std::uint32_t side, from, to;  ///< from and to: in seen_
+    double height;                 ///< the greatest
   };
 
   [[nodiscard]] bool going_on() const { return answer_ == Answer::near || answer_ == Answer::likely; }
@@ -95,7 +92,9 @@ class Overlay {
   [[nodiscard]] Seen see(const meshes::Vec3& at) const {
     const meshes::Vec3 from = meshes::operator-(at, origin_);
     const double second = meshes::dot(second_, from), third = meshes::dot(third_, from);
-    return {1 - second - third, second, third, meshes::dot(normal_, from)};
+    const double first = 1 - second - third;
+    const auto bit = [](double share, unsigned k) { return static_cast<unsigned>(share <= kTouching) << k; };
+    return {first, second, third, meshes::dot(normal_, from), bit(first, 0) | bit(second, 1) | bit(third, 2)};
   }
 
   /// Of a triangle seen from above, in areas of the one that is proved; below 0 where it faces the other way.
@@ -106,10 +105,10 @@ class Overlay {
   /// Towards the middle of the triangle.
   template <class Mesh>
   bool find_first(const Mesh& mesh) {
-    constexpr Seen kMiddle{1. / 3, 1. / 3, 1. / 3, 0};
+    constexpr Seen kMiddle{1. / 3, 1. / 3, 1. / 3, 0, 0};
+    const Triangle& t = mesh.triangle(begin_);
+    for (std::size_t k = 0; k < 3; ++k) first_[k] = see(mesh.position(t[k]));
     for (int step = 0; step < kSteps; ++step) {
-      const Triangle& t = mesh.triangle(begin_);
-      for (std::size_t k = 0; k < 3; ++k) first_[k] = see(mesh.position(t[k]));
       std::uint32_t leave = 3;
       double least = 0;
       for (std::uint32_t k = 0; k < 3; ++k) {
@@ -122,20 +121,24 @@ class Overlay {
       const std::uint32_t next = mesh.twin(3 * begin_ + leave);
       if (next == kNone) return false;
       begin_ = next / 3;
+      const Seen from = first_[(leave + 1) % 3], to = first_[leave];
+      const std::uint32_t k = next % 3;
+      first_[k] = from;
+      first_[(k + 1) % 3] = to;
+      first_[(k + 2) % 3] = see(mesh.position(mesh.triangle(begin_)[(k + 2) % 3]));
     }
     return false;
   }
 
   /// Takes a triangle in; corners of the one that is proved may be under it.
   template <class Mesh>
-  Errors visit(const Mesh& mesh, std::uint32_t number, const Corners& at) {
+  void visit(const Mesh& mesh, std::uint32_t number, const Corners& at) {
     visited_[number] = proof_;
     used_.push_back(number);
-    const Errors errors{mesh.error(number), mesh.needs(number)};
     const double all = area(at[0], at[1], at[2]);
     if (!(all > 0)) {
       answer_ = Answer::unclear;
-      return errors;
+      return;
     }
     // Twice the areas with the first corner are these cross products; with another they differ by the sides.
     const double least = -kOnSide * all;
@@ -151,62 +154,70 @@ class Overlay {
         first += at[2].second - at[1].second;
       }
       const double second = all - third - first;
-      if (first < least || second < least || third < least) continue;
-      note(mesh, number, errors, std::abs(first * at[0].height + second * at[1].height + third * at[2].height) / all);
+      if (std::min({first, second, third}) < least) continue;
+      note(mesh, number, std::abs(first * at[0].height + second * at[1].height + third * at[2].height) / all);
       corners_found_ |= 1U << corner;
     }
-    return errors;
   }
 
   /// A triangle of the mesh is so high over the one that is proved.
   template <class Mesh>
-  void note(const Mesh& mesh, std::uint32_t number, const Errors& errors, double height) {
-    error_ = std::max(error_, height + errors.error);
-    if (height + errors.needs <= most_ || !going_on()) return;
+  void note(const Mesh& mesh, std::uint32_t number, double height) {
+    error_ = std::max(error_, height + mesh.error(number));
+    if (height + mesh.needs(number) > most_ && going_on()) ask_plane(mesh, number, height);
+  }
+
+  template <class Mesh>
+  [[gnu::noinline]] void ask_plane(const Mesh& mesh, std::uint32_t number, double height) {
     using namespace meshes;
     const Triangle& t = mesh.triangle(number);
     const Vec3& at = mesh.position(t[0]);
     const Vec3 n = meshes::cross(mesh.position(t[1]) - at, mesh.position(t[2]) - at);
     const double from_plane = height * std::abs(dot(normal_, unit(n)));
-    answer_ = from_plane + errors.needs > most_ ? Answer::far : Answer::likely;
+    answer_ = from_plane + mesh.needs(number) > most_ ? Answer::far : Answer::likely;
   }
 
   /// Where a part of a side is over the triangle what is beyond has to be seen.
-  void offer(std::uint32_t side, const Errors& errors, const Seen& from, const Seen& to) {
+  void offer(std::uint32_t side, std::uint32_t from_seen, std::uint32_t to_seen) {
+    const Seen &from = seen_[from_seen], &to = seen_[to_seen];
+    if ((from.outside & to.outside) != 0) return;
     double begin = 0, end = 1;
-    const auto clip = [&](double a, double b) {
-      a -= kTouching;
-      b -= kTouching;
-      if (a > 0 && b > 0) return true;
-      if (a <= 0 && b <= 0) return false;
-      double& limit = a < b ? begin : end;
-      limit = a < b ? std::max(begin, a / (a - b)) : std::min(end, a / (a - b));
-      return true;
-    };
-    if (!clip(from.first, to.first) || !clip(from.second, to.second) || !clip(from.third, to.third) || begin >= end)
-      return;
+    if (const unsigned cut = from.outside | to.outside; cut != 0) {
+      const auto clip = [&](unsigned k, double a, double b) {
+        if ((cut >> k & 1U) == 0) return;
+        a -= kTouching;
+        b -= kTouching;
+        double& limit = a < b ? begin : end;
+        limit = a < b ? std::max(begin, a / (a - b)) : std::min(end, a / (a - b));
+      };
+      clip(0, from.first, to.first);
+      clip(1, from.second, to.second);
+      clip(2, from.third, to.third);
+      if (begin >= end) return;
+    }
     const double rise = to.height - from.height;
     open_.push_back(
-        {side, errors, from, to, std::max(std::abs(from.height + begin * rise), std::abs(from.height + end * rise))});
+        {side, from_seen, to_seen, std::max(std::abs(from.height + begin * rise), std::abs(from.height + end * rise))});
   }
 
   template <class Mesh>
   void cross(const Mesh& mesh) {
     const Open open = open_.back();
     open_.pop_back();
-    note(mesh, open.side / 3, open.errors, open.height);
+    note(mesh, open.side / 3, open.height);
     const std::uint32_t twin = mesh.twin(open.side), beyond = twin / 3, k = twin % 3;
     if (twin == kNone) {
       answer_ = Answer::unclear;
     } else if (visited_[beyond] == proof_) {
-      note(mesh, beyond, {mesh.error(beyond), mesh.needs(beyond)}, open.height);
+      note(mesh, beyond, open.height);
     } else {
-      const Seen top = see(mesh.position(mesh.triangle(beyond)[(k + 2) % 3]));
-      const Errors errors = visit(mesh, beyond, {open.to, open.from, top});
-      note(mesh, beyond, errors, open.height);
+      const auto top = static_cast<std::uint32_t>(seen_.size());
+      seen_.push_back(see(mesh.position(mesh.triangle(beyond)[(k + 2) % 3])));
+      visit(mesh, beyond, {seen_[open.to], seen_[open.from], seen_[top]});
+      note(mesh, beyond, open.height);
       if (!going_on()) return;
-      offer(3 * beyond + (k + 1) % 3, errors, open.from, top);
-      offer(3 * beyond + (k + 2) % 3, errors, top, open.to);
+      offer(3 * beyond + (k + 1) % 3, open.from, top);
+      offer(3 * beyond + (k + 2) % 3, top, open.to);
     }
   }
 
@@ -216,6 +227,7 @@ class Overlay {
   std::uint32_t begin_ = 0;
   unsigned corners_found_ = 0;  ///< a bit for each
   Corners first_{};
+  std::vector<Seen> seen_;  ///< vertices that were seen
   std::vector<Open> open_;
   std::vector<std::uint32_t> used_;
   std::vector<std::uint32_t> visited_;  ///< of the mesh's triangles: the last proof that took them

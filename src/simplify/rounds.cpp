@@ -35,6 +35,7 @@ constexpr std::uint64_t kPieceKeeps = 8;  ///< one in so many triangles, where a
 // With a bound:
 constexpr double kFirstBound = 0.125;  ///< of the median edge: few triangles lie so near another; no step is less
 constexpr double kBoundGrows = 4;      ///< from one step to the next; what a step has used up is missing in the last
+constexpr int kRings = 4;              ///< of triangles around what a round may move: proofs look at what lies around
 constexpr int kBoundRounds = 3;  ///< of the last step: the first goes as far as it can, others clear what it held fast
 
 /// Where a round cuts: different from the two before it.
@@ -43,17 +44,44 @@ double share_of_round(int round) {
   return kShares[static_cast<std::size_t>(round) % kShares.size()];
 }
 
+/// Triangles by number: all of them, or, where rounds have gone before, those within kRings of a vertex that has not
+/// been tried and may move. Few have not: those that pieces held fast.
+std::vector<std::uint32_t> triangles_to_try(const WorkMesh& work) {
+  const std::vector<Triangle>& triangles = work.mesh.triangles;
+  std::vector<std::uint8_t> near(work.mesh.positions.size(), 1);
+  if (std::any_of(work.tried.begin(), work.tried.end(), [](std::uint8_t tried) { return tried != 0; })) {
+    for (std::size_t v = 0; v < near.size(); ++v) {
+      near[v] = work.tried[v] == 0 && (work.locked.empty() || work.locked[v] == 0) ? 1 : 0;
+    }
+  }
+  const auto is_near = [&](const Triangle& t) { return (near[t[0]] | near[t[1]] | near[t[2]]) != 0; };
+  for (int ring = 1; ring < kRings; ++ring) {
+    std::vector<std::uint8_t> wider = near;
+    for (const Triangle& t : triangles) {
+      if (is_near(t)) wider[t[0]] = wider[t[1]] = wider[t[2]] = 1;
+    }
+    near = std::move(wider);
+  }
+  std::vector<std::uint32_t> chosen;
+  for (std::uint32_t t = 0; t < triangles.size(); ++t) {
+    if (is_near(triangles[t])) chosen.push_back(t);
+  }
+  return chosen;
+}
+
 class Round {
  public:
   Round(WorkMesh& work, double share) : work_(work), size_(work.mesh.triangles.size()) {
-    const auto place = [&](std::size_t triangle) {
-      const auto& [a, b, c] = work.mesh.triangles[triangle];
+    const std::vector<std::uint32_t> chosen = triangles_to_try(work);
+    const auto place = [&](std::size_t number) {
+      const auto& [a, b, c] = work.mesh.triangles[chosen[number]];
       return at(a) + at(b) + at(c);
     };
-    starts_ = cut_into_boxes(size_, place, kPieceTriangles, share, order_);
+    starts_ = cut_into_boxes(chosen.size(), place, kPieceTriangles, share, order_);
+    for (std::uint32_t& triangle : order_) triangle = chosen[triangle];
     pieces_.resize(starts_.size() - 1);
     vertices_.resize(pieces_.size());
-    find_owners();
+    find_owners(chosen);
   }
 
   [[nodiscard]] std::uint64_t size() const { return size_; }
@@ -163,8 +191,16 @@ class Round {
   }
 
   /// Which piece has all triangles of a vertex.
-  void find_owners() {
+  void find_owners(const std::vector<std::uint32_t>& chosen) {
     owner_.assign(work_.mesh.positions.size(), kNone);
+    std::size_t next = 0;
+    for (std::uint32_t t = 0; chosen.size() < size_ && t < size_; ++t) {
+      if (next < chosen.size() && chosen[next] == t) {
+        ++next;
+        continue;
+      }
+      for (const std::uint32_t v : work_.mesh.triangles[t]) owner_[v] = kSeveral;
+    }
     for (std::uint32_t p = 0; p + 1 < starts_.size(); ++p) {
       for (const std::uint32_t t : triangles_of(p)) {
         for (const std::uint32_t v : work_.mesh.triangles[t])
