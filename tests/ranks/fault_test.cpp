@@ -1,4 +1,5 @@
 // A rank that fails ends the job: one message, its exit code, nothing under the output's name.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <sys/stat.h>
@@ -86,16 +87,18 @@ TEST_F(RankFaults, LauncherOfAnotherMpi) {
 }
 
 TEST_F(RankFaults, KilledRank) {
-  // Rank 0 waits for an input that never comes: whenever the other one is killed, the job is under way.
+  // Rank 0 waits for an input that never comes. Until it begins to, opening the pipe to write waits: the other one is
+  // killed while the job is under way, and not while MPI is starting it. Should no rank begin, something else reads.
   const std::string pipe = folder_ / "pipe.ply";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  const test::Outcome outcome = test::run_shell(test::mpirun(2) + " surface " + pipe + " -o " + (folder_ / "out.ply") +
-                                                " -q & run=$!\n"
-                                                "for i in $(seq 1200); do ranks=$(ps -o pid= --ppid $run); set -- "
-                                                "$ranks; [ $# -eq 2 ] && break; sleep 0.05; done\n"
-                                                "sleep 0.2; kill -9 ${2:-$run}; wait $run");
+  const std::string quoted = test::quoted(pipe);
+  const test::Outcome outcome = test::run_shell(
+      test::mpirun(2) + " surface " + quoted + " -o " + test::quoted(folder_ / "out.ply") + " -q & run=$!\n" +
+      "(sleep 60; exec cat " + quoted + ") >/dev/null 2>&1 & other=$!\n" + "exec 3>" + quoted +
+      "; kill $other; set -- $(ps -o pid= --ppid $run); kill -9 ${2:-$run}; wait $run");
   std::filesystem::remove(pipe);
   EXPECT_NE(outcome.code, 0);
+  EXPECT_THAT(outcome.out + outcome.err, testing::HasSubstr("signal 9"));
   EXPECT_EQ(folder_.entries(), entries_);
 }
 
