@@ -104,7 +104,7 @@ double refit_memory(const ReconstructionPlan& plan, double per_step) {
 
 /// Behind the sweep: the mesh as it was waits, and regions of it, with quadrics.
 void add_simplification(const ReconstructionPlan& plan, const SlabStore& store, ExpectedCost& cost) {
-  constexpr double kProgram = 60e6, kRegions = 84, kPlain = 2.2e-6, kWithin = 20e-6, kFlat = 0.55e-6;
+  constexpr double kProgram = 35e6, kRegions = 84, kPlain = 2.2e-6, kWithin = 20e-6, kFlat = 0.55e-6;
   const double triangles = expected_triangles(plan);
   const auto count = static_cast<std::uint64_t>(triangles);
   cost.memory =
@@ -126,7 +126,7 @@ double mesh_memory(const ReconstructionPlan& plan, const SlabStore& store, doubl
   const double per_sample = slabs_with_values(plan) * corner_bytes + slabs_with_surface(plan) * surface_bytes;
   const double cached = std::min(static_cast<double>(plan.feed.cache_bytes),
                                  static_cast<double>(store.total()) * (37 + 4.0 * attributes));
-  constexpr double kProgram = 60e6;
+  constexpr double kProgram = 35e6;
   // What the window's count leaves out - counting cells, clustering, bins, and the allocator's gaps - grows with it,
   // and with the samples within reach, however low slabs are. Where thin sheets are looked for cells' normals come to
   // it, and more leaves.
@@ -140,7 +140,7 @@ double mesh_memory(const ReconstructionPlan& plan, const SlabStore& store, doubl
 /// Of --tiles: the cells and the leaves' buffers, and what a thread works on.
 double tiles_memory(const ReconstructionPlan& plan) {
   if (plan.tiles.folder.empty()) return 0;
-  constexpr double kProgram = 60e6, kLeaves = 48e6, kVertices = 64e6, kThread = 60e6;
+  constexpr double kProgram = 35e6, kLeaves = 48e6, kVertices = 64e6, kThread = 60e6;
   constexpr double kPerTriangle = 1.0, kLeafTriangles = 45'000;
   const double triangles = expected_triangles(plan);
   const double threads =
