@@ -48,11 +48,15 @@ double share_of_round(int round) {
 /// been tried and may move. Few have not: those that pieces held fast.
 std::vector<std::uint32_t> triangles_to_try(const WorkMesh& work) {
   const std::vector<Triangle>& triangles = work.mesh.triangles;
-  std::vector<std::uint8_t> near(work.mesh.positions.size(), 1);
-  if (std::any_of(work.tried.begin(), work.tried.end(), [](std::uint8_t tried) { return tried != 0; })) {
-    for (std::size_t v = 0; v < near.size(); ++v) {
-      near[v] = work.tried[v] == 0 && (work.locked.empty() || work.locked[v] == 0) ? 1 : 0;
-    }
+  std::vector<std::uint32_t> chosen;
+  if (std::all_of(work.tried.begin(), work.tried.end(), [](std::uint8_t tried) { return tried == 0; })) {
+    chosen.resize(triangles.size());
+    std::iota(chosen.begin(), chosen.end(), 0U);
+    return chosen;
+  }
+  std::vector<std::uint8_t> near(work.tried.size());
+  for (std::size_t v = 0; v < near.size(); ++v) {
+    near[v] = work.tried[v] == 0 && (work.locked.empty() || work.locked[v] == 0) ? 1 : 0;
   }
   const auto is_near = [&](const Triangle& t) { return (near[t[0]] | near[t[1]] | near[t[2]]) != 0; };
   for (int ring = 1; ring < kRings; ++ring) {
@@ -62,7 +66,6 @@ std::vector<std::uint32_t> triangles_to_try(const WorkMesh& work) {
     }
     near = std::move(wider);
   }
-  std::vector<std::uint32_t> chosen;
   for (std::uint32_t t = 0; t < triangles.size(); ++t) {
     if (is_near(triangles[t])) chosen.push_back(t);
   }
