@@ -112,6 +112,7 @@ void RimFairer::find_rim(Held& here, const Held* above) {
   each_corner([&](std::uint32_t v, std::uint32_t next, std::uint32_t before) {
     if (slot[v] != kInside) here.rim[slot[v]].fan.push_back({next, before});
   });
+  for (RimVertex& v : here.rim) std::sort(v.fan.begin(), v.fan.end());  // sums must not depend on how they came
 }
 
 /// A slab's vertices take a step when those beside, in the slabs around, have taken the one before.
@@ -150,16 +151,24 @@ double RimFairer::least_height(const RimVertex& v, std::size_t steps) const {
   return least;
 }
 
+/// The fit's normal turns with the noise, more so where samples end: along its plane a rim would leave the surface.
+RimFairer::Point RimFairer::normal(const RimVertex& v, std::size_t steps) const {
+  const Eigen::Vector3d at = vector_of(v.at[steps]);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const auto& [next, before] : v.fan)
+    sum += (vector_of(position(next, steps)) - at).cross(vector_of(position(before, steps)) - at);
+  sum.normalize();
+  return {sum.x(), sum.y(), sum.z()};
+}
+
 void RimFairer::step(Held& here, std::size_t number) {
-  const VertexBatch& vertices = here.mesh.vertices;
   for (RimVertex& v : here.rim) {
     const Eigen::Vector3d at = vector_of(v.at[number - 1]);
-    const Eigen::Vector3d normal =
-        Eigen::Vector3f(vertices.nx[v.vertex], vertices.ny[v.vertex], vertices.nz[v.vertex]).cast<double>();
+    const Eigen::Vector3d across = vector_of(normal(v, number - 1));
     const Eigen::Vector3d middle =
         0.5 * (vector_of(position(v.beside[0], number - 1)) + vector_of(position(v.beside[1], number - 1)));
     Eigen::Vector3d move = 0.5 * (middle - at);
-    move -= move.dot(normal) * normal;
+    move -= move.dot(across) * across;
     const double most = kMostFairing * least_height(v, number - 1);
     if (const double length = move.norm(); length > most) move *= most / length;
     const Eigen::Vector3d to = at + move;

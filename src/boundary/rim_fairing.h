@@ -21,8 +21,8 @@ inline constexpr double kMostFairing = 0.35;
 
 /// Takes a streamed mesh slab by slab and gives it back, kFairingSteps slabs later: vertices on the boundary with one
 /// neighbour to either side along it have gone half of the way to the middle between these, kFairingSteps times, across
-/// their normals. What comes out of a slab depends on it and on kFairingSteps slabs to either side alone, and not on
-/// the order of triangles.
+/// the normals of the triangles there. What comes out of a slab depends on it and on kFairingSteps slabs to either side
+/// alone, and not on the order of triangles.
 class RimFairer {
  public:
   void push(MeshSlab slab);
@@ -37,7 +37,7 @@ class RimFairer {
     std::uint32_t vertex = 0;                       ///< of its slab
     std::array<std::uint32_t, 2> beside{};          ///< along the boundary, numbers over all slabs
     std::array<Point, kFairingSteps + 1> at{};      ///< before the steps and after each
-    std::vector<std::array<std::uint32_t, 2>> fan;  ///< the other two vertices of its triangles
+    std::vector<std::array<std::uint32_t, 2>> fan;  ///< the other two vertices of its triangles, ascending
   };
   struct Held {
     MeshSlab mesh;
@@ -51,6 +51,8 @@ class RimFairer {
   void step(Held& here, std::size_t number);
   [[nodiscard]] Point position(std::uint32_t v, std::size_t steps) const;
   [[nodiscard]] double least_height(const RimVertex& v, std::size_t steps) const;
+  /// The mean of the triangles', by area; 0 where they have none.
+  [[nodiscard]] Point normal(const RimVertex& v, std::size_t steps) const;
 
   std::deque<Held> held_;  ///< the last that has gone, its positions alone, and those that have not
   bool below_ = false;     ///< the first one held has gone
