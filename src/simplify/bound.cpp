@@ -11,7 +11,9 @@ using namespace meshes;
 constexpr float kTightened = 0.8F;
 constexpr double kUsed = 0.995;      ///< of the bound: the other way it is a little farther
 constexpr float kSurelyNear = 0.3F;  ///< of what is left of the bound: root mean square of distances taken on trust
-constexpr double kRimUsed = 0.6;     ///< of the bound: root mean square distance of a boundary vertex from the boundary
+/// Of a piece: as few are left of large triangles, each of which counts. Pieces that meshes are cut into have more.
+constexpr std::size_t kFewTriangles = 12'000;
+constexpr double kRimUsed = 0.6;  ///< of the bound: root mean square distance of a boundary vertex from the boundary
 
 }  // namespace
 
@@ -60,6 +62,9 @@ bool Tracker::rim_allows(std::uint32_t u, std::uint32_t v, const Vec3& to) const
 bool Tracker::allows(const Stars& stars, std::span<const Vec3> positions, std::uint32_t u, std::uint32_t v,
                      const Vec3& to) {
   if (!rim_allows(u, v, to)) return false;
+  // At a boundary the mesh ends, elsewhere it turns away: there, to ask in another way takes long and hardly pays,
+  // since what grows from such a place is often taken back.
+  const bool asks_again = stars.boundary(u) || stars.boundary(v) || old_.triangles.size() <= kFewTriangles;
   after_.clear();
   uses_.clear();
   room_after_ = spare_after_ = static_cast<float>(kUsed * old_.bound);
@@ -78,7 +83,8 @@ bool Tracker::allows(const Stars& stars, std::span<const Vec3> positions, std::u
       const auto most = static_cast<double>(room_after_);
       const NearOld::Answer answer = near_old_.look(corners, under_[triangle], most);
       if (answer == NearOld::Answer::far) return false;
-      if (answer == NearOld::Answer::unclear && !near_old_.prove(corners, under_[triangle], most)) return false;
+      if (answer == NearOld::Answer::unclear && !(asks_again && near_old_.prove(corners, under_[triangle], most)))
+        return false;
       const auto used = near_old_.used();
       uses_.insert(uses_.end(), used.begin(), used.end());
       after_.push_back({triangle, near_old_.begin(), near_old_.error(), static_cast<std::uint32_t>(uses_.size())});
