@@ -139,37 +139,33 @@ RimFairer::Point RimFairer::position(std::uint32_t v, std::size_t steps) const {
   return {vertices.x[i], vertices.y[i], vertices.z[i]};
 }
 
-double RimFairer::least_height(const RimVertex& v, std::size_t steps) const {
+RimFairer::Fan RimFairer::fan_of(const RimVertex& v, std::size_t steps) const {
   const Eigen::Vector3d at = vector_of(v.at[steps]);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double least = HUGE_VAL;
   for (const auto& [next, before] : v.fan) {
     const Eigen::Vector3d p = vector_of(position(next, steps)) - at;
     const Eigen::Vector3d q = vector_of(position(before, steps)) - at;
+    const Eigen::Vector3d across = p.cross(q);
     const double longest = std::sqrt(std::max({p.squaredNorm(), q.squaredNorm(), (p - q).squaredNorm()}));
-    least = std::min(least, longest > 0 ? p.cross(q).norm() / longest : 0);
+    least = std::min(least, longest > 0 ? across.norm() / longest : 0);
+    sum += across;
   }
-  return least;
-}
-
-/// The fit's normal turns with the noise, more so where samples end: along its plane a rim would leave the surface.
-RimFairer::Point RimFairer::normal(const RimVertex& v, std::size_t steps) const {
-  const Eigen::Vector3d at = vector_of(v.at[steps]);
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const auto& [next, before] : v.fan)
-    sum += (vector_of(position(next, steps)) - at).cross(vector_of(position(before, steps)) - at);
   sum.normalize();
-  return {sum.x(), sum.y(), sum.z()};
+  return {{sum.x(), sum.y(), sum.z()}, least};
 }
 
 void RimFairer::step(Held& here, std::size_t number) {
   for (RimVertex& v : here.rim) {
     const Eigen::Vector3d at = vector_of(v.at[number - 1]);
-    const Eigen::Vector3d across = vector_of(normal(v, number - 1));
+    const Fan fan = fan_of(v, number - 1);
+    // Not the fit's, which turns with the noise, more so where samples end: a rim would leave the surface.
+    const Eigen::Vector3d normal = vector_of(fan.normal);
     const Eigen::Vector3d middle =
         0.5 * (vector_of(position(v.beside[0], number - 1)) + vector_of(position(v.beside[1], number - 1)));
     Eigen::Vector3d move = 0.5 * (middle - at);
-    move -= move.dot(across) * across;
-    const double most = kMostFairing * least_height(v, number - 1);
+    move -= move.dot(normal) * normal;
+    const double most = kMostFairing * fan.least_height;
     if (const double length = move.norm(); length > most) move *= most / length;
     const Eigen::Vector3d to = at + move;
     v.at[number] = {to.x(), to.y(), to.z()};

@@ -39,6 +39,11 @@ class RimFairer {
     std::array<Point, kFairingSteps + 1> at{};      ///< before the steps and after each
     std::vector<std::array<std::uint32_t, 2>> fan;  ///< the other two vertices of its triangles, ascending
   };
+  /// The triangles at a vertex.
+  struct Fan {
+    Point normal;         ///< their mean, by area; 0 where they have none
+    double least_height;  ///< over a longest side
+  };
   struct Held {
     MeshSlab mesh;
     std::uint32_t first = 0;     ///< number of its first vertex
@@ -50,9 +55,7 @@ class RimFairer {
   void go_on();
   void step(Held& here, std::size_t number);
   [[nodiscard]] Point position(std::uint32_t v, std::size_t steps) const;
-  [[nodiscard]] double least_height(const RimVertex& v, std::size_t steps) const;
-  /// The mean of the triangles', by area; 0 where they have none.
-  [[nodiscard]] Point normal(const RimVertex& v, std::size_t steps) const;
+  [[nodiscard]] Fan fan_of(const RimVertex& v, std::size_t steps) const;
 
   std::deque<Held> held_;  ///< the last that has gone, its positions alone, and those that have not
   bool below_ = false;     ///< the first one held has gone
