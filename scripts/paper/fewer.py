@@ -28,20 +28,20 @@ def measured(program, cloud, truth, folder, limit, wanted):
     """Rows; `wanted`: is a name?"""
     mesh, fewer = os.path.join(folder, "mesh.ply"), os.path.join(folder, "fewer.ply")
     for cell in CELLS if wanted(UNIFORM) else ():
-        cost = runs.chosen(program, cloud, mesh, [*ALL, "--cell", cell])
+        cost = runs.surface(program, cloud, mesh, [*ALL, "--cell", cell])
         yield {"name": UNIFORM, "wanted": cell, "cost": cost} | runs.judge(program, mesh, truth)
     for deviation in DEVIATIONS if wanted(FLAT) else ():
         options = KEEP if deviation == "default" else [*KEEP, "--deviation", deviation]
-        cost = runs.chosen(program, cloud, mesh, options)
+        cost = runs.surface(program, cloud, mesh, options)
         yield {"name": FLAT, "wanted": deviation, "cost": cost} | runs.judge(program, mesh, truth)
     for count in ASKED_COUNTS if wanted(ASKED) else ():
-        cost = runs.chosen(program, cloud, mesh, [*KEEP, "--triangles", str(count)])
+        cost = runs.surface(program, cloud, mesh, [*KEEP, "--triangles", str(count)])
         yield {"name": ASKED, "wanted": count, "cost": cost} | runs.judge(program, mesh, truth)
     meshlab = shutil.which("meshlabserver") and shutil.which("xvfb-run")
     for name, options in ((OURS, []), (MESHLAB, []), (FINE, ["--cell", "0.6r"])):
         if not wanted(name) or (name == MESHLAB and not meshlab):
             continue
-        runs.chosen(program, cloud, mesh, [*ALL, *options])
+        runs.surface(program, cloud, mesh, [*ALL, *options])
         for count in FINE_COUNTS if name == FINE else COUNTS:
             print(f"  {name}, {count}", flush=True)
             row = {"name": name, "wanted": count}

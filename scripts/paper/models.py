@@ -5,6 +5,7 @@ import os
 import shutil
 import struct
 import subprocess
+import sys
 
 DRAGON = "dragon_vrip.ply.gz"
 NAMES = ("dragon", "armadillo", "bunny", "knot")
@@ -60,11 +61,12 @@ def _unpack(packed, path):
 def _estimate_normals(source, target):
     """PCA over the nearest neighbours by Open3D, so that no program is judged on normals of its own making. Signs are
     those of the true normals the samples came with."""
-    import open3d
-    cloud = open3d.io.read_point_cloud(source)
-    cloud.estimate_normals(open3d.geometry.KDTreeSearchParamKNN(NEIGHBOURS))
-    open3d.io.write_point_cloud(target + ".part.ply", cloud)
-    os.rename(target + ".part.ply", target)
+    _run_open3d(source, target, NEIGHBOURS)
+
+
+def _run_open3d(source, target, *numbers):
+    script = os.path.join(os.path.dirname(os.path.abspath(__file__)), "open3d_normals.py")
+    subprocess.run([sys.executable, script, source, target, *map(str, numbers)], check=True)
 
 
 def has_normals(cloud):
@@ -78,12 +80,7 @@ def with_normals(cloud, target):
     if has_normals(cloud):
         return cloud
     if not os.path.exists(target):
-        import open3d
-        points = open3d.io.read_point_cloud(cloud)
-        points.estimate_normals(open3d.geometry.KDTreeSearchParamKNN(30))
-        points.orient_normals_consistent_tangent_plane(15)
-        open3d.io.write_point_cloud(target + ".part.ply", points)
-        os.rename(target + ".part.ply", target)
+        _run_open3d(cloud, target, 30, 15)
     return target
 
 

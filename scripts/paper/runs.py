@@ -49,12 +49,7 @@ class _Watchdog:
 
 
 def surface(program, cloud, mesh, options):
-    """A run of lamina surface that chooses nothing but what `options` say: `run` with the counts of --stats."""
-    return chosen(program, cloud, mesh, ["--raw", *options])
-
-
-def chosen(program, cloud, mesh, options):
-    """A run of lamina surface as it chooses by itself."""
+    """A run of lamina surface: `run` with the counts of --stats."""
     stats = mesh + ".json"
     cost = run([program, "surface", cloud, "-o", mesh, "--quiet", "--stats", stats, *options])
     with open(stats) as f:

@@ -122,7 +122,7 @@ def measured(case, program, found, wanted, known):
 
 
 def _lamina(program, cloud, mesh, options):
-    cost = runs.chosen(program, cloud, mesh, options)
+    cost = runs.surface(program, cloud, mesh, options)
     del cost["stats"]
     return cost
 

@@ -3,37 +3,17 @@
 // a surface trimmed by density does (Kazhdan and Hoppe, "Screened Poisson surface reconstruction", 2013), and not along
 // whole triangles.
 #pragma once
-#include <array>
 #include <cstdint>
 #include <deque>
 #include <utility>
 #include <vector>
 
-#include "meshes/mesh_sink.h"
+#include "meshes/mesh_slab.h"
 
 namespace lamina {
 
 /// A cut lies at least this share of its edge away from either end, so that no triangle loses its area.
 inline constexpr float kLeastCut = 0.05F;
-
-/// A slab of a streamed mesh: triangles name vertices of this slab and of the one before, counted over all slabs.
-struct MeshSlab {
-  std::int64_t slab = 0;
-  VertexBatch vertices;
-  std::vector<std::array<std::uint32_t, 3>> triangles;
-};
-
-/// Calls use(vertex, next, before) for the corners in triangles of a slab's vertices [first, end); `vertex` counts from
-/// the first.
-template <typename Use>
-void for_corners(const std::vector<std::array<std::uint32_t, 3>>& triangles, std::uint32_t first, std::uint32_t end,
-                 const Use& use) {
-  for (const auto& t : triangles) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (t[k] >= first && t[k] < end) use(t[k] - first, t[(k + 1) % 3], t[(k + 2) % 3]);
-    }
-  }
-}
 
 /// Takes a streamed mesh slab by slab and gives back what lies within the level, one slab later, in the order in which
 /// it came: of every slab the vertices that stay, then those of its cuts by the edge they lie on. A manifold stays one.

@@ -17,8 +17,12 @@
 #include "lamina/mesh_receiver.h"
 #include "meshes/mesh_sink.h"
 #include "reconstruct/plan.h"
+#include "reconstruct/stages.h"
 
 namespace lamina {
+
+static_assert(kFlipSlabs == kFlipReach);
+
 namespace {
 
 struct Corner {
@@ -159,6 +163,7 @@ void place_vertices(const ClusteredSlab& slab, const ReconstructionPlan& plan, V
 MeshOutput::MeshOutput(const ReconstructionPlan& plan, SlabSink& sink)
     : plan_(plan), sink_(sink), clusterer_(ClusterSettings{plan.cluster}), distinct_(plan.double_positions) {
   const auto level = static_cast<float>(plan.trim);
+  if (plan.projection.creases) flips_.emplace();
   if (level > 0) rims_.emplace(Rims{RimSmoother(level), RimTrimmer(level), {}});
 }
 
@@ -213,10 +218,10 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
     mesh_.slab = done_.slab;
     place_vertices({done_, *clustered_.front(), next}, plan_, mesh_.vertices);
     std::swap(mesh_.triangles, done_.triangles);
-    if (rims_) {
-      rims_->smoother.push(std::exchange(mesh_, rims_->trimmer.spare()));
+    if (flips_) {
+      flips_->push(std::exchange(mesh_, {}));
     } else {
-      pass_on(mesh_);
+      hand_to_rims(mesh_);
     }
     if (clustered_.front().use_count() == 1) {
       const std::lock_guard lock(mutex_);
@@ -224,7 +229,20 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
     }
     clustered_.pop_front();
   }
+  if (flips_) {
+    if (last) flips_->finish();
+    while (flips_->pop(mesh_)) hand_to_rims(mesh_);
+  }
   if (rims_) trim(last);
+}
+
+/// Which pass it on where there are none.
+void MeshOutput::hand_to_rims(MeshSlab& slab) {
+  if (rims_) {
+    rims_->smoother.push(std::exchange(slab, rims_->trimmer.spare()));
+  } else {
+    pass_on(slab);
+  }
 }
 
 void MeshOutput::trim(bool last) {

@@ -16,6 +16,7 @@
 #include "boundary/rim_fairing.h"
 #include "boundary/rims.h"
 #include "clustering/clusterer.h"
+#include "clustering/crease_flips.h"
 #include "isosurface/iso_mesh.h"
 #include "lamina/frame.h"
 #include "lamina/mesh_receiver.h"
@@ -93,6 +94,7 @@ class MeshOutput {
 
  private:
   void work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last);
+  void hand_to_rims(MeshSlab& slab);
   void trim(bool last);
   void pass_on(MeshSlab& slab);
 
@@ -103,6 +105,7 @@ class MeshOutput {
   std::deque<std::shared_ptr<IsoSlab>> clustered_;  ///< by the clusterer, not yet written
   FinalSlab done_;                                  ///< lent to the clusterer and back: its storage is kept
   MeshSlab mesh_;                                   ///< of `done_`
+  std::optional<CreaseFlips> flips_;                ///< where there are creases
   /// What makes the rims.
   struct Rims {
     RimSmoother smoother;

@@ -81,7 +81,9 @@ struct ReconstructionPlan {
   ExpectedCost expected;
 
   /// The slabs each stage works on for the finished slabs of a span.
-  [[nodiscard]] StageSpans stages_of(const SlabSpan& span) const { return {span, slabs, projection.centres}; }
+  [[nodiscard]] StageSpans stages_of(const SlabSpan& span) const {
+    return {span, slabs, {projection.centres, projection.creases}};
+  }
 };
 
 /// Throws Error(usage) for settings out of range. Called before the input is opened.

@@ -45,6 +45,9 @@ inline constexpr std::array<StageReach, kStages> kStageReach{{
      "down and seven up"},
 }};
 
+/// Slabs more either way where edges turn along creases (kFlipReach), which the triangles of the slabs around say.
+inline constexpr std::int32_t kFlipSlabs = 2;
+
 constexpr const StageReach& reach_of(Stage stage) {
   return kStageReach[static_cast<std::size_t>(stage)];
 }
@@ -62,14 +65,22 @@ inline SlabSpan all_slabs(const Lattice& lattice, const Extent& extent) {
   return {lattice.slab_of(extent.z_min) - kTouchSlabs, lattice.slab_of(extent.z_max) + kTouchSlabs + 2};
 }
 
+/// What asks for more slabs than the table has.
+struct WiderReach {
+  bool diffuse = false;  ///< corners follow the centres of the slab below
+  bool creases = false;  ///< edges turn along them
+};
+
 /// The slabs each stage works on for the finished slabs of a span.
 class StageSpans {
  public:
-  /// `all`: all_slabs(); `diffuse`: corners follow the centres of the slab below.
-  StageSpans(const SlabSpan& span, const SlabSpan& all, bool diffuse) {
+  /// `all`: all_slabs().
+  StageSpans(const SlabSpan& span, const SlabSpan& all, const WiderReach& wider) {
+    const std::int32_t flips = wider.creases ? kFlipSlabs : 0;
     for (std::size_t s = 0; s < kStages; ++s) {
-      const std::int32_t below = kStageReach[s].below + (diffuse && s == static_cast<std::size_t>(Stage::project));
-      spans_[s] = {std::max(all.begin, span.begin - below), std::min(all.end, span.end + kStageReach[s].above)};
+      const bool centres = wider.diffuse && s == static_cast<std::size_t>(Stage::project);
+      const std::int32_t below = kStageReach[s].below + flips + (centres ? 1 : 0);
+      spans_[s] = {std::max(all.begin, span.begin - below), std::min(all.end, span.end + kStageReach[s].above + flips)};
     }
   }
   [[nodiscard]] const SlabSpan& of(Stage stage) const { return spans_[static_cast<std::size_t>(stage)]; }

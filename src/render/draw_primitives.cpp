@@ -123,6 +123,9 @@ class TriangleSpan {
 
 constexpr double kWireWidth = 0.45;      // half the width of a wire line, pixels
 constexpr double kBoundaryWidth = 1.25;  // half the width of a boundary line, pixels
+/// A vertex whose normal has a smaller cosine (35 degrees) with a triangle's lies on a sharp edge: the triangle is lit by
+/// its own there, as smooth shading would carry the edge far into large triangles.
+constexpr float kSharpCorner = 0.82F;
 constexpr float kWireDarkening = 0.25F;
 constexpr double kLeastRadius = 0.5;  // pixels: a point never vanishes between samples
 constexpr float kLeastSlant = 0.05F;  // a disc seen from its side keeps this much of its width
@@ -146,6 +149,7 @@ class Surface {
     if (back_) face_ = -face_;
     for (std::size_t i = 0; i < 3; ++i) {
       normal_[i] = view.direction(normals[t[i]]);
+      if (std::abs(normal_[i].dot(face_)) < kSharpCorner * normal_[i].norm()) normal_[i] = back_ ? -face_ : face_;
       if (settings.colour == ColourMode::normals) {
         base_[i] = normal_colour(normals[t[i]]);
       } else {

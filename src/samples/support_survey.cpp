@@ -35,8 +35,9 @@ constexpr std::size_t kMiddleDisk = 2;
 constexpr std::size_t kLeastInDisk = 8;
 constexpr std::size_t kCounted = 16;
 
-/// Neighbouring places that are looked at together: a place alone is a single draw.
-constexpr std::size_t kPooled = 32;
+/// Neighbouring places that are looked at together: a place alone is a single draw, and what chance makes of H from
+/// place to place costs more than detail gains by a finer look.
+constexpr std::size_t kPooled = 64;
 /// Errors count at most so many medians of all: strays.
 constexpr float kMostError = 3;
 

@@ -19,14 +19,17 @@ TEST(Stages, ArchitectureShowsThePictureOfTheTable) {
 
 TEST(Stages, SpansGrowByTheTableAndEndWithTheCloud) {
   const SlabSpan all{-3, 40};
-  const StageSpans inner({15, 20}, all, /*diffuse=*/false);
+  const StageSpans inner({15, 20}, all, {});
   for (std::size_t s = 0; s < kStages; ++s) {
     const SlabSpan& span = inner.of(static_cast<Stage>(s));
     EXPECT_EQ(span, (SlabSpan{15 - kStageReach[s].below, 20 + kStageReach[s].above})) << kStageReach[s].name;
   }
-  const StageSpans whole(all, all, /*diffuse=*/true);
+  const StageSpans whole(all, all, {.diffuse = true, .creases = true});
   for (std::size_t s = 0; s < kStages; ++s) EXPECT_EQ(whole.of(static_cast<Stage>(s)), all);
-  EXPECT_EQ(StageSpans({15, 20}, all, true).of(Stage::project).begin, inner.of(Stage::project).begin - 1);
+  EXPECT_EQ(StageSpans({15, 20}, all, {.diffuse = true}).of(Stage::project).begin, inner.of(Stage::project).begin - 1);
+  const SlabSpan turned = StageSpans({15, 20}, all, {.creases = true}).of(Stage::triangulate);
+  const SlabSpan plain = inner.of(Stage::triangulate);
+  EXPECT_EQ(turned, (SlabSpan{plain.begin - kFlipSlabs, plain.end + kFlipSlabs}));
 }
 
 TEST(Stages, EachStageCoversWhatTheNextOneNeeds) {

@@ -305,6 +305,28 @@ TEST(Render, RefusesSettingsThatCannotBeMeant) {
   EXPECT_THROW(render(mesh, {}), Error);
 }
 
+/// Eight vertices, whose normals point along the diagonals.
+TriangleMesh box() {
+  TriangleMesh mesh;
+  for (int i = 0; i < 8; ++i) mesh.positions.push_back({double(i & 1), double(i >> 1 & 1), double(i >> 2)});
+  mesh.triangles = {{0, 2, 3}, {0, 3, 1}, {4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4},
+                    {2, 6, 7}, {2, 7, 3}, {0, 4, 6}, {0, 6, 2}, {1, 3, 7}, {1, 7, 5}};
+  return mesh;
+}
+
+TEST(Render, SharpEdgesAreNotCarriedIntoTheirFaces) {
+  RenderSettings s = front(200, 200);
+  s.azimuth = 30;
+  s.elevation = 20;
+  RenderSettings flat = s;
+  flat.flat = true;
+  EXPECT_EQ(render(box(), s).pixels, render(box(), flat).pixels);
+  TriangleMesh turned = box();  // as some programs write them
+  for (auto& t : turned.triangles) std::swap(t[1], t[2]);
+  EXPECT_EQ(render(turned, s).pixels, render(turned, flat).pixels);
+  EXPECT_NE(render(test::sphere(1, 12), s).pixels, render(test::sphere(1, 12), flat).pixels) << "and round ones are round";
+}
+
 TEST(Render, StopsWhenCancelled) {
   const std::atomic<bool> cancel{true};
   RunContext context;

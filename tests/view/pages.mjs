@@ -146,6 +146,25 @@ async function lookAtMesh() {
   });
 }
 
+/** Of eight vertices, whose normals point along the diagonals. */
+async function lookAtBox() {
+  const lines = ['OFF', '8 12 0'];
+  for (let i = 0; i < 8; ++i) lines.push(`${i & 1} ${(i >> 1) & 1} ${i >> 2}`);
+  lines.push(...['0 2 3', '0 3 1', '4 5 7', '4 7 6', '0 1 5', '0 5 4', '2 6 7', '2 7 3', '0 4 6', '0 6 2', '1 3 7', '1 7 5'].map((t) => `3 ${t}`));
+  writeFileSync(join(folder, 'box.off'), `${lines.join('\n')}\n`);
+  run('view', join(folder, 'box.off'), '-o', join(folder, 'box.html'));
+  await look('box', `file://${join(folder, 'box.html')}`, async (page, see) => {
+    await see('smooth');
+    const smooth = await savedPicture(page, 'box');
+    await page.press('g');
+    await see('flat');
+    const flat = await savedPicture(page, 'box_flat');
+    const differs = (p, i) => Math.abs(p[0] - flat.pixels[flat.channels * i]) > 8;
+    const others = count(smooth, (p, x, y) => differs(p, y * smooth.width + x)) / (smooth.width * smooth.height);
+    expect(others < 0.005, `box: its edges are not carried into its faces (${others.toFixed(4)})`);
+  });
+}
+
 async function lookAtPoints() {
   ball('far.ply', 6000, [500000, 4000000, 100]);
   run('view', join(folder, 'far.ply'), '--points', '3000', '-o', join(folder, 'points.html'));
@@ -249,6 +268,7 @@ rmSync(folder, { recursive: true, force: true });
 mkdirSync(folder, { recursive: true });
 try {
   await lookAtMesh();
+  await lookAtBox();
   await lookAtPoints();
   await lookAtTiles();
   await lookAtBoundary();

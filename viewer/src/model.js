@@ -2,6 +2,7 @@
 import { Box3, Group, Mesh, ShaderMaterial, Vector3 } from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { boundaryLines } from './boundary.js';
+import { splitAtCreases } from './creases.js';
 import { readBlock } from './data.js';
 import { makeMaterial, shared } from './surface_material.js';
 
@@ -113,6 +114,7 @@ export class Model {
     this.attributes = attributesOf(drawable.geometry, parser);
     this.hasColours = drawable.geometry.hasAttribute('color');
     if (this.kind === 'mesh' && !drawable.geometry.hasAttribute('normal')) drawable.geometry.computeVertexNormals();
+    if (this.kind === 'mesh') splitAtCreases(drawable.geometry);
     drawable.geometry.computeBoundingBox();
     const box = drawable.geometry.boundingBox;
     const middle = box.getCenter(new Vector3());

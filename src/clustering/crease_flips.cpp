@@ -1,0 +1,223 @@
+#include "clustering/crease_flips.h"
+
+#include <algorithm>
+#include <set>
+#include <tuple>
+#include <utility>
+
+namespace lamina {
+namespace {
+
+using meshes::operator-;
+using meshes::operator*;
+using meshes::area_normal;
+using meshes::dot;
+using meshes::unit;
+using meshes::Vec3;
+
+/// Ends of a side whose normals have a smaller cosine (20 degrees) lie on different sheets; a bend of less is no crease
+/// for projection either (kLeastBend).
+constexpr double kSheets = 0.94;
+/// A triangle lies in the sheet of a vertex whose normal has at least this cosine (30 degrees) with its own.
+constexpr double kInSheet = 0.87;
+
+using Edge = std::array<std::uint32_t, 2>;
+
+Edge sorted(std::uint32_t a, std::uint32_t b) {
+  return {std::min(a, b), std::max(a, b)};
+}
+
+}  // namespace
+
+Edge CreaseFlips::Flip::made() const {
+  return sorted(left, right);
+}
+
+bool CreaseFlips::Flip::goes_before(const Flip& other) const {
+  return std::tuple(-gain, sorted(from, to)) < std::tuple(-other.gain, sorted(other.from, other.to));
+}
+
+void CreaseFlips::push(MeshSlab slab) {
+  Held& held = held_.emplace_back();
+  held.first = pushed_;
+  pushed_ += static_cast<std::uint32_t>(slab.vertices.size());
+  held.mesh = std::move(slab);
+  find_bent(held);
+  const std::size_t last = gone_ + held_.size() - 1;
+  find_wanted(last);
+  if (held_.size() > 1) decide(last - 1);
+}
+
+void CreaseFlips::finish() {
+  finished_ = true;
+  if (!held_.empty()) decide(gone_ + held_.size() - 1);
+}
+
+bool CreaseFlips::pop(MeshSlab& out) {
+  if (held_.empty() || !held_.front().decided) return false;
+  // Flips of the next slab may take triangles of this one.
+  if (held_.size() > 1 ? !held_[1].decided : !finished_) return false;
+  Held& here = held_.front();
+  out = std::move(here.mesh);
+  if (!here.dropped.empty()) {
+    std::sort(here.dropped.begin(), here.dropped.end());
+    std::uint32_t index = 0;
+    std::erase_if(out.triangles, [&](const Triangle&) {
+      return std::binary_search(here.dropped.begin(), here.dropped.end(), index++);
+    });
+  }
+  std::sort(here.added.begin(), here.added.end());
+  out.triangles.insert(out.triangles.end(), here.added.begin(), here.added.end());
+  held_.pop_front();
+  ++gone_;
+  return true;
+}
+
+std::size_t CreaseFlips::slab_of(std::uint32_t vertex) const {
+  const auto after =
+      std::partition_point(held_.begin(), held_.end(), [vertex](const Held& h) { return h.first <= vertex; });
+  return static_cast<std::size_t>(after - held_.begin()) - 1;
+}
+
+Vec3 CreaseFlips::position(std::uint32_t vertex) const {
+  const Held& held = held_[slab_of(vertex)];
+  const VertexBatch& of = held.mesh.vertices;
+  const std::uint32_t i = vertex - held.first;
+  return {of.x[i], of.y[i], of.z[i]};
+}
+
+Vec3 CreaseFlips::normal(std::uint32_t vertex) const {
+  const Held& held = held_[slab_of(vertex)];
+  const VertexBatch& of = held.mesh.vertices;
+  const std::uint32_t i = vertex - held.first;
+  return {double{of.nx[i]}, double{of.ny[i]}, double{of.nz[i]}};
+}
+
+void CreaseFlips::find_bent(Held& here) const {
+  for (std::uint32_t i = 0; i < here.mesh.triangles.size(); ++i) {
+    const Triangle& t = here.mesh.triangles[i];
+    const std::array<Vec3, 3> normals{normal(t[0]), normal(t[1]), normal(t[2])};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::size_t next = (k + 1) % 3;
+      if (dot(normals[k], normals[next]) >= kSheets) continue;
+      const Edge edge = sorted(t[k], t[next]);
+      here.bent.push_back({edge[0], edge[1], i, t[(k + 2) % 3], t[k] < t[next]});
+    }
+  }
+  std::sort(here.bent.begin(), here.bent.end(), [](const BentSide& a, const BentSide& b) {
+    return std::tuple(a.low, a.high, a.ascending) < std::tuple(b.low, b.high, b.ascending);
+  });
+}
+
+/// The sides of two triangles, both of the slab or one of the slab below.
+void CreaseFlips::find_wanted(std::size_t slab) {
+  Held& here = at(slab);
+  const Held* const below = slab > gone_ ? &at(slab - 1) : nullptr;
+  const auto alike = [](const std::vector<BentSide>& sides, const Edge& edge) {
+    return std::equal_range(sides.begin(), sides.end(), BentSide{edge[0], edge[1], 0, 0, false},
+                            [](const BentSide& a, const BentSide& b) { return a.edge() < b.edge(); });
+  };
+  for (auto first = here.bent.begin(); first != here.bent.end();) {
+    const auto side = first;
+    first = std::find_if(side, here.bent.end(), [&](const BentSide& s) { return s.edge() != side->edge(); });
+    if (first - side == 2) {
+      want(side[0], side[1], {slab, slab}, here);
+    } else if (first - side == 1 && below != nullptr) {
+      const auto [other, after] = alike(below->bent, side->edge());
+      if (after - other == 1) want(*side, *other, {slab, slab - 1}, here);
+    }
+  }
+}
+
+void CreaseFlips::want(const BentSide& one, const BentSide& other, const std::array<std::size_t, 2>& slabs,
+                       Held& here) const {
+  if (one.ascending == other.ascending || one.opposite == other.opposite) return;
+  Flip flip{one.low,
+            one.high,
+            one.opposite,
+            other.opposite,
+            {TriangleAt{slabs[0], one.triangle}, TriangleAt{slabs[1], other.triangle}},
+            0};
+  if (!one.ascending) std::swap(flip.from, flip.to);
+  // A slab's triangles name its vertices and those of the one before.
+  const auto fits = [&](std::uint32_t end) {
+    const auto [low, high] = std::minmax({slab_of(end), slab_of(flip.left), slab_of(flip.right)});
+    return high - low <= 1;
+  };
+  if (!fits(flip.from) || !fits(flip.to)) return;
+  const Vec3 from = position(flip.from), to = position(flip.to);
+  const Vec3 left = position(flip.left), right = position(flip.right);
+  const Vec3 from_normal = normal(flip.from), to_normal = normal(flip.to);
+  const double after = std::min(dot(unit(area_normal(from, right, left)), from_normal),
+                                dot(unit(area_normal(right, to, left)), to_normal));
+  if (after < kInSheet) return;
+  const Vec3 over = unit(area_normal(from, to, left)), under = unit(area_normal(to, from, right));
+  const double before =
+      std::min({dot(over, from_normal), dot(over, to_normal), dot(under, from_normal), dot(under, to_normal)});
+  flip.gain = after - before;
+  if (flip.gain > 0) here.wanted.push_back(flip);
+}
+
+/// Those of a slab that no better one stands in the way of: that takes one of the triangles, or makes the same edge.
+std::vector<const CreaseFlips::Flip*> CreaseFlips::first_of_their_triangles(std::size_t slab) const {
+  struct Claim {
+    std::array<std::uint64_t, 2> what;
+    const Flip* by;
+  };
+  std::vector<Claim> claims;
+  const std::size_t place = slab - gone_;
+  for (std::size_t i = place > 0 ? place - 1 : 0; i < std::min(place + 2, held_.size()); ++i) {
+    for (const Flip& f : held_[i].wanted) {
+      for (const TriangleAt& t : f.triangles) claims.push_back({{t.slab << 1U, t.index}, &f});
+      const Edge edge = f.made();
+      claims.push_back({{(std::uint64_t{edge[0]} << 1U) | 1U, edge[1]}, &f});
+    }
+  }
+  std::sort(claims.begin(), claims.end(), [](const Claim& a, const Claim& b) {
+    return a.what != b.what ? a.what < b.what : a.by->goes_before(*b.by);
+  });
+  std::set<const Flip*> beaten;
+  for (std::size_t i = 1; i < claims.size(); ++i) {
+    if (claims[i].what == claims[i - 1].what) beaten.insert(claims[i].by);
+  }
+  std::vector<const Flip*> out;
+  for (const Flip& f : held_[place].wanted) {
+    if (!beaten.contains(&f)) out.push_back(&f);
+  }
+  return out;
+}
+
+/// An edge of more than two triangles would be left by those that make one which is there.
+void CreaseFlips::drop_known_edges(std::size_t slab, std::vector<const Flip*>& flips) const {
+  std::vector<Edge> made;
+  made.reserve(flips.size());
+  for (const Flip* f : flips) made.push_back(f->made());
+  std::sort(made.begin(), made.end());
+  std::vector<Edge> known;
+  const std::size_t place = slab - gone_;
+  for (std::size_t i = place > 0 ? place - 1 : 0; i < std::min(place + 2, held_.size()); ++i) {
+    for (const Triangle& t : held_[i].mesh.triangles) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Edge edge = sorted(t[k], t[(k + 1) % 3]);
+        if (std::binary_search(made.begin(), made.end(), edge)) known.push_back(edge);
+      }
+    }
+  }
+  std::sort(known.begin(), known.end());
+  std::erase_if(flips, [&](const Flip* f) { return std::binary_search(known.begin(), known.end(), f->made()); });
+}
+
+void CreaseFlips::decide(std::size_t slab) {
+  Held& here = at(slab);
+  here.decided = true;
+  if (here.wanted.empty()) return;
+  std::vector<const Flip*> flips = first_of_their_triangles(slab);
+  drop_known_edges(slab, flips);
+  for (const Flip* f : flips) {
+    for (const TriangleAt& t : f->triangles) at(t.slab).dropped.push_back(t.index);
+    for (const Triangle& t : {Triangle{f->from, f->right, f->left}, Triangle{f->right, f->to, f->left}})
+      held_[slab_of(std::max({t[0], t[1], t[2]}))].added.push_back(t);
+  }
+}
+
+}  // namespace lamina
