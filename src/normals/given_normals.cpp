@@ -27,6 +27,10 @@ constexpr double kLeast = 0.7;
 constexpr double kMostFlat = 0.006, kMost = 0.025, kMostApart = 0.3;
 /// And the share of them that lean, where there is a plane, from which on none is believed.
 constexpr double kMostLeaning = 0.3;
+/// Where neighbours lie in a plane as exactly as this no normal of the surface leans 15 degrees, but those that were
+/// interpolated over a flat face, as of eight vertices over a cube's, do.
+constexpr double kExactlyFlat = 0.01;
+constexpr double kAlongExact = 0.966;
 /// Disorder from which on planes through noisy samples are better normals. Of a clean model with a sample for each of
 /// its details it is 0.3, of scans with noise of two and three pixels 0.33 and 0.47: normals found are as good as the
 /// former and half as far off as the latter.
@@ -68,7 +72,8 @@ Looked on_lattice(std::span<const Eigen::Vector3d> at, std::span<const Eigen::Ve
 /// Of a sample and its neighbours, how many face to the one side and the other of their plane.
 struct Sides {
   std::uint64_t one = 0, other = 0;
-  bool in_plane = false;
+  std::uint64_t off = 0;  ///< that lean in an exact plane
+  bool in_plane = false, in_exact_plane = false;
   double apart = 0;     ///< GivenNormals::apart
   double disorder = 0;  ///< GivenNormals::disorder
 };
@@ -102,6 +107,7 @@ Sides sides_around(const Looked& samples, const SampleTree& tree, std::uint32_t 
     const double height = across.dot(offsets[i]);
     sides.one += cosine > kLeast ? 1 : 0;
     sides.other += cosine < -kLeast ? 1 : 0;
+    sides.off += std::abs(cosine) < kAlongExact ? 1 : 0;
     above += cosine > kLeast ? height : 0;
     below += cosine < -kLeast ? height : 0;
     products += normal * normal.transpose();
@@ -115,6 +121,7 @@ Sides sides_around(const Looked& samples, const SampleTree& tree, std::uint32_t 
     sides.disorder = 1 - order.eigenvalues()(2) / double{kNeighbours};
   }
   sides.in_plane = axes.eigenvalues()(0) < kFlat * kFlat * axes.eigenvalues()(1);
+  sides.in_exact_plane = axes.eigenvalues()(0) < kExactlyFlat * kExactlyFlat * axes.eigenvalues()(1);
   return sides;
 }
 
@@ -126,7 +133,10 @@ bool GivenNormals::contradict() const {
 }
 
 bool GivenNormals::lean() const {
-  return in_planes >= kEnough && static_cast<double>(leaning) > kMostLeaning * static_cast<double>(in_planes);
+  const auto most = [](std::uint64_t part, std::uint64_t whole) {
+    return whole >= kEnough && static_cast<double>(part) > kMostLeaning * static_cast<double>(whole);
+  };
+  return most(leaning, in_planes) || most(off, in_exact_planes);
 }
 
 bool GivenNormals::scatter() const {
@@ -156,6 +166,8 @@ GivenNormals look_at_normals(std::span<const Eigen::Vector3d> at, std::span<cons
     out.flat_odd += flat ? odd : 0;
     out.in_planes += s.in_plane ? kNeighbours : 0;
     out.leaning += s.in_plane ? kNeighbours - all : 0;
+    out.in_exact_planes += s.in_exact_plane ? kNeighbours : 0;
+    out.off += s.in_exact_plane ? s.off : 0;
     out.apart += s.apart;
     mixed += odd > 0 ? 1 : 0;
   }

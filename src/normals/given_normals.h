@@ -17,8 +17,10 @@ struct GivenNormals {
   /// By how many deviations of the neighbours' heights those of one side lie above those of the other, on average where
   /// there are some of both: next to none where signs fell by chance, one or more where two sheets lie close together.
   double apart = 0;
-  std::uint64_t in_planes = 0;  ///< neighbours, of those samples whose neighbours lie in a plane
-  std::uint64_t leaning = 0;    ///< of these, with a normal that leans more than 45 degrees from the plane's
+  std::uint64_t in_planes = 0;        ///< neighbours, of those samples whose neighbours lie in a plane
+  std::uint64_t leaning = 0;          ///< of these, with a normal that leans more than 45 degrees from the plane's
+  std::uint64_t in_exact_planes = 0;  ///< the same where they lie in it but for a hundredth
+  std::uint64_t off = 0;              ///< of these, with a normal that leans more than 15 degrees
   /// How little the normals of a sample and its neighbours lie along one axis, whichever way, in the middle: 1 - the
   /// largest eigenvalue of their mean product with themselves. 0 where all do, 0.52 where they face anywhere.
   double disorder = 0;

@@ -129,6 +129,32 @@ TEST(MixedNormals, GiveTheSurfaceThatTheirAxesMean) {
   }
 }
 
+/// A cube's; `vertices`: normals are those of its eight vertices, interpolated, not of its faces.
+Cloud cube_cloud(std::size_t count, bool vertices) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<> u(-1, 1);
+  Cloud cloud;
+  for (std::size_t i = 0; i < count; ++i) {
+    Point3 p{u(random), u(random), u(random)};
+    Point3 face{};
+    const std::size_t axis = i % 3;
+    p[axis] = face[axis] = i % 2 == 0 ? 1 : -1;
+    cloud.add(p, vertices ? p : face);
+  }
+  return cloud;
+}
+
+TEST(MixedNormals, InterpolatedOverFlatFacesAreFoundAgain) {
+  const Cloud cloud = cube_cloud(20'000, true);
+  EXPECT_TRUE(look(cloud).lean());
+  EXPECT_FALSE(look(cube_cloud(20'000, false)).lean());
+  EXPECT_FALSE(look(test::sphere_cloud(200'000)).lean()) << "nearly flat as far as neighbours go";
+  const test::Reconstruction r = reconstruct(cloud, believing_nothing());
+  ASSERT_TRUE(r.stats.normals.has_value());
+  EXPECT_EQ(r.stats.normals->estimated, 20'000U);
+  EXPECT_TRUE(r.facts.is_closed_manifold());
+}
+
 TEST(MixedNormals, OfNoUseAreFoundAgain) {
   Cloud upright = test::sphere_cloud(20'000);
   for (Point3& n : upright.normals) n = {0, 0, 1};
