@@ -123,9 +123,11 @@ class TriangleSpan {
 
 constexpr double kWireWidth = 0.45;      // half the width of a wire line, pixels
 constexpr double kBoundaryWidth = 1.25;  // half the width of a boundary line, pixels
-/// A vertex whose normal has a smaller cosine (35 degrees) with a triangle's lies on a sharp edge: the triangle is lit by
-/// its own there, as smooth shading would carry the edge far into large triangles.
+/// A vertex whose normal has a smaller cosine (35 degrees) with a triangle's lies on a sharp edge: the triangle is lit
+/// by its own there, as smooth shading would carry the edge far into large triangles. Not one that lies across the
+/// normals of all of its vertices (37 degrees from their mean), as noise leaves them: there is no edge.
 constexpr float kSharpCorner = 0.82F;
+constexpr float kAlongVertices = 0.8F;
 constexpr float kWireDarkening = 0.25F;
 constexpr double kLeastRadius = 0.5;  // pixels: a point never vanishes between samples
 constexpr float kLeastSlant = 0.05F;  // a disc seen from its side keeps this much of its width
@@ -147,9 +149,15 @@ class Surface {
     face_ = view.direction(meshes::to_float(meshes::unit(meshes::area_normal(mesh, triangle))));
     back_ = face_.z() < 0;
     if (back_) face_ = -face_;
+    Eigen::Vector3f mean = Eigen::Vector3f::Zero();
     for (std::size_t i = 0; i < 3; ++i) {
       normal_[i] = view.direction(normals[t[i]]);
-      if (std::abs(normal_[i].dot(face_)) < kSharpCorner * normal_[i].norm()) normal_[i] = back_ ? -face_ : face_;
+      mean += normal_[i];
+    }
+    const bool along = std::abs(mean.dot(face_)) > kAlongVertices * mean.norm();
+    for (std::size_t i = 0; i < 3; ++i) {
+      const bool sharp = std::abs(normal_[i].dot(face_)) < kSharpCorner * normal_[i].norm();
+      if (along && sharp) normal_[i] = mean.dot(face_) < 0 ? -face_ : face_;
       if (settings.colour == ColourMode::normals) {
         base_[i] = normal_colour(normals[t[i]]);
       } else {

@@ -3,6 +3,8 @@ import { BufferAttribute, Vector3 } from 'three';
 
 /** A vertex whose normal has a smaller cosine (35 degrees) with a triangle's lies on a sharp edge, as for lamina render. */
 const sharpCorner = 0.82;
+/** Not for a triangle that lies across the normals of all of its vertices, 37 degrees from their mean, as noise leaves them. */
+const alongVertices = 0.8;
 /** Triangles at a vertex whose normals have a greater one (10 degrees) lie on the same side. */
 const sameSide = 0.985;
 
@@ -23,18 +25,20 @@ export function splitAtCreases(geometry) {
   const sides = new Map();  // by vertex: { number, normal } of its copies
   const from = [], normals = [];
   const corners = Array.from({ length: 3 }, () => new Vector3());
-  const across = new Vector3(), along = new Vector3(), smooth = new Vector3();
+  const smooth = corners.map(() => new Vector3());
+  const across = new Vector3(), along = new Vector3(), mean = new Vector3();
   const changed = [];  // places in the index, and the vertices to be there
   for (let t = 0; t + 2 < index.count; t += 3) {
     corners.forEach((corner, k) => corner.fromBufferAttribute(position, index.getX(t + k)));
     along.subVectors(corners[2], corners[0]);
     across.subVectors(corners[1], corners[0]).cross(along).normalize();
-    if (across.lengthSq() === 0) continue;
+    mean.set(0, 0, 0);
+    smooth.forEach((n, k) => mean.add(n.fromBufferAttribute(normal, index.getX(t + k)).normalize()));
+    if (across.lengthSq() === 0 || Math.abs(mean.dot(across)) <= alongVertices * mean.length()) continue;
     for (let k = 0; k < 3; ++k) {
       const vertex = index.getX(t + k);
-      smooth.fromBufferAttribute(normal, vertex).normalize();
-      if (Math.abs(smooth.dot(across)) >= sharpCorner) continue;
-      const own = smooth.dot(across) < 0 ? across.clone().negate() : across.clone();
+      if (Math.abs(smooth[k].dot(across)) >= sharpCorner) continue;
+      const own = mean.dot(across) < 0 ? across.clone().negate() : across.clone();
       if (!sides.has(vertex)) sides.set(vertex, []);
       let side = sides.get(vertex).find((s) => s.normal.dot(own) > sameSide);
       if (!side) {
