@@ -95,7 +95,8 @@ void add_look_options(CLI::App& tool, RenderSettings& s) {
       ->check(CLI::IsMember({"auto", "none", "normals"}).description(""))
       ->type_name("auto|none|normals")
       ->group("Look");
-  tool.add_flag("--flat", s.flat, "One shade per triangle instead of interpolated normals (which end at sharp edges)")->group("Look");
+  tool.add_flag("--flat", s.flat, "One shade per triangle instead of interpolated normals (which end at sharp edges)")
+      ->group("Look");
   tool.add_flag("--wireframe,--wire", s.wire, "Lines along the triangles' edges")->group("Look");
   tool.add_flag("--mark-boundary", s.mark_boundary, "Edges of only one triangle in red, over everything")
       ->group("Look");

@@ -324,7 +324,8 @@ TEST(Render, SharpEdgesAreNotCarriedIntoTheirFaces) {
   TriangleMesh turned = box();  // as some programs write them
   for (auto& t : turned.triangles) std::swap(t[1], t[2]);
   EXPECT_EQ(render(turned, s).pixels, render(turned, flat).pixels);
-  EXPECT_NE(render(test::sphere(1, 12), s).pixels, render(test::sphere(1, 12), flat).pixels) << "and round ones are round";
+  EXPECT_NE(render(test::sphere(1, 12), s).pixels, render(test::sphere(1, 12), flat).pixels)
+      << "and round ones are round";
 }
 
 TEST(Render, StopsWhenCancelled) {
