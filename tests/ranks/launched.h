@@ -7,9 +7,11 @@
 
 namespace lamina::test {
 
-/// Open MPI keeps some of its memory to the end, and containers forbid it to copy between processes with one call.
+/// Open MPI keeps some of its memory to the end, and containers forbid it to copy between processes with one call. Runs
+/// side by side make the one folder that they would share at the same time, and one of them fails: each has its own.
 inline const std::string kMpiEnvironment =
-    "export ASAN_OPTIONS=detect_leaks=0:$ASAN_OPTIONS OMPI_MCA_btl_vader_single_copy_mechanism=none; ";
+    "export ASAN_OPTIONS=detect_leaks=0:$ASAN_OPTIONS OMPI_MCA_btl_vader_single_copy_mechanism=none "
+    "OMPI_MCA_orte_tmpdir_base=$(mktemp -d /tmp/ranks-XXXXXX); trap 'rm -rf \"$OMPI_MCA_orte_tmpdir_base\"' EXIT; ";
 
 /// Why ranks cannot be tried here; empty: they can.
 inline std::string no_ranks() {
