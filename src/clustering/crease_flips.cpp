@@ -8,16 +8,11 @@
 namespace lamina {
 namespace {
 
-using meshes::operator-;
-using meshes::operator*;
 using meshes::area_normal;
 using meshes::dot;
 using meshes::unit;
 using meshes::Vec3;
 
-/// Ends of a side whose normals have a smaller cosine (20 degrees) lie on different sheets; a bend of less is no crease
-/// for projection either (kLeastBend).
-constexpr double kSheets = 0.94;
 /// A triangle lies in the sheet of a vertex whose normal has at least this cosine (30 degrees) with its own.
 constexpr double kInSheet = 0.87;
 
@@ -99,7 +94,7 @@ void CreaseFlips::find_bent(Held& here) const {
     const std::array<Vec3, 3> normals{normal(t[0]), normal(t[1]), normal(t[2])};
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t next = (k + 1) % 3;
-      if (dot(normals[k], normals[next]) >= kSheets) continue;
+      if (dot(normals[k], normals[next]) >= bend_) continue;
       const Edge edge = sorted(t[k], t[next]);
       here.bent.push_back({edge[0], edge[1], i, t[(k + 2) % 3], t[k] < t[next]});
     }

@@ -24,6 +24,9 @@ inline constexpr int kFlipReach = 2;
 /// order of triangles; those that are new come last.
 class CreaseFlips {
  public:
+  /// `bend`: cosine between the normals of vertices, from which on these lie on one sheet.
+  explicit CreaseFlips(double bend) : bend_(bend) {}
+
   void push(MeshSlab slab);
   void finish();  ///< no more slabs come
   /// The next slab, false when none is ready.
@@ -72,6 +75,7 @@ class CreaseFlips {
   [[nodiscard]] std::vector<const Flip*> first_of_their_triangles(std::size_t slab) const;
   void drop_known_edges(std::size_t slab, std::vector<const Flip*>& flips) const;
 
+  double bend_;
   std::deque<Held> held_;
   std::size_t gone_ = 0;  ///< slabs
   bool finished_ = false;

@@ -16,6 +16,7 @@
 #include "lamina/error.h"
 #include "lamina/mesh_receiver.h"
 #include "meshes/mesh_sink.h"
+#include "mls/sheets.h"
 #include "reconstruct/plan.h"
 #include "reconstruct/stages.h"
 
@@ -163,7 +164,7 @@ void place_vertices(const ClusteredSlab& slab, const ReconstructionPlan& plan, V
 MeshOutput::MeshOutput(const ReconstructionPlan& plan, SlabSink& sink)
     : plan_(plan), sink_(sink), clusterer_(ClusterSettings{plan.cluster}), distinct_(plan.double_positions) {
   const auto level = static_cast<float>(plan.trim);
-  if (plan.projection.creases) flips_.emplace();
+  if (plan.projection.creases) flips_.emplace(kLeastBend);
   if (level > 0) rims_.emplace(Rims{RimSmoother(level), RimTrimmer(level), {}});
 }
 

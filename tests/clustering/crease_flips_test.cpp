@@ -21,6 +21,7 @@ namespace {
 using meshes::Vec3;
 using Triangle = std::array<std::uint32_t, 3>;
 
+constexpr double kBend = 0.94;
 constexpr int kRows = 12;  // of as many vertices, a slab each
 
 std::vector<MeshSlab> flat_grid() {
@@ -72,7 +73,7 @@ struct Whole {
 
 TEST(CreaseFlips, SidesFollowTheCrease) {
   const std::vector<MeshSlab> before = roof();
-  const std::vector<MeshSlab> after = test::passed(CreaseFlips(), before);
+  const std::vector<MeshSlab> after = test::passed(CreaseFlips(kBend), before);
   ASSERT_EQ(after.size(), before.size());
   const Whole mesh(after);
   EXPECT_EQ(mesh.triangles.size(), Whole(before).triangles.size());
@@ -87,7 +88,7 @@ TEST(CreaseFlips, SidesFollowTheCrease) {
 
 TEST(CreaseFlips, WhatHasNoCreaseStaysAsItIs) {
   const std::vector<MeshSlab> before = flat_grid();
-  const std::vector<MeshSlab> after = test::passed(CreaseFlips(), before);
+  const std::vector<MeshSlab> after = test::passed(CreaseFlips(kBend), before);
   ASSERT_EQ(after.size(), before.size());
   for (std::size_t s = 0; s < after.size(); ++s) {
     EXPECT_EQ(after[s].slab, before[s].slab);
@@ -112,8 +113,9 @@ TEST(CreaseFlips, NoEdgeIsMadeThatIsThere) {
   set_normal(slab, 3, {0, 0, 1});
   std::vector<MeshSlab> open{slab};
   open[0].triangles.resize(2);
-  EXPECT_NE(Whole(test::passed(CreaseFlips(), open)).triangles, open[0].triangles) << "without the others they would";
-  EXPECT_EQ(Whole(test::passed(CreaseFlips(), {slab})).triangles, slab.triangles);
+  EXPECT_NE(Whole(test::passed(CreaseFlips(kBend), open)).triangles, open[0].triangles)
+      << "without the others they would";
+  EXPECT_EQ(Whole(test::passed(CreaseFlips(kBend), {slab})).triangles, slab.triangles);
 }
 
 RC_GTEST_PROP(CreaseFlips, AnyMeshStaysTheSurfaceItIs, ()) {
@@ -130,13 +132,13 @@ RC_GTEST_PROP(CreaseFlips, AnyMeshStaysTheSurfaceItIs, ()) {
   }
   std::vector<MeshSlab> shuffled = before;
   for (MeshSlab& slab : shuffled) std::shuffle(slab.triangles.begin(), slab.triangles.end(), random);
-  const std::vector<MeshSlab> after = test::passed(CreaseFlips(), before);
+  const std::vector<MeshSlab> after = test::passed(CreaseFlips(kBend), before);
   const Whole mesh(after);
   const test::Topology was = Whole(before).topology();
   const test::Topology is = mesh.topology();
   RC_ASSERT(is.bad_edges == was.bad_edges && is.bad_vertices == was.bad_vertices && is.degenerate == 0U &&
             is.duplicates == 0U && is.same_surface(was));
-  RC_ASSERT(mesh.canonical() == Whole(test::passed(CreaseFlips(), shuffled)).canonical());
+  RC_ASSERT(mesh.canonical() == Whole(test::passed(CreaseFlips(kBend), shuffled)).canonical());
   for (std::size_t s = 0; s < after.size(); ++s) {
     for (const Triangle& t : after[s].triangles) {
       for (const std::uint32_t v : t) RC_ASSERT(v / kRows <= s && v / kRows + 1 >= s);
@@ -154,7 +156,7 @@ RC_GTEST_PROP(CreaseFlips, FarSlabsDoNotCount, ()) {
   for (MeshSlab& slab : whole) {
     for (double& z : slab.vertices.z) z += height(random);
   }
-  const std::vector<MeshSlab> all = test::passed(CreaseFlips(), whole);
+  const std::vector<MeshSlab> all = test::passed(CreaseFlips(kBend), whole);
   // The first slab keeps its vertices, but its triangles are not known.
   std::vector<MeshSlab> part(whole.begin() + static_cast<std::ptrdiff_t>(from),
                              whole.begin() + static_cast<std::ptrdiff_t>(end));
@@ -164,7 +166,7 @@ RC_GTEST_PROP(CreaseFlips, FarSlabsDoNotCount, ()) {
       for (std::uint32_t& v : t) v -= static_cast<std::uint32_t>(from) * kRows;
     }
   }
-  std::vector<MeshSlab> some = test::passed(CreaseFlips(), part);
+  std::vector<MeshSlab> some = test::passed(CreaseFlips(kBend), part);
   for (std::size_t s = kFlipReach + 1; s + kFlipReach < some.size(); ++s) {
     for (Triangle& t : some[s].triangles) {
       for (std::uint32_t& v : t) v += static_cast<std::uint32_t>(from) * kRows;
