@@ -1,4 +1,4 @@
-// survey_support(): which width of a disk predicts samples best.
+// survey_support(): how well disks of several widths predict samples.
 
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
@@ -20,6 +20,7 @@
 #include "samples/bucket_runs.h"
 #include "samples/sample_tree.h"
 #include "samples/support_field.h"
+#include "samples/support_pools.h"
 
 namespace lamina {
 namespace {
@@ -28,36 +29,12 @@ constexpr std::uint64_t kPlaces = 4096;
 constexpr std::uint64_t kLeastStride = 16;       ///< samples for a place
 constexpr std::uint64_t kMostRead = 1ULL << 22;  ///< samples, about
 
-/// Radii of the disks that are tried, in radii of the samples.
-constexpr std::array<float, 6> kDisks{1, 1.4F, 2, 2.8F, 4, 5.6F};
-constexpr std::size_t kMiddleDisk = 2;
 /// Samples in a disk that have something to say of it, and among which the spacing is measured.
 constexpr std::size_t kLeastInDisk = 8;
 constexpr std::size_t kCounted = 16;
 
-/// Neighbouring places that are looked at together: a place alone is a single draw, and what chance makes of H from
-/// place to place costs more than detail gains by a finer look.
-constexpr std::size_t kPooled = 64;
-/// Errors count at most so many medians of all: strays.
-constexpr float kMostError = 3;
-
-/// H for a radius of the best disk. The fit of the projection knows normals as well, so it is as sure in a narrower
-/// one.
-constexpr double kSupportPerDisk = 0.65;
-constexpr float kMostByDisk = 3;  ///< H: in plain parts wider ones gain nothing
-/// H is at least so much, and so much more for each radius of error: fits to few very noisy samples go astray.
-constexpr double kLeastBlend = 1.1;
-constexpr double kBlendPerError = 3.5;
-/// And for each radius by which the error is more than this so much more: noise that fills a disk looks smaller than it
-/// is, since what lies as far off as the disk is wide counts as another sheet.
-constexpr double kLargeError = 0.25;
-constexpr double kBlendPerLargeError = 6;
-/// A support reaches so much less than the neighbours that lie on all sides: between two lines of samples it has to
-/// hold some of both.
-constexpr float kAllRoundPerSupport = 1.25F;
-constexpr double kAllRoundShare = 0.75;  ///< of the places around reach those neighbours
-constexpr float kMostByDensity = 1.1F;   ///< radii nearby: what counts of samples make of those out there
-constexpr float kMostAround = 8;         ///< radii: neighbours farther away are not looked at
+constexpr float kMostByDensity = 1.1F;  ///< radii nearby: what counts of samples make of those out there
+constexpr float kMostAround = 8;        ///< radii: neighbours farther away are not looked at
 
 typedef float Four __attribute__((vector_size(16)));  // NOLINT(modernize-use-using): attributes on typedefs
 
@@ -88,13 +65,6 @@ struct FlatNeighbours {
     std::fill(weight.begin() + static_cast<std::ptrdiff_t>(kept), weight.end(), 0.0F);
     count = kept;
   }
-};
-
-/// How far a seed, the origin, is from what disks of neighbours suggest, in radii; without the last ones where the
-/// disks are wider than neighbours are known.
-struct Trial {
-  std::array<float, kDisks.size()> error{};
-  float all_round = 0;  ///< neighbours lie on all sides of it within so many radii; infinite: in no disk
 };
 
 Four four(const std::vector<float>& v, std::size_t i) {
@@ -257,11 +227,6 @@ std::optional<Trial> try_disks(const SeedNeighbourhoods& of, std::size_t seed, d
   return trial;
 }
 
-struct Place {
-  std::array<std::int32_t, 3> at{};
-  Trial trial;
-};
-
 /// Buckets whose samples are seeds, and with those around that hold their neighbours.
 struct SurveyRun {
   BucketSpan seeds, read;
@@ -292,84 +257,6 @@ std::vector<SurveyRun> choose_runs(const SlabStore& store, double reach) {
   return chosen.empty() ? runs : chosen;
 }
 
-/// The best disk of some trials, and its error.
-struct BestDisk {
-  double radius = 0, error = 0;
-};
-BestDisk best_of(const std::array<double, kDisks.size()>& squares) {
-  const auto least = std::min_element(squares.begin(), squares.end());
-  const auto k = static_cast<std::size_t>(least - squares.begin());
-  const auto disk = [](std::size_t at) { return double{kDisks[at]}; };
-  double radius = disk(k);
-  if (k > 0 && k + 1 < kDisks.size()) {
-    // Where the parabola through three has its lowest point.
-    const double bend = squares[k - 1] - 2 * squares[k] + squares[k + 1];
-    const double step = bend > 0 ? 0.5 * (squares[k - 1] - squares[k + 1]) / bend : 0;
-    radius += step * (step > 0 ? disk(k + 1) - disk(k) : disk(k) - disk(k - 1));
-  }
-  return {radius, std::sqrt(*least)};
-}
-
-/// H that reaches neighbours on all sides at most of some places. Those at rims have none.
-float blend_all_round(std::vector<float>& distances) {
-  std::erase_if(distances, [](float d) { return std::isinf(d); });
-  return distances.size() < kPooled / 2 ? 0 : quantile_of(distances, kAllRoundShare) / kAllRoundPerSupport;
-}
-
-/// What the places around one say together.
-struct Pool {
-  std::array<double, kDisks.size()> squares{};
-  std::vector<float> all_round;
-};
-
-float blend_of(Pool& pool, SupportAim aim) {
-  const float sides = std::clamp(blend_all_round(pool.all_round), kLeastSupport, kMostAllRound);
-  if (aim == SupportAim::all_round) return sides;
-  const BestDisk best = best_of(pool.squares);
-  const double by_disk = std::min(kSupportPerDisk * best.radius, double{kMostByDisk});
-  const double by_error =
-      kLeastBlend + kBlendPerError * best.error + kBlendPerLargeError * std::max(0.0, best.error - kLargeError);
-  return std::max(sides, std::clamp(static_cast<float>(std::max(by_disk, by_error)), kLeastSupport, kMostSupport));
-}
-
-SupportSurvey pooled(const std::vector<Place>& places, SupportAim aim) {
-  std::vector<float> errors;
-  errors.reserve(places.size());
-  std::array<std::vector<std::int32_t>, 3> at;
-  for (const Place& p : places) {
-    errors.push_back(p.trial.error[kMiddleDisk]);
-    for (std::size_t k = 0; k < 3; ++k) at[k].push_back(p.at[k]);
-  }
-  const float most = kMostError * median_of(errors);
-  const SampleTree tree(at[0], at[1], at[2]);
-  SupportSurvey out;
-  out.places.resize(places.size());
-  std::vector<float> sides(places.size());
-  tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t p) {
-    std::array<Neighbour, kPooled - 1> found;
-    const std::size_t n =
-        tree.nearest(static_cast<std::uint32_t>(p), found.size(), std::numeric_limits<float>::infinity(), found.data());
-    Pool pool;
-    const auto add = [&](std::uint32_t place) {
-      const Trial& t = places[tree.order()[place]].trial;
-      pool.all_round.push_back(t.all_round);
-      for (std::size_t k = 0; k < kDisks.size(); ++k) {
-        const double error = static_cast<double>(std::min(t.error[k], most));
-        pool.squares[k] += error * error / static_cast<double>(n + 1);
-      }
-    };
-    add(static_cast<std::uint32_t>(p));
-    for (std::size_t i = 0; i < n; ++i) add(found[i].sample);
-    SupportPlace& made = out.places[tree.order()[p]];
-    made.blend = blend_of(pool, aim);
-    sides[p] = blend_all_round(pool.all_round);
-    for (std::size_t k = 0; k < 3; ++k) made.at[k] = static_cast<float>(places[tree.order()[p]].at[k]);
-  });
-  out.lines = median_of(sides) > kLeastSupport;
-  if (aim == SupportAim::all_round && !out.lines) out.places.clear();
-  return out;
-}
-
 }  // namespace
 
 SupportSurvey survey_support(const SlabStore& store, const ReadBucket& read, const RadiusSurvey& survey,
@@ -382,7 +269,7 @@ SupportSurvey survey_support(const SlabStore& store, const ReadBucket& read, con
   for (const SurveyRun& run : runs) total += samples_in(store, run.seeds);
   const std::uint64_t stride = std::max(kLeastStride, total / kPlaces);
   tbb::enumerable_thread_specific<TrialScratch> scratch;
-  std::vector<Place> places;
+  std::vector<TriedPlace> places;
   std::uint64_t passed = 0;
   for (const SurveyRun& run : runs) {
     const LocalSamples samples = read_oriented(store, read, run.read);
@@ -404,7 +291,7 @@ SupportSurvey survey_support(const SlabStore& store, const ReadBucket& read, con
     }
   }
   if (places.empty()) return {};
-  return pooled(places, aim);
+  return pool_places(places, aim);
 }
 
 }  // namespace lamina

@@ -11,12 +11,14 @@ using test::Cloud;
 using test::Point3;
 
 /// The unit sphere with uniform noise on each coordinate (in spacings) and normals some 20 degrees off.
-Cloud noisy_sphere(std::size_t count, double spacings) {
+/// `right`: spacings of noise where x is positive.
+Cloud noisy_sphere(std::size_t count, double spacings, double right) {
   Cloud cloud = test::sphere_cloud(count);
   std::mt19937 random(9);
   std::uniform_real_distribution<> u(-1, 1);
-  const double most = spacings * std::sqrt(4 * std::numbers::pi / static_cast<double>(count));
+  const double spacing = std::sqrt(4 * std::numbers::pi / static_cast<double>(count));
   for (std::size_t i = 0; i < count; ++i) {
+    const double most = spacing * (cloud.positions[i][0] > 0 ? right : spacings);
     for (std::size_t k = 0; k < 3; ++k) {
       cloud.positions[i][k] += most * u(random);
       cloud.normals[i][k] += 0.5 * u(random);
@@ -27,10 +29,14 @@ Cloud noisy_sphere(std::size_t count, double spacings) {
   return cloud;
 }
 
+Cloud noisy_sphere(std::size_t count, double spacings) {
+  return noisy_sphere(count, spacings, spacings);
+}
+
 class SurfaceRefit : public ::testing::Test {
  protected:
   std::string bytes(SurfaceSettings settings, int threads = 0) {
-    settings.input = input_;
+    if (settings.input.empty()) settings.input = input_;
     settings.output = folder_ / "out.ply";
     RunContext run;
     run.threads = threads;
@@ -59,6 +65,7 @@ TEST_F(SurfaceRefit, OnlyWhenAskedFor) {
 TEST_F(SurfaceRefit, ChoiceIsTheSameForThreadsAndWindows) {
   SurfaceSettings s;
   s.blend.reset();
+  s.input = test::write_cloud(noisy_sphere(8000, 0.2, 0.7), folder_ / "uneven.ply");
   const std::string once = bytes(s, 1);
   EXPECT_GT(plan_.noise, 0.09);
   EXPECT_LT(plan_.least_blend, plan_.most_blend);
