@@ -151,14 +151,15 @@ SupportSurvey pool_places(const std::vector<TriedPlace>& places, SupportAim aim)
   });
   SupportSurvey out;
   out.places.resize(places.size());
-  const float reliable = reliability(draws);
+  out.lines = median_of(sides) > kLeastSupport;
+  // Where samples lie on lines, the lines around a place say how far it is to the next.
+  const float reliable = out.lines ? 1 : reliability(draws);
   for (std::size_t p = 0; p < places.size(); ++p) {
     const Draw& d = draws[p];
     SupportPlace& made = out.places[tree.order()[p]];
     made.blend = std::max(d.near, d.around + reliable * (d.near - d.around));
     for (std::size_t k = 0; k < 3; ++k) made.at[k] = static_cast<float>(places[tree.order()[p]].at[k]);
   }
-  out.lines = median_of(sides) > kLeastSupport;
   if (aim == SupportAim::all_round && !out.lines) out.places.clear();
   return out;
 }
