@@ -80,8 +80,8 @@ Pool pool_of(std::span<const Trial* const> trials, std::size_t first, std::size_
   return pool;
 }
 
-float blend_of(Pool& pool, SupportAim aim) {
-  const float sides = std::clamp(blend_all_round(pool.all_round), kLeastSupport, kMostAllRound);
+float blend_of(const Pool& pool, float all_round, SupportAim aim) {
+  const float sides = std::clamp(all_round, kLeastSupport, kMostAllRound);
   if (aim == SupportAim::all_round) return sides;
   const BestDisk best = best_of(pool.squares);
   const double by_disk = std::min(kSupportPerDisk * best.radius, double{kMostByDisk});
@@ -92,18 +92,23 @@ float blend_of(Pool& pool, SupportAim aim) {
 
 /// H at a place by those near it, by those of the wider neighbourhood, and by halves of those near it.
 struct Draw {
+  float sides = 0;  ///< what reaches neighbours on all sides
   float near = 0, around = 0;
   std::array<float, 2> halves{};
 };
 
 /// `trials`: of the place itself, then of those around, the nearest first.
 Draw draw_of(std::span<const Trial* const> trials, float most, SupportAim aim) {
-  const auto blend = [&](std::span<const Trial* const> of, std::size_t first, std::size_t step) {
-    Pool pool = pool_of(of, first, step, most);
-    return blend_of(pool, aim);
-  };
   const auto near = trials.first(std::min(trials.size(), kPooled));
-  Draw draw{blend(near, 0, 1), blend(trials, 0, 1), {}};
+  Draw draw;
+  Pool pool = pool_of(near, 0, 1, most);
+  draw.sides = blend_all_round(pool.all_round);
+  draw.near = blend_of(pool, draw.sides, aim);
+  const auto blend = [&](std::span<const Trial* const> of, std::size_t first, std::size_t step) {
+    Pool some = pool_of(of, first, step, most);
+    return blend_of(some, blend_all_round(some.all_round), aim);
+  };
+  draw.around = blend(trials, 0, 1);
   for (std::size_t half = 0; half < 2; ++half) draw.halves[half] = near.size() > 1 ? blend(near, half, 2) : draw.near;
   return draw;
 }
@@ -134,23 +139,18 @@ SupportSurvey pool_places(const std::vector<TriedPlace>& places, SupportAim aim)
   const float most = kMostError * median_of(errors);
   const SampleTree tree(at[0], at[1], at[2]);
   std::vector<Draw> draws(places.size());
-  std::vector<float> sides(places.size());
   tbb::parallel_for(std::size_t{0}, places.size(), [&](std::size_t p) {
     std::array<Neighbour, kPooledAround - 1> found;
     const std::size_t n =
         tree.nearest(static_cast<std::uint32_t>(p), found.size(), std::numeric_limits<float>::infinity(), found.data());
-    std::sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(n),
-              [](const Neighbour& a, const Neighbour& b) {
-                return a.squared != b.squared ? a.squared < b.squared : a.sample < b.sample;
-              });
     std::vector<const Trial*> trials{&places[tree.order()[p]].trial};
     for (std::size_t i = 0; i < n; ++i) trials.push_back(&places[tree.order()[found[i].sample]].trial);
     draws[p] = draw_of(trials, most, aim);
-    std::vector<float> distances = pool_of(std::span(trials).first(std::min(n + 1, kPooled)), 0, 1, most).all_round;
-    sides[p] = blend_all_round(distances);
   });
   SupportSurvey out;
   out.places.resize(places.size());
+  std::vector<float> sides;
+  for (const Draw& d : draws) sides.push_back(d.sides);
   out.lines = median_of(sides) > kLeastSupport;
   // Where samples lie on lines, the lines around a place say how far it is to the next.
   const float reliable = out.lines ? 1 : reliability(draws);
