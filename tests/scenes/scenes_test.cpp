@@ -34,7 +34,7 @@ const std::map<std::string, MeshQuality> kLimits{
   {"KnotFromOneSide",    {  0.11,   0.95,    0.17, 1.0,     0.2,     12.5, 10,   1,    0.1,   11,   1.12,  8.5,   0}},
   {"Facade",             {  0.155,  0.28,    0.07, 0.96,    0.15,    30,    4,   0.05, 0.03,  13,   1.17,  9.5,   0}},
   {"Room",               {  0.145,  1.95,    0.08, 1.0,     0.25,    28,    4,   0.1,  0.06,  16,   1.2, 12.5,   0}},
-  // A table top that faces down is 2 % more that is flipped.
+  // A table top that faces down is 2 % more that is flipped; one scrap of 0.36 % stays.
   {"RoomNoisyWithoutNormals", { 0.28, 2.4,   0.2, 1.0,   0.8,    38,    6,   0.45, 0.15, 18,   1.2,   14,   0}},
   {"ThinPlate",          {  0.14,   0,       0,    1.05,    0.02,    33,    2,   0.02, 0.05,   1,   1,      0,   0}},
   {"Terraces",           {  0.175,  0.05,    0.08, 1.0,     0.3,     40,    2,   0.1,  0.1,   10,   1.2,  9.5,   0}},
