@@ -150,6 +150,7 @@ SupportSurvey pool_places(const std::vector<TriedPlace>& places, SupportAim aim)
   SupportSurvey out;
   out.places.resize(places.size());
   std::vector<float> sides;
+  sides.reserve(draws.size());
   for (const Draw& d : draws) sides.push_back(d.sides);
   out.lines = median_of(sides) > kLeastSupport;
   // Where samples lie on lines, the lines around a place say how far it is to the next.
