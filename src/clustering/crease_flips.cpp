@@ -22,6 +22,37 @@ Edge sorted(std::uint32_t a, std::uint32_t b) {
   return {std::min(a, b), std::max(a, b)};
 }
 
+/// Which vertices are ends of some edges: a bit each, so that the many triangles far from all of them cost next to
+/// nothing.
+class EndsOf {
+ public:
+  explicit EndsOf(const std::vector<Edge>& edges) {
+    if (edges.empty()) return;
+    std::uint32_t last = 0;
+    first_ = edges.front()[0];
+    for (const Edge& e : edges) {
+      first_ = std::min(first_, e[0]);
+      last = std::max(last, e[1]);
+    }
+    count_ = last - first_ + 1;
+    bits_.assign(count_ / 64 + 1, 0);
+    for (const Edge& e : edges) {
+      for (const std::uint32_t v : e) bits_[(v - first_) / 64] |= std::uint64_t{1} << ((v - first_) % 64);
+    }
+  }
+  /// How many of a triangle's vertices are.
+  [[nodiscard]] unsigned among(const std::array<std::uint32_t, 3>& t) const { return is(t[0]) + is(t[1]) + is(t[2]); }
+
+ private:
+  [[nodiscard]] unsigned is(std::uint32_t vertex) const {
+    const std::uint32_t at = vertex - first_;  // of one before the first: a large number
+    return at < count_ ? static_cast<unsigned>(bits_[at / 64] >> (at % 64) & 1U) : 0U;
+  }
+
+  std::uint32_t first_ = 0, count_ = 0;
+  std::vector<std::uint64_t> bits_;
+};
+
 }  // namespace
 
 Edge CreaseFlips::Flip::made() const {
@@ -54,13 +85,14 @@ bool CreaseFlips::pop(MeshSlab& out) {
   if (held_.size() > 1 ? !held_[1].decided : !finished_) return false;
   Held& here = held_.front();
   out = std::move(here.mesh);
-  if (!here.dropped.empty()) {
-    std::sort(here.dropped.begin(), here.dropped.end());
-    std::uint32_t index = 0;
-    std::erase_if(out.triangles, [&](const Triangle&) {
-      return std::binary_search(here.dropped.begin(), here.dropped.end(), index++);
-    });
+  std::sort(here.dropped.begin(), here.dropped.end());
+  auto kept = here.dropped.empty() ? out.triangles.end() : out.triangles.begin() + here.dropped.front();
+  for (std::size_t i = 0; i < here.dropped.size(); ++i) {
+    const std::size_t next = i + 1 < here.dropped.size() ? here.dropped[i + 1] : out.triangles.size();
+    kept = std::copy(out.triangles.begin() + here.dropped[i] + 1,
+                     out.triangles.begin() + static_cast<std::ptrdiff_t>(next), kept);
   }
+  out.triangles.erase(kept, out.triangles.end());
   std::sort(here.added.begin(), here.added.end());
   out.triangles.insert(out.triangles.end(), here.added.begin(), here.added.end());
   held_.pop_front();
@@ -82,16 +114,23 @@ Vec3 CreaseFlips::position(std::uint32_t vertex) const {
 }
 
 Vec3 CreaseFlips::normal(std::uint32_t vertex) const {
-  const Held& held = held_[slab_of(vertex)];
+  return normal_in(held_[slab_of(vertex)], vertex);
+}
+
+Vec3 CreaseFlips::normal_in(const Held& held, std::uint32_t vertex) {
   const VertexBatch& of = held.mesh.vertices;
   const std::uint32_t i = vertex - held.first;
   return {double{of.nx[i]}, double{of.ny[i]}, double{of.nz[i]}};
 }
 
+/// Those of the last slab.
 void CreaseFlips::find_bent(Held& here) const {
+  // A slab's triangles name its vertices and those of the one before.
+  const Held& below = held_.size() > 1 ? held_[held_.size() - 2] : here;
+  const auto normal_of = [&](std::uint32_t vertex) { return normal_in(vertex < here.first ? below : here, vertex); };
   for (std::uint32_t i = 0; i < here.mesh.triangles.size(); ++i) {
     const Triangle& t = here.mesh.triangles[i];
-    const std::array<Vec3, 3> normals{normal(t[0]), normal(t[1]), normal(t[2])};
+    const std::array<Vec3, 3> normals{normal_of(t[0]), normal_of(t[1]), normal_of(t[2])};
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t next = (k + 1) % 3;
       if (dot(normals[k], normals[next]) >= bend_) continue;
@@ -188,10 +227,12 @@ void CreaseFlips::drop_known_edges(std::size_t slab, std::vector<const Flip*>& f
   made.reserve(flips.size());
   for (const Flip* f : flips) made.push_back(f->made());
   std::sort(made.begin(), made.end());
+  const EndsOf ends(made);
   std::vector<Edge> known;
   const std::size_t place = slab - gone_;
   for (std::size_t i = place > 0 ? place - 1 : 0; i < std::min(place + 2, held_.size()); ++i) {
     for (const Triangle& t : held_[i].mesh.triangles) {
+      if (ends.among(t) < 2) continue;
       for (std::size_t k = 0; k < 3; ++k) {
         const Edge edge = sorted(t[k], t[(k + 1) % 3]);
         if (std::binary_search(made.begin(), made.end(), edge)) known.push_back(edge);
