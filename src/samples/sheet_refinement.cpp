@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <numeric>
 #include <utility>
 
 namespace lamina {
@@ -100,13 +101,13 @@ void SheetRefinement::push(const LocalSamples& samples, const std::vector<std::u
     bucket.low = std::min(bucket.low, piece.low);
     bucket.high = std::max(bucket.high, piece.high);
   }
-  for_pieces([&](const Piece& piece) {
-    for (std::size_t i = piece.begin; i < piece.end; ++i) {
-      std::uint32_t& cell = bucket.cell_of[i];
-      if (cell != kNone) cell = piece.visits[cell / kCells].index * kCells + cell % kCells;
+  for_pieces([&](Piece& piece) { give_indices(bucket, piece); });
+  tbb::parallel_for(std::uint32_t{0}, kShares, [&](std::uint32_t share) {
+    for (const Piece& piece : pieces) {
+      const std::uint16_t first = piece.share_begin[share];
+      add(samples, bucket, std::span(piece.by_share).subspan(first, piece.share_begin[share + 1] - first), piece.begin);
     }
   });
-  tbb::parallel_for(std::uint32_t{0}, kShares, [&](std::uint32_t share) { add(samples, bucket, share); });
 }
 
 /// The blocks of a piece's samples; until these have indices, cells count from the piece's list of them.
@@ -132,11 +133,33 @@ void SheetRefinement::list_blocks(const LocalSamples& samples, const std::vector
   }
 }
 
-/// The samples in every kShares-th block, which no other thread adds to.
-void SheetRefinement::add(const LocalSamples& samples, const WaitingBucket& bucket, std::uint32_t share) {
-  for (std::size_t i = 0; i < bucket.cell_of.size(); ++i) {
+/// What the piece's samples have of the list's blocks becomes the blocks' own; samples are put in order by share, which
+/// has every kShares-th block.
+void SheetRefinement::give_indices(WaitingBucket& bucket, Piece& piece) {
+  static_assert(kSampleGrain <= std::numeric_limits<std::uint16_t>::max());
+  std::array<std::uint16_t, kShares + 1>& begin = piece.share_begin;
+  const auto share_of = [](std::uint32_t cell) { return cell / kCells % kShares; };
+  for (std::size_t i = piece.begin; i < piece.end; ++i) {
+    std::uint32_t& cell = bucket.cell_of[i];
+    if (cell == kNone) continue;
+    cell = piece.visits[cell / kCells].index * kCells + cell % kCells;
+    ++begin[share_of(cell) + 1];
+  }
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+  piece.by_share.resize(begin.back());
+  auto next = begin;
+  for (std::size_t i = piece.begin; i < piece.end; ++i) {
     const std::uint32_t cell = bucket.cell_of[i];
-    if (cell == kNone || cell / kCells % kShares != share) continue;
+    if (cell != kNone) piece.by_share[next[share_of(cell)]++] = static_cast<std::uint16_t>(i - piece.begin);
+  }
+}
+
+/// Samples of one share, whose blocks no other thread adds to, each `begin` and one of the numbers.
+void SheetRefinement::add(const LocalSamples& samples, const WaitingBucket& bucket, std::span<const std::uint16_t> of,
+                          std::size_t begin) {
+  for (const std::uint16_t number : of) {
+    const std::size_t i = begin + number;
+    const std::uint32_t cell = bucket.cell_of[i];
     Findings& findings = findings_[cell / kCells];
     if (const Directions near = directions_near(samples.nx[i], samples.ny[i], samples.nz[i]);
         (findings.shared & ~near) != 0) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "base/hashing.h"
@@ -148,18 +149,22 @@ class SheetRefinement {
     std::uint8_t level;
     std::uint32_t index;
   };
+  static constexpr std::uint32_t kShares = 16;  ///< of the blocks: each is filled by one thread
   /// Successive samples of a bucket that is pushed, [begin, end).
   struct Piece {
     std::size_t begin = 0, end = 0;
     std::vector<Visit> visits;
+    std::vector<std::uint16_t> by_share;  ///< samples that count, from `begin`; those of a share follow one another
+    std::array<std::uint16_t, kShares + 1> share_begin{};
     std::int64_t low = std::numeric_limits<std::int64_t>::max();   ///< as of WaitingBucket
     std::int64_t high = std::numeric_limits<std::int64_t>::min();  ///< likewise
   };
-  static constexpr std::uint32_t kShares = 16;  ///< of the blocks: each is filled by one thread
 
   void list_blocks(const LocalSamples& samples, const std::vector<std::uint8_t>& level,
                    const std::vector<float>& support, WaitingBucket& bucket, Piece& piece) const;
-  void add(const LocalSamples& samples, const WaitingBucket& bucket, std::uint32_t share);
+  static void give_indices(WaitingBucket& bucket, Piece& piece);
+  void add(const LocalSamples& samples, const WaitingBucket& bucket, std::span<const std::uint16_t> of,
+           std::size_t begin);
   [[nodiscard]] bool is_needed(const Cell& at, int cells, std::uint8_t level) const;
   std::uint32_t touch(const Cell& block, std::uint8_t level);
   [[nodiscard]] Directions shared_around(const Block& block) const;
