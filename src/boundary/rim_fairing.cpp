@@ -6,37 +6,30 @@
 #include <cmath>
 #include <utility>
 
-#include "base/hashing.h"
-
 namespace lamina {
 namespace {
 
-/// What a vertex sums up over its triangles: in each one neighbour comes next and one before, and those of a closed fan
-/// cancel. Of an open one there remain the first, a, and the last, b: as a - b, as a^2 - b^2, and as a hash that tells
-/// whether these two are all that remain.
-struct FanSums {
-  std::uint64_t difference = 0, squares = 0, hash = 0;
-
-  void add(std::int64_t next, std::int64_t before) {
-    const auto n = static_cast<std::uint64_t>(next);
-    const auto b = static_cast<std::uint64_t>(before);
+/// The first and the last neighbour of an open fan with this hash, from the other two vertices of its triangles: in
+/// each one comes next and one before, and those in the middle cancel. False where it is no single fan.
+bool ends_of(const std::vector<std::array<std::uint32_t, 2>>& fan, std::uint64_t hash,
+             std::array<std::uint32_t, 2>& ends) {
+  // What remains of a - b and of a^2 - b^2.
+  std::uint64_t difference = 0, squares = 0;
+  const std::uint64_t origin = fan.front()[0];
+  for (const auto& [next, before] : fan) {
+    const std::uint64_t n = next - origin, b = before - origin;
     difference += n - b;
     squares += n * n - b * b;
-    hash += scrambled(n) - scrambled(b);
   }
-  [[nodiscard]] bool open() const { return hash != 0; }
-  /// False where it is no single fan.
-  [[nodiscard]] bool ends(std::int64_t& a, std::int64_t& b) const {
-    const auto minus = static_cast<std::int64_t>(difference);
-    const auto product = static_cast<std::int64_t>(squares);
-    if (minus == 0 || product % minus != 0) return false;
-    const std::int64_t plus = product / minus;
-    if ((plus + minus) % 2 != 0) return false;
-    a = (plus + minus) / 2;
-    b = (plus - minus) / 2;
-    return scrambled(static_cast<std::uint64_t>(a)) - scrambled(static_cast<std::uint64_t>(b)) == hash;
-  }
-};
+  const auto minus = static_cast<std::int64_t>(difference);
+  const auto product = static_cast<std::int64_t>(squares);
+  if (minus == 0 || product % minus != 0) return false;
+  const std::int64_t plus = product / minus;
+  if ((plus + minus) % 2 != 0) return false;
+  ends = {static_cast<std::uint32_t>((plus + minus) / 2 + static_cast<std::int64_t>(origin)),
+          static_cast<std::uint32_t>((plus - minus) / 2 + static_cast<std::int64_t>(origin))};
+  return fan_hash(ends[0], ends[1]) == hash;
+}
 
 Eigen::Vector3d vector_of(const std::array<double, 3>& p) {
   return {p[0], p[1], p[2]};
@@ -49,7 +42,11 @@ void RimFairer::push(MeshSlab slab) {
   held.first = pushed_;
   pushed_ += static_cast<std::uint32_t>(slab.vertices.size());
   held.mesh = std::move(slab);
-  if (held_.size() > 1) find_rim(held_[held_.size() - 2], &held);
+  held.fans.assign(held.mesh.vertices.size(), 0);
+  FanHashes none;
+  Held* const below = held_.size() > 1 ? &held_[held_.size() - 2] : nullptr;
+  add_fans(held.mesh, held.first, held.fans, below != nullptr ? below->fans : none);
+  if (below != nullptr) find_rim(*below, &held);
   go_on();
 }
 
@@ -86,32 +83,27 @@ bool RimFairer::pop(MeshSlab& out) {
 /// A vertex has triangles in its own slab and in the one above.
 void RimFairer::find_rim(Held& here, const Held* above) {
   const auto& vertices = here.mesh.vertices;
-  const auto first = std::int64_t{here.first};
-  const std::uint32_t end = here.first + static_cast<std::uint32_t>(vertices.size());
-  const auto each_corner = [&](const auto& use) {
-    for_corners(here.mesh.triangles, here.first, end, use);
-    if (above != nullptr) for_corners(above->mesh.triangles, here.first, end, use);
-  };
-  std::vector<FanSums> sums(vertices.size());
-  each_corner(
-      [&](std::uint32_t v, std::uint32_t next, std::uint32_t before) { sums[v].add(next - first, before - first); });
+  const FanHashes fans = std::exchange(here.fans, {});
   here.steps = 0;
-  std::int64_t a = 0;
-  std::int64_t b = 0;
-  for (std::uint32_t i = 0; i < sums.size(); ++i) {
-    if (!sums[i].open() || !sums[i].ends(a, b)) continue;
+  for (std::uint32_t i = 0; i < fans.size(); ++i) {
+    if (fans[i] == 0) continue;
     RimVertex& v = here.rim.emplace_back();
     v.vertex = i;
-    v.beside = {static_cast<std::uint32_t>(a + first), static_cast<std::uint32_t>(b + first)};
     v.at[0] = {vertices.x[i], vertices.y[i], vertices.z[i]};
   }
   if (here.rim.empty()) return;
   constexpr std::uint32_t kInside = ~0U;
   std::vector<std::uint32_t> slot(vertices.size(), kInside);
   for (std::uint32_t r = 0; r < here.rim.size(); ++r) slot[here.rim[r].vertex] = r;
-  each_corner([&](std::uint32_t v, std::uint32_t next, std::uint32_t before) {
-    if (slot[v] != kInside) here.rim[slot[v]].fan.push_back({next, before});
-  });
+  const auto collect = [&](const MeshSlab& mesh) {
+    for_corners(mesh.triangles, here.first, here.first + static_cast<std::uint32_t>(vertices.size()),
+                [&](std::uint32_t v, std::uint32_t next, std::uint32_t before) {
+                  if (slot[v] != kInside) here.rim[slot[v]].fan.push_back({next, before});
+                });
+  };
+  collect(here.mesh);
+  if (above != nullptr) collect(above->mesh);
+  std::erase_if(here.rim, [&](RimVertex& v) { return !ends_of(v.fan, fans[v.vertex], v.beside); });
   for (RimVertex& v : here.rim) std::sort(v.fan.begin(), v.fan.end());  // sums must not depend on how they came
 }
 

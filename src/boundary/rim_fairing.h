@@ -7,7 +7,8 @@
 #include <deque>
 #include <vector>
 
-#include "boundary/rims.h"
+#include "boundary/fan_hashes.h"
+#include "meshes/mesh_slab.h"
 
 namespace lamina {
 
@@ -47,6 +48,7 @@ class RimFairer {
   struct Held {
     MeshSlab mesh;
     std::uint32_t first = 0;     ///< number of its first vertex
+    FanHashes fans;              ///< until the rim is known
     std::vector<RimVertex> rim;  ///< ascending
     int steps = -1;              ///< done; -1: the rim is not known
   };

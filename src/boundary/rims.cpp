@@ -6,8 +6,6 @@
 #include <numeric>
 #include <utility>
 
-#include "base/hashing.h"
-
 namespace lamina {
 namespace {
 
@@ -236,14 +234,18 @@ void RimSmoother::push(MeshSlab slab) {
   held.first = pushed_;
   held.overhang = slab.vertices.overhang;
   held.mesh = std::move(slab);
+  held.fans.assign(held.overhang.size(), 0);
   pushed_ += static_cast<std::uint32_t>(held.overhang.size());
+  FanHashes none;
+  add_fans(held.mesh, held.first, held.fans, held_.empty() ? none : held_.back().fans);
+  // Vertices have triangles in their own slab and in the one above.
+  if (!held_.empty()) find_boundary(held_.back());
   held_.push_back(std::move(held));
-  if (held_.size() > 1) find_boundary(held_[held_.size() - 2], &held_.back());
 }
 
 void RimSmoother::finish() {
   finished_ = true;
-  if (!held_.empty()) find_boundary(held_.back(), nullptr);
+  if (!held_.empty()) find_boundary(held_.back());
 }
 
 bool RimSmoother::pop(MeshSlab& out) {
@@ -259,47 +261,44 @@ bool RimSmoother::pop(MeshSlab& out) {
   return true;
 }
 
-/// Around a vertex inside every neighbour comes next in one triangle and before in another; at the ends of an open fan
-/// it does not.
-void RimSmoother::find_boundary(Held& here, const Held* above) {
-  sums_.assign(here.overhang.size(), 0);
-  const auto add = [&](std::uint32_t v, std::uint32_t next, std::uint32_t before) {
-    sums_[v] += scrambled(next) - scrambled(before);
-  };
-  for_corners(here.mesh.triangles, here.first, here.end(), add);
-  if (above != nullptr) for_corners(above->mesh.triangles, here.first, here.end(), add);
+void RimSmoother::find_boundary(Held& here) const {
   here.boundary.resize(here.overhang.size());
-  for (std::size_t i = 0; i < sums_.size(); ++i) {
-    here.boundary[i] = sums_[i] != 0 ? 1 : 0;
+  here.raised.resize(here.overhang.size());
+  for (std::size_t i = 0; i < here.overhang.size(); ++i) {
+    here.boundary[i] = here.fans[i] != 0 ? 1 : 0;
     here.rim = here.rim || here.boundary[i] != 0 || here.overhang[i] >= level_;
+    here.raised[i] = static_cast<std::uint32_t>(raised(here, i) * kUnits);
   }
+  here.fans = {};
 }
 
 void RimSmoother::smooth(Held& here, const Held* below, const Held* above) {
-  const auto holder = [&](std::uint32_t v) -> const Held& {
-    return v < here.first ? *below : v < here.end() ? here : *above;
-  };
-  const auto raised = [&](const Held& of, std::size_t i) {
-    return of.boundary[i] != 0 ? std::max(of.overhang[i], kEndOverhang * level_) : of.overhang[i];
-  };
-  sums_.assign(here.overhang.size(), 0);
-  counts_.assign(here.overhang.size(), 0);
-  inside_.assign(here.overhang.size(), 0);
-  const auto add = [&](std::uint32_t v, std::uint32_t next, std::uint32_t before) {
-    for (const std::uint32_t neighbour : {next, before}) {
-      const Held& of = holder(neighbour);
-      const std::uint32_t i = neighbour - of.first;
-      sums_[v] += static_cast<std::uint64_t>(raised(of, i) * kUnits);
-      ++counts_[v];
-      inside_[v] += of.boundary[i] == 0 ? 1 : 0;
+  around_.assign(here.overhang.size(), {});
+  const auto add = [&](const MeshSlab& mesh) {
+    for (const auto& t : mesh.triangles) {
+      std::array<std::uint32_t, 3> overhang, inside;
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Held& of = t[k] < here.first ? *below : t[k] < here.end() ? here : *above;
+        overhang[k] = of.raised[t[k] - of.first];
+        inside[k] = 1U - of.boundary[t[k] - of.first];
+      }
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::uint32_t v = t[k] - here.first;  // of one of another slab: beyond this one's
+        if (v >= around_.size()) continue;
+        Around& a = around_[v];
+        a.sum += std::uint64_t{overhang[(k + 1) % 3]} + overhang[(k + 2) % 3];
+        a.neighbours += 2;
+        a.inside += inside[(k + 1) % 3] + inside[(k + 2) % 3];
+      }
     }
   };
-  for_corners(here.mesh.triangles, here.first, here.end(), add);
-  if (above != nullptr) for_corners(above->mesh.triangles, here.first, here.end(), add);
+  add(here.mesh);
+  if (above != nullptr) add(above->mesh);
   std::vector<float>& out = here.mesh.vertices.overhang;
   for (std::size_t i = 0; i < out.size(); ++i) {
-    if (counts_[i] == 0 || (here.boundary[i] != 0 && inside_[i] == 0)) continue;
-    const float mean = static_cast<float>(sums_[i]) / (kUnits * static_cast<float>(counts_[i]));
+    const Around& a = around_[i];
+    if (a.neighbours == 0 || (here.boundary[i] != 0 && a.inside == 0)) continue;
+    const float mean = static_cast<float>(a.sum) / (kUnits * static_cast<float>(a.neighbours));
     out[i] = 0.5F * (raised(here, i) + mean);
   }
 }

@@ -3,11 +3,13 @@
 // a surface trimmed by density does (Kazhdan and Hoppe, "Screened Poisson surface reconstruction", 2013), and not along
 // whole triangles.
 #pragma once
+#include <algorithm>
 #include <cstdint>
 #include <deque>
 #include <utility>
 #include <vector>
 
+#include "boundary/fan_hashes.h"
 #include "meshes/mesh_slab.h"
 
 namespace lamina {
@@ -85,22 +87,31 @@ class RimSmoother {
   struct Held {
     MeshSlab mesh;
     std::uint32_t first = 0;             ///< number of its first vertex
+    FanHashes fans;                      ///< while triangles come
     std::vector<float> overhang;         ///< as it came
     std::vector<std::uint8_t> boundary;  ///< 1: a vertex on the boundary
+    std::vector<std::uint32_t> raised;   ///< overhangs, those on the boundary raised, in whole units
     bool rim = false;                    ///< vertices on the boundary, or overhangs of the level or more
     [[nodiscard]] std::uint32_t end() const { return first + static_cast<std::uint32_t>(overhang.size()); }
   };
-  /// `above`: null for the last slab.
-  void find_boundary(Held& here, const Held* above);
+  void find_boundary(Held& here) const;
   void smooth(Held& here, const Held* below, const Held* above);
+  /// A vertex's overhang, where it is on the boundary raised.
+  [[nodiscard]] float raised(const Held& of, std::size_t i) const {
+    return of.boundary[i] != 0 ? std::max(of.overhang[i], kEndOverhang * level_) : of.overhang[i];
+  }
+  /// Of a vertex's neighbours, each as often as it has triangles with it.
+  struct Around {
+    std::uint64_t sum = 0;                     ///< of their overhangs, in units
+    std::uint32_t neighbours = 0, inside = 0;  ///< all of them, and those not on the boundary
+  };
 
   float level_;
   std::deque<Held> held_;  ///< the one before the next to go, that one, and those above
   bool below_ = false;     ///< the first one held has gone
   bool finished_ = false;
   std::uint32_t pushed_ = 0;  ///< vertices
-  std::vector<std::uint64_t> sums_;
-  std::vector<std::uint32_t> counts_, inside_;
+  std::vector<Around> around_;
 };
 
 }  // namespace lamina
