@@ -296,48 +296,73 @@ inline Triple triple(const float* p) {
   return {load(p), low + high, high - low};
 }
 
+/// What the trusted neighbours of eight corners add up to, row by row.
+struct Neighbours {
+  Vec s{};               ///< the sign's sum as for_neighbours() has it
+  Vec w{};               ///< weights
+  Vec nx{}, ny{}, nz{};  ///< normals
+  Vec ox{}, oy{}, oz{};  ///< where they lie
+
+  /// Those at (-1 to 1, kY, kZ), in the row of the field that has its middle at `at`. Where nothing is trusted the
+  /// field is zero and adds nothing. Products with 0 and 1 are left out: at most a zero has another sign.
+  template <int kY, int kZ>
+  [[gnu::always_inline]] void add_row(const CornerField& f, int at, float cell) {
+    constexpr int kAcross = (kY != 0) + (kZ != 0);
+    add_plane<-1, kY, kZ>(f, at, cell);
+    if constexpr (kAcross != 0) add_plane<0, kY, kZ>(f, at, cell);
+    add_plane<1, kY, kZ>(f, at, cell);
+    const Triple t = triple(&f.trusted[at]);
+    const Vec row_t = weighted<kAcross>(t);
+    w += row_t;
+    nx += weighted<kAcross>(triple(&f.nx[at]));
+    ny += weighted<kAcross>(triple(&f.ny[at]));
+    nz += weighted<kAcross>(triple(&f.nz[at]));
+    ox += neighbour_weight(1, kY, kZ) * t.difference;
+    if constexpr (kY != 0) oy += kY < 0 ? -row_t : row_t;
+    if constexpr (kZ != 0) oz += kZ < 0 ? -row_t : row_t;
+  }
+
+ private:
+  template <int kX, int kY, int kZ>
+  [[gnu::always_inline]] void add_plane(const CornerField& f, int at, float cell) {
+    Vec rise{};  // its change along the offset, cells
+    const auto step = [&]<int kSign, bool kFirst>(const float* normal) {
+      if constexpr (kSign == 0) return;
+      const Vec along = kSign < 0 ? -load(normal) : load(normal);
+      rise = kFirst ? along : rise + along;
+    };
+    step.template operator()<kX, true>(&f.nx[at + kX]);
+    step.template operator()<kY, kX == 0>(&f.ny[at + kX]);
+    step.template operator()<kZ, kX == 0 && kY == 0>(&f.nz[at + kX]);
+    const Vec seen = load(&f.distance[at + kX]) - cell * rise;
+    s += (kX != 0) + (kY != 0) + (kZ != 0) == 1 ? seen : neighbour_weight(kX, kY, kZ) * seen;
+  }
+  /// The middle one and the outer ones of a row, so many axes away from the corner.
+  template <int kAcross>
+  [[gnu::always_inline]] static Vec weighted(const Triple& of) {
+    const Vec outer = kAcross == 0 ? of.sum : neighbour_weight(1, kAcross > 0, kAcross > 1) * of.sum;
+    if constexpr (kAcross == 0) return outer;
+    return (kAcross == 1 ? of.middle : neighbour_weight(0, 1, 1) * of.middle) + outer;
+  }
+};
+
 inline Extension extend(const CornerField& f, int y, int z, float cell, float surrounded2) {
   const Vec zero = splat(0.0F);
-  Vec s = zero;
-  Vec w = zero;
-  Vec nx = zero;
-  Vec ny = zero;
-  Vec nz = zero;
-  Vec ox = zero;
-  Vec oy = zero;
-  Vec oz = zero;
-  for (int dz = -1; dz <= 1; ++dz) {
-    for (int dy = -1; dy <= 1; ++dy) {
-      const int row = (z + 1 + dz) * CornerField::kRows + y + 1 + dy;
-      if (f.any[row] == 0) continue;
-      const int at = row * CornerField::kRow + 1;
-      // The sign's sum as for_neighbours() has it; where nothing is trusted the field is zero and adds nothing.
-      const auto add = [&](int dx) {
-        const TangentPlane<Vec> plane{load(&f.distance[at + dx]), load(&f.nx[at + dx]), load(&f.ny[at + dx]),
-                                      load(&f.nz[at + dx])};
-        s += neighbour_weight(dx, dy, dz) * plane.seen_from(dx, dy, dz, cell);
-      };
-      add(-1);
-      const int m = (dy != 0) + (dz != 0);
-      if (m != 0) add(0);
-      add(1);
-      // Where the neighbours lie, row by row: weights of the row's middle and outer corners.
-      const Vec inner = splat(m == 0 ? 0.0F : 1.0F / static_cast<float>(m * m));
-      const Vec outer = splat(1.0F / static_cast<float>((m + 1) * (m + 1)));
-      const Triple t = triple(&f.trusted[at]);
-      const Triple ax = triple(&f.nx[at]);
-      const Triple ay = triple(&f.ny[at]);
-      const Triple az = triple(&f.nz[at]);
-      const Vec row_t = inner * t.middle + outer * t.sum;
-      w += row_t;
-      nx += inner * ax.middle + outer * ax.sum;
-      ny += inner * ay.middle + outer * ay.sum;
-      nz += inner * az.middle + outer * az.sum;
-      ox += outer * t.difference;
-      oy += row_t * static_cast<float>(dy);
-      oz += row_t * static_cast<float>(dz);
-    }
-  }
+  Neighbours sums;
+  const auto row = [&]<int kY, int kZ> {
+    const int at = (z + 1 + kZ) * CornerField::kRows + y + 1 + kY;
+    if (f.any[at] != 0) sums.add_row<kY, kZ>(f, at * CornerField::kRow + 1, cell);
+  };
+  row.template operator()<-1, -1>();
+  row.template operator()<0, -1>();
+  row.template operator()<1, -1>();
+  row.template operator()<-1, 0>();
+  row.template operator()<0, 0>();
+  row.template operator()<1, 0>();
+  row.template operator()<-1, 1>();
+  row.template operator()<0, 1>();
+  row.template operator()<1, 1>();
+  const auto& [s, w, nx, ny, nz, ox, oy, oz] = sums;
   const Vec any = w > zero ? w : splat(1.0F);
   const Vec n2 = nx * nx + ny * ny + nz * nz;
   const Vec along = ox * nx + oy * ny + oz * nz;
