@@ -5,6 +5,7 @@
 #include <atomic>
 #include <bit>
 #include <cstring>
+#include <limits>
 #include <vector>
 
 #include "base/four.h"
@@ -31,7 +32,8 @@ struct InCell {
 };
 
 /// Of the 4^3 corners around a cell, from one below its low corner on, those that a sample in the cell acts on: rows of
-/// x, a word per layer.
+/// x, a word per layer. `kBounded`: no farther along its normal than its height.
+template <bool kBounded>
 std::array<RowWord, 4> corners_near(const InCell& sample) {
   const auto from_sample = [&](std::size_t axis) { return FourFloats{-1, 0, 1, 2} - sample.point[axis]; };
   const FourFloats dx = from_sample(0);
@@ -48,9 +50,12 @@ std::array<RowWord, 4> corners_near(const InCell& sample) {
     const FourFloats up = up_y + up_z[z];
     FourInts rows{};
     for (int x = 0; x < 4; ++x) {
-      const FourFloats height = up + up_x[x];
-      const FourInts near = (height < FourFloats{} + sample.height) & (height > FourFloats{} - sample.height);
-      rows |= (left > x2[x] + FourFloats{}) & near & (1 << x);
+      FourInts near = left > x2[x] + FourFloats{};
+      if constexpr (kBounded) {
+        const FourFloats height = up + up_x[x];
+        near &= (height > -height ? height : -height) < FourFloats{} + sample.height;
+      }
+      rows |= near & (1 << x);
     }
     out[static_cast<std::size_t>(z)] = std::bit_cast<RowWord>(__builtin_convertvector(rows, FourRows));
   }
@@ -86,9 +91,14 @@ class BlockMarks {
     if (level_ < 0) return;
     CornerBlock& here = window.touch_shared(level_, home_);
     for (int z = 0; z < 8; ++z) set_bits(here.home, z, cells_[static_cast<std::size_t>(z)]);
+    unsigned layers = 0;  // with any corners
+    for (unsigned z = 0; z < kSide; ++z) {
+      const auto rows = corners_.begin() + z * kSide;
+      layers |= static_cast<unsigned>(std::any_of(rows, rows + kSide, [](unsigned row) { return row != 0; })) << z;
+    }
     for (int dz = -1; dz <= 1; ++dz) {
       for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) write_to(window, dx, dy, dz);
+        for (int dx = -1; dx <= 1; ++dx) write_to(window, layers, dx, dy, dz);
       }
     }
   }
@@ -96,10 +106,11 @@ class BlockMarks {
  private:
   static constexpr int kSide = 12;  // from one corner below the block to three above its first beyond
 
-  /// The part of the corners that lies in the block (dx, dy, dz) from the samples' own.
-  void write_to(Window& window, int dx, int dy, int dz) const {
+  /// The part of the corners in these layers that lies in the block (dx, dy, dz) from the samples' own.
+  void write_to(Window& window, unsigned layers, int dx, int dy, int dz) const {
     CornerBlock* to = nullptr;
     for (int z = std::max(0, -1 - 8 * dz); z < std::min(8, kSide - 1 - 8 * dz); ++z) {
+      if (((layers >> (z + 8 * dz + 1)) & 1U) == 0) continue;
       std::uint64_t word = 0;
       for (int y = std::max(0, -1 - 8 * dy); y < std::min(8, kSide - 1 - 8 * dy); ++y) {
         const unsigned row = corners_[static_cast<std::size_t>((z + 8 * dz + 1) * kSide + y + 8 * dy + 1)];
@@ -124,27 +135,31 @@ void mark_samples(Window& window, std::span<const Mark> marks) {
   std::vector<FloorDivider> cells;  // by level
   cells.reserve(static_cast<std::size_t>(window.levels()));
   for (int level = 0; level < window.levels(); ++level) cells.emplace_back(window.lattice().cell_size(level));
-  // By level, too: samples of several lie among each other.
-  std::vector<BlockMarks> blocks(static_cast<std::size_t>(window.levels()));
+  // Of every level some, for samples of several lie among each other, and rows of blocks are gone through to and fro
+  // where samples are in order by smaller ones.
+  constexpr std::size_t kBlocks = 16;
+  std::vector<BlockMarks> blocks(kBlocks * static_cast<std::size_t>(window.levels()));
   for (const Mark& m : marks) {
     const std::int32_t a = window.lattice().cell_size(m.level);
     const FloorDivider& cell_of = cells[m.level];
     const Cell cell{cell_of(m.x), cell_of(m.y), cell_of(m.z)};
-    BlockMarks& block = blocks[m.level];
-    if (!block.holds(m.level, block_of(cell))) {
+    const Block home = block_of(cell);
+    BlockMarks& block = blocks[kBlocks * m.level + static_cast<std::uint32_t>(home.x) % kBlocks];
+    if (!block.holds(m.level, home)) {
       block.write_to(window);
-      block.begin(m.level, block_of(cell));
+      block.begin(m.level, home);
     }
     const float inv = 1.0F / static_cast<float>(a);
     const auto inside = [inv, a](std::int32_t v, std::int32_t low) {
       return static_cast<float>(std::int64_t{v} - std::int64_t{low} * a) * inv;
     };
     block.mark_cell(offset_in_block(cell));
-    block.mark_corners(offset_in_block(cell),
-                       corners_near({{inside(m.x, cell.x), inside(m.y, cell.y), inside(m.z, cell.z)},
-                                     m.normal,
-                                     m.active_radius * inv,
-                                     m.active_height}));
+    const InCell sample{{inside(m.x, cell.x), inside(m.y, cell.y), inside(m.z, cell.z)},
+                        m.normal,
+                        m.active_radius * inv,
+                        m.active_height};
+    const bool bounded = sample.height < std::numeric_limits<float>::infinity();
+    block.mark_corners(offset_in_block(cell), bounded ? corners_near<true>(sample) : corners_near<false>(sample));
   }
   for (const BlockMarks& block : blocks) block.write_to(window);
 }
