@@ -44,13 +44,13 @@ std::uint32_t SheetRefinement::touch(const Cell& block, std::uint8_t level) {
       block_table_.touch(block, level, [this](const Cell& at, std::uint8_t l) { return is_needed(at, kSide, l); });
   if (!is_new) return index;
   if (index == blocks_.size()) {
-    blocks_.emplace_back();
+    blocks_.push_back(std::make_unique<Block>());
     findings_.emplace_back();
   } else {
-    blocks_[index] = {};
+    *blocks_[index] = {};
   }
-  blocks_[index].at = block;
-  blocks_[index].level = level;
+  blocks_[index]->at = block;
+  blocks_[index]->level = level;
   const Cell cell{block.x >> kDistrictBits, block.y >> kDistrictBits, block.z >> kDistrictBits};
   const auto district = district_table_.touch(
       cell, level, [this](const Cell& at, std::uint8_t l) { return is_needed(at, kSide << kDistrictBits, l); });
@@ -157,16 +157,22 @@ void SheetRefinement::give_indices(WaitingBucket& bucket, Piece& piece) {
 /// Samples of one share, whose blocks no other thread adds to, each `begin` and one of the numbers.
 void SheetRefinement::add(const LocalSamples& samples, const WaitingBucket& bucket, std::span<const std::uint16_t> of,
                           std::size_t begin) {
-  for (const std::uint16_t number : of) {
-    const std::size_t i = begin + number;
-    const std::uint32_t cell = bucket.cell_of[i];
+  const auto cell_at = [&](std::size_t k) { return bucket.cell_of[begin + of[k]]; };
+  constexpr std::size_t kAhead = 8;  // samples: their cells lie anywhere in memory
+  for (std::size_t k = 0; k < of.size(); ++k) {
+    if (k + kAhead < of.size()) {
+      const std::uint32_t later = cell_at(k + kAhead);
+      __builtin_prefetch(&blocks_[later / kCells]->cells[later % kCells]);
+    }
+    const std::size_t i = begin + of[k];
+    const std::uint32_t cell = cell_at(k);
     Findings& findings = findings_[cell / kCells];
     if (const Directions near = directions_near(samples.nx[i], samples.ny[i], samples.nz[i]);
         (findings.shared & ~near) != 0) {
       findings.shared &= near;
       std::atomic_ref(districts_[findings.district]).fetch_and(near, std::memory_order_relaxed);
     }
-    CellNormals& c = blocks_[cell / kCells].cells[cell % kCells];
+    CellNormals& c = blocks_[cell / kCells]->cells[cell % kCells];
     ++c.samples;
     c.x += in_units(samples.nx[i]);
     c.y += in_units(samples.ny[i]);
@@ -194,7 +200,7 @@ SheetRefinement::Directions SheetRefinement::shared_around(const Block& block) c
 
 /// Of the cells wanted.
 void SheetRefinement::decide(std::uint32_t own) {
-  const Block& block = blocks_[own];
+  const Block& block = *blocks_[own];
   Findings& findings = findings_[own];
   const std::uint64_t wanted = std::exchange(findings.wanted, 0);
   findings.decided |= wanted;
@@ -236,7 +242,7 @@ std::uint64_t SheetRefinement::cancelling(std::uint64_t wanted, const Around& ar
     const auto [z_begin, z_end] = range(dz);
     for (int z = z_begin; z < z_end; ++z) {
       for (int y = y_begin; y < y_end; ++y) {
-        const CellNormals* const row = &blocks_[index].cells[index_in_block(x_begin, y, z)];
+        const CellNormals* const row = &blocks_[index]->cells[index_in_block(x_begin, y, z)];
         std::copy(row, row + (x_end - x_begin), &field[in_field(dx * kSide + x_begin, dy * kSide + y, dz * kSide + z)]);
       }
     }

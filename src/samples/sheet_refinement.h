@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <limits>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -173,10 +174,10 @@ class SheetRefinement {
   [[nodiscard]] std::uint64_t cancelling(std::uint64_t wanted, const Around& around) const;
 
   Lattice lattice_;
-  std::vector<FloorDivider> to_cell_;  ///< by level
-  std::deque<Block> blocks_;           ///< a block keeps its index until it is forgotten
-  std::vector<Findings> findings_;     ///< by block: most of the work reads these alone
-  std::vector<Directions> districts_;  ///< what all normals in a district lie near
+  std::vector<FloorDivider> to_cell_;           ///< by level
+  std::vector<std::unique_ptr<Block>> blocks_;  ///< a block keeps its index until it is forgotten
+  std::vector<Findings> findings_;              ///< by block: most of the work reads these alone
+  std::vector<Directions> districts_;           ///< what all normals in a district lie near
   CellTable block_table_, district_table_;
   std::int64_t needed_from_ = std::numeric_limits<std::int64_t>::min();  ///< z of samples still to be judged
   std::deque<WaitingBucket> waiting_;
