@@ -120,6 +120,8 @@ void RimTrimmer::find_cuts(const Held* below, Held& here, const Held* above) con
   };
   const auto look = [&](const std::vector<std::array<std::uint32_t, 3>>& triangles) {
     for (const auto& t : triangles) {
+      if (std::max({t[0], t[1], t[2]}) < here.end() && inside(t[0]) == inside(t[1]) && inside(t[1]) == inside(t[2]))
+        continue;  // nearly all
       for (std::size_t k = 0; k < 3; ++k) {
         const auto [low, high] = std::minmax(t[k], t[(k + 1) % 3]);
         if (high < here.first || high >= here.end() || inside(low) == inside(high)) continue;

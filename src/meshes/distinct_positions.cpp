@@ -91,10 +91,19 @@ void DistinctPositions::move(VertexBatch& v, std::size_t i, int steps) const {
 void DistinctPositions::separate(VertexBatch& v) {
   here_.clear(v.size());
   late_.clear();
-  for (std::size_t i = 0; i < v.size(); ++i) {
-    const std::uint64_t print = fingerprint(v.x[i], v.y[i], v.z[i]);
-    const bool first = here_.insert(print);
-    if (!first || below_.contains(print)) late_.push_back(i);
+  // Fingerprints of the next vertices: their seats are asked for as soon as they are known.
+  constexpr std::size_t kAhead = 16;
+  std::array<std::uint64_t, kAhead> prints{};
+  for (std::size_t next = 0; next < v.size() + kAhead; ++next) {
+    std::uint64_t& print = prints[next % kAhead];
+    if (const std::size_t i = next - kAhead; next >= kAhead) {
+      const bool first = here_.insert(print);
+      if (!first || below_.contains(print)) late_.push_back(i);
+    }
+    if (next >= v.size()) continue;
+    print = fingerprint(v.x[next], v.y[next], v.z[next]);
+    here_.ask_for(print);
+    below_.ask_for(print);
   }
   Set moved;
   for (const std::size_t i : late_) {

@@ -31,6 +31,10 @@ class DistinctPositions {
     void clear(std::size_t expected);
     bool insert(std::uint64_t value);  ///< false where it is there
     [[nodiscard]] bool contains(std::uint64_t value) const;
+    /// Asks for where a value that is looked for soon would be.
+    void ask_for(std::uint64_t value) const {
+      if (!seats_.empty()) __builtin_prefetch(&seats_[value & (seats_.size() - 1)]);
+    }
 
    private:
     [[nodiscard]] std::size_t seat_of(std::uint64_t value) const;
