@@ -111,7 +111,7 @@ namespace {
 std::vector<Work> list_work(Window& window, int level, std::int32_t slab, bool centres) {
   std::vector<Work> work;
   for (const Tile& t : window.tiles(level, slab)) {
-    Work w{t, t.leaf, leaf_layers(window, level, slab, t.block)};
+    Work w{t, t.leaf, leaf_layers(window, level, slab, t.block), level};
     const auto [begin, end] = w.layers;
     if (centres) {
       std::uint64_t any = 0;
@@ -290,7 +290,7 @@ class Projector::Level {
   /// `local.queries` are the tile's; its steps are settled.
   void finish(const Work& work, Scratch::Local& local, const TileState& state, const CreaseState& creases) {
     fit_tile(rule_, state, local.queries, creases.found, local.fit, local.counts);
-    store_values(window_, level_, work, local.queries, state, local.fit);
+    store_values(rule_, window_, work, local.queries, state, local.fit);
   }
 
   /// How far points may move from where they start, steps.

@@ -28,6 +28,8 @@ struct ProjectSettings {
   float trusted_offset = 0.4F;  ///< trusted while |projected point - weighted average| <= this, in support radii
   int trusted_samples = 3;      ///< and at least this many samples contributed
   bool residuals = false;       ///< samples have them (ActiveBucket::residual): what their mean tells is added
+  bool leans = true;            ///< values have kLean; else 0
+  bool densities = true;        ///< and kDensity
   bool creases = false;         ///< sharp edges where normals fall into two or three groups (creases.h); corners only
 };
 

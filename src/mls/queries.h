@@ -22,6 +22,7 @@ struct Work {
   Tile tile;
   Projected* points = nullptr;  ///< the block's corners, or its cell centres
   LeafLayers layers{0, 0};      ///< of the slab
+  int level = 0;
   [[nodiscard]] bool corners() const { return points == tile.leaf; }
 };
 

@@ -155,13 +155,13 @@ void fit_tile(const ProjectRule& rule, const TileState& state, const std::vector
   for (const Crease& c : creases) take_crease(c, out, counts);
 }
 
-void store_values(Window& window, int level, const Work& work, const std::vector<Query>& queries,
+void store_values(const ProjectRule& rule, Window& window, const Work& work, const std::vector<Query>& queries,
                   const TileState& state, const TileFit& fit) {
+  const int level = work.level;
   Projected& points = *work.points;
   CornerBlock& leaf = *work.tile.leaf;
   const bool corners = work.corners();
   const auto [begin, end] = work.layers;
-  const std::size_t channels = state.all.channels();
   for (int z = begin; z < end; ++z) {
     points.seen.words[z] = points.trusted.words[z] = 0;
     if (corners) leaf.outside.words[z] = leaf.creased.words[z] = 0;
@@ -188,7 +188,7 @@ void store_values(Window& window, int level, const Work& work, const std::vector
   }
   CornerValues& values = points.values[window.slab_in_leaf(level, begin)];
   values.allocate(count, window.channels());
-  const auto cell = static_cast<float>(window.lattice().cell_size(level));
+  const float cell = rule.cell;
   std::uint32_t at = 0;
   for (int z = begin; z < end; ++z) {
     const std::uint64_t shared = corners ? leaf.shared.words[z] : 0;
@@ -202,7 +202,7 @@ void store_values(Window& window, int level, const Work& work, const std::vector
       const std::size_t g = query / kLanes;
       const int l = static_cast<int>(query % kLanes);
       const FitOutput& out = fit.fits[g];
-      const Lanes* sums = &state.all.sums[g * channels];
+      const Lanes* sums = &state.all.sums[g * rule.channels];
       float* const v = values.of(at);
       v[kDistance] = out.distance[l] * cell;
       v[kNormalX] = out.nx[l];
@@ -210,8 +210,8 @@ void store_values(Window& window, int level, const Work& work, const std::vector
       v[kNormalZ] = out.nz[l];
       v[kCurvature] = out.curvature[l] / cell;
       v[kOffsetFromMean] = out.offset_from_mean[l];
-      v[kLean] = packed_lean({out.lean_x[l], out.lean_y[l], out.lean_z[l]});
-      v[kDensity] = density(sums, l) / (cell * cell);
+      v[kLean] = rule.settings.leans ? packed_lean({out.lean_x[l], out.lean_y[l], out.lean_z[l]}) : 0.0F;
+      v[kDensity] = rule.settings.densities ? density(sums, l) / (cell * cell) : 0.0F;
       v[kCrease] = fit.creases.empty() ? 0.0F : fit.creases[query][0];
       v[kCreaseEnd] = fit.creases.empty() ? 0.0F : fit.creases[query][1];
       const float inv = 1.0F / sums[kW][l];

@@ -40,7 +40,7 @@ void fit_tile(const ProjectRule& rule, const TileState& state, const std::vector
 /// Writes what later stages need into the slab's layers of the block: `seen`, `trusted`, the signs of the seen points'
 /// own distances in `outside` (corners only), and the values, for the seen points alone: `active` becomes `seen`.
 /// Corners that a finer level holds take its values: it must be done.
-void store_values(Window& window, int level, const Work& work, const std::vector<Query>& queries,
+void store_values(const ProjectRule& rule, Window& window, const Work& work, const std::vector<Query>& queries,
                   const TileState& state, const TileFit& fit);
 
 /// Makes room for the values of the active points in the layers of a block (one slab's); false when there are none.

@@ -211,6 +211,8 @@ void plan_mesh(const SurfaceSettings& s, const StoredCloud& cloud, Reconstructio
                        plan.feed.refine_sheets ? influence : 0};
   const std::uint64_t specks = s.prune_triangles ? 0 : std::min(kSpeckSamples, plan.samples / kSpeckShare);
   plan.pruning = {s.prune_triangles.value_or(kSpeckTriangles), specks, resolve(s.prune_size, median, plan.feed.blend)};
+  plan.projection.leans = plan.trim > 0;
+  plan.projection.densities = specks > 0;
   plan.mesh_attributes = plan.attributes;
   if (s.vertex_levels) plan.mesh_attributes.push_back({"level", ScalarType::uint8});
   if (s.vertex_curvature) plan.mesh_attributes.push_back({"curvature", ScalarType::float32});
