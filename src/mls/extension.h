@@ -44,40 +44,59 @@ struct CornerValue {
 /// for its own; `out` is then untouched. `attributes` (may be null) gets window.attributes() floats.
 bool corner_value(const Window& window, int level, const Cell& corner, CornerValue& out, float* attributes);
 
+/// A layer of a block's corners that are in a mask (`seen` or a subset of it), and where their records begin.
+struct RecordLayer {
+  std::uint64_t wanted = 0, active = 0;
+  const float* first = nullptr;  ///< record
+  std::uint32_t channels = 0;
+
+  RecordLayer() = default;
+  RecordLayer(const CornerBlock* of, BlockMask Projected::*mask, int layer, int slab_layers) {
+    if (of == nullptr) return;
+    const CornerValues& values = of->values[static_cast<std::size_t>(layer / slab_layers)];
+    if (values.count == 0) return;
+    wanted = (of->*mask).words[layer];
+    if (wanted == 0) return;
+    active = of->active.words[layer];
+    first = values.of(of->value_index(layer * 64, slab_layers));
+    channels = values.channels;
+  }
+  [[nodiscard]] const float* record(int bit) const {
+    const std::uint64_t before = active & ((std::uint64_t{1} << bit) - 1);
+    return first + static_cast<std::size_t>(std::popcount(before)) * channels;
+  }
+};
+
 /// The values of the corners around a corner: calls use(dx, dy, dz, record) for those of the 26 corners around one of a
-/// block that are in a mask (`seen` or a subset of it) and have their values, in the order of for_neighbours(). Rows of
-/// corners share the search for their first record.
+/// block that are in a mask (`seen` or a subset of it) and have their values, in the order of for_neighbours().
 template <typename Use>
 void for_records_around(const CornerBlock& block, int offset, BlockMask Projected::*mask, int slab_layers,
                         const Use& use) {
-  const int layer_shift = std::countr_zero(static_cast<unsigned>(slab_layers));
   const int x = offset & 7;
+  const int y = (offset >> 3) & 7;
   for (int dz = -1; dz <= 1; ++dz) {
     const int z = (offset >> 6) + dz;
-    const int layer = z & 7;
+    // Of the blocks at x and beside it; rows in one block share them.
+    RecordLayer middle, aside;
+    const int beyond = x == 0 ? -1 : 1;
     for (int dy = -1; dy <= 1; ++dy) {
-      const int y = ((offset >> 3) & 7) + dy;
-      const int row = 8 * (y & 7);
-      /// Of the corners in a block `beyond` from this one, by their bits in the row.
-      const auto visit = [&](int beyond, unsigned wanted) {
-        const CornerBlock* const from = block.around[CornerBlock::towards(beyond, y >> 3, z >> 3)];
-        if (from == nullptr) return;
-        auto bits = static_cast<unsigned>((from->*mask).words[layer] >> row) & wanted;
-        if (bits == 0) return;
-        const CornerValues& values = from->values[static_cast<std::size_t>(layer >> layer_shift)];
-        if (values.count == 0) return;
-        const std::uint32_t first = from->value_index(layer * 64 + row, slab_layers);
-        const auto active = static_cast<unsigned>(from->active.words[layer] >> row);
-        for (; bits != 0; bits &= bits - 1) {
+      const int block_y = (y + dy) >> 3;
+      const int row = 8 * ((y + dy) & 7);
+      if (dy == -1 || (y + dy) == 0 || (y + dy) == 8) {
+        middle = {block.around[CornerBlock::towards(0, block_y, z >> 3)], mask, z & 7, slab_layers};
+        if (x == 0 || x == 7)
+          aside = {block.around[CornerBlock::towards(beyond, block_y, z >> 3)], mask, z & 7, slab_layers};
+      }
+      const auto visit = [&](const RecordLayer& of, int from_x, unsigned three) {
+        for (auto bits = static_cast<unsigned>(of.wanted >> row) & three; bits != 0; bits &= bits - 1) {
           const int at = std::countr_zero(bits);
-          const int before = std::popcount(active & ((1U << at) - 1));
-          use(at + 8 * beyond - x, dy, dz, values.of(first + static_cast<std::uint32_t>(before)));
+          use(at + from_x - x, dy, dz, of.record(row + at));
         }
       };
       const unsigned three = dy == 0 && dz == 0 ? 0b101U : 0b111U;
-      if (x == 0 && (three & 1U) != 0) visit(-1, 0x80U);
-      visit(0, (x == 0 ? three >> 1 : three << (x - 1)) & 0xFFU);
-      if (x == 7) visit(1, 0x01U);
+      if (x == 0) visit(aside, -8, (three & 1U) << 7);
+      visit(middle, 0, (x == 0 ? three >> 1 : three << (x - 1)) & 0xFFU);
+      if (x == 7) visit(aside, 8, three >> 2);
     }
   }
 }
