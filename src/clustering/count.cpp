@@ -166,11 +166,9 @@ template <ClusterMode mode>
 void count_as(Window& window, std::int64_t slab) {
   SlabRecord& here = window.at(slab);
   SlabRecord& next = window.at(slab + 1);
-  for (const IsoVertex& v : here.iso->vertices) {
-    if (v.high.next() && v.high.index() >= next.corners.size()) {
-      bad_slab(slab, "an isovertex names corner " + std::to_string(v.high.index()) + " of the next slab, which has " +
-                         std::to_string(next.corners.size()));
-    }
+  if (here.next_corners > next.corners.size()) {
+    bad_slab(slab, "an isovertex names corner " + std::to_string(here.next_corners - 1) +
+                       " of the next slab, which has " + std::to_string(next.corners.size()));
   }
   const Tables tables{{here.vertices.data(), next.vertices.data()},
                       {here.corners.data(), next.corners.data()},
@@ -202,6 +200,7 @@ void lay_out(SlabRecord& record, std::shared_ptr<const IsoSlab> iso) {
     throw Error(ExitCode::budget, "clustering: slab " + std::to_string(record.slab) + " holds more than " +
                                       std::to_string(kRefIndex) + " isovertices; use larger cells");
   }
+  record.next_corners = 0;
   record.crossing.clear();
   record.border.clear();
   record.unresolved.clear();
@@ -230,6 +229,7 @@ void lay_out(SlabRecord& record, std::shared_ptr<const IsoSlab> iso) {
     note.direction = static_cast<std::uint8_t>(2 * (vertex.axis % 3) + (vertex.near_high ? 1 : 0));
     note.corner = vertex.near_high ? vertex.high.bits : vertex.low.bits;
     record.vertices[v] = note;
+    if (vertex.high.next()) record.next_corners = std::max(record.next_corners, vertex.high.index() + 1);
     if (note.crossing()) record.crossing.push_back(static_cast<std::uint32_t>(v));
   }
 }

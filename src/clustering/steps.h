@@ -94,6 +94,7 @@ struct SlabRecord {
   std::vector<std::uint8_t> vetoes;  ///< parallel to iso->corners: condition Q fails beside an unresolved cluster
   std::vector<std::uint32_t>
       seats;  ///< parallel: index into `unresolved` while unresolved or split, else the final number
+  std::uint32_t next_corners = 0;       ///< corners of the next slab that vertices name are less than this
   std::vector<std::uint32_t> crossing;  ///< vertices that belong to a corner of the next slab
   std::vector<IsoTriangle> border;      ///< triangles that touch the next slab, by a vertex or by its cluster
   std::vector<UnresolvedCluster> unresolved;
