@@ -130,6 +130,13 @@ std::vector<Work> list_work(Window& window, int level, std::int32_t slab, bool c
   return work;
 }
 
+/// Whether the level projects any of a tile's points itself.
+bool has_queries(const Work& work) {
+  std::uint64_t own = 0;
+  for (int z = work.layers.begin; z < work.layers.end; ++z) own |= work.own(z);
+  return own != 0;
+}
+
 /// Of a group's sums.
 std::size_t channels_of(const Window& window, const ProjectSettings& settings) {
   return kSums + static_cast<std::size_t>(window.attributes()) + (settings.residuals ? kResidualSums : 0);
@@ -154,8 +161,9 @@ class Projector::Level {
         window_(window),
         lattice_(window.lattice()),
         level_(level),
-        feed_(feed),
-        work_(list_work(window, level, slab, projector.settings_.centres)) {
+        feed_(feed) {
+    for (const Work& w : list_work(window, level, slab, projector.settings_.centres))
+      (has_queries(w) ? work_ : taken_over_).push_back(w);
     layers_.level = level;
     layers_.first = lattice_.first_layer(level, slab);
     layers_.end = layers_.first + lattice_.layers(level);
@@ -163,12 +171,18 @@ class Projector::Level {
   }
 
   void project(const std::vector<NumberedBuckets>& batches) {
-    if (work_.empty()) return;
     if (batches.empty()) {
       // Nothing is seen here.
-      for (const Work& w : work_)
-        std::fill_n(&w.points->active.words[w.layers.begin], w.layers.end - w.layers.begin, 0);
-    } else if (batches.size() == 1) {
+      for (const std::vector<Work>* const some : {&work_, &taken_over_}) {
+        for (const Work& w : *some)
+          std::fill_n(&w.points->active.words[w.layers.begin], w.layers.end - w.layers.begin, 0);
+      }
+      return;
+    }
+    tbb::parallel_for(std::size_t{0}, taken_over_.size(),
+                      [&](std::size_t t) { store_values(rule_, window_, taken_over_[t], {}, {}, {}); });
+    if (work_.empty()) return;
+    if (batches.size() == 1) {
       project_at_once(batches.front());
     } else {
       project_in_turns(batches);
@@ -305,6 +319,7 @@ class Projector::Level {
   int level_;
   SampleFeed& feed_;
   std::vector<Work> work_;
+  std::vector<Work> taken_over_;  ///< tiles whose points finer levels hold, all of them: no sample is looked at
   QueryLayers layers_;
 };
 

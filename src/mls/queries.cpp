@@ -58,7 +58,7 @@ void list_queries(const Work& work, std::vector<Query>& out) {
   const auto [begin, end] = work.layers;
   const auto wanted = [&, begin = begin, end = end](int z) {
     if (z < begin || z >= end) return std::uint64_t{0};
-    return work.points->active.words[z] & ~(work.corners() ? work.tile.leaf->shared.words[z] : 0);
+    return work.own(z);
   };
   for (int z = begin & ~1; z < end; z += 2) {
     const std::array<std::uint64_t, 2> layers{wanted(z), wanted(z + 1)};

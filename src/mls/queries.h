@@ -24,6 +24,10 @@ struct Work {
   LeafLayers layers{0, 0};      ///< of the slab
   int level = 0;
   [[nodiscard]] bool corners() const { return points == tile.leaf; }
+  /// The points of a layer that the level projects itself: not those that a finer level holds too.
+  [[nodiscard]] std::uint64_t own(int z) const {
+    return points->active.words[z] & ~(corners() ? tile.leaf->shared.words[z] : 0);
+  }
 };
 
 /// A point to project, in the tile's compact order.
@@ -31,8 +35,8 @@ struct Query {
   std::uint8_t x, y, z;
 };
 
-/// The active points of the slab that this level projects itself: not those that a finer level holds too. By groups of
-/// 2^3, so that the eight of a group lie close together and few samples act on any of them.
+/// The points of the slab that this level projects itself. By groups of 2^3, so that the eight of a group lie close
+/// together and few samples act on any of them.
 void list_queries(const Work& work, std::vector<Query>& out);
 
 /// Query points and their running sums, in lane groups of eight; the last group is filled up with copies of its last
