@@ -25,6 +25,10 @@ inline FourFloats to_floats(const FourInts& v) {
 inline FourFloats floor_of(const FourFloats& v) {
   return std::bit_cast<FourFloats>(_mm_floor_ps(std::bit_cast<__m128>(v)));
 }
+/// To the nearest whole numbers, of two as near to the even one.
+inline FourInts rounded(const FourFloats& v) {
+  return std::bit_cast<FourInts>(_mm_cvtps_epi32(std::bit_cast<__m128>(v)));
+}
 /// A bit for each of the four that a comparison holds for.
 inline unsigned bits_of(const FourInts& mask) {
   return static_cast<unsigned>(_mm_movemask_ps(std::bit_cast<__m128>(mask)));

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "base/four.h"
 #include "mls/extension.h"
 #include "mls/kernel.h"
 
@@ -39,12 +40,12 @@ float across(const std::array<float, 3>& v, const std::array<float, 3>& normal) 
 }  // namespace
 
 float packed_lean(const std::array<float, 3>& lean) {
-  std::uint32_t bits = 0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const auto steps = static_cast<std::int32_t>(std::lrint(std::clamp(lean[k], -1.0F, 1.0F) * kLeanSteps));
-    bits |= (static_cast<std::uint32_t>(steps) & kLeanMask) << (kLeanBits * k);
-  }
-  return std::bit_cast<float>(bits);
+  const FourFloats one{1, 1, 1, 1};
+  FourFloats v{lean[0], lean[1], lean[2], 0};
+  v = v < -one ? -one : v;
+  v = one < v ? one : v;
+  const FourInts steps = rounded(v * kLeanSteps) & static_cast<std::int32_t>(kLeanMask);
+  return std::bit_cast<float>(steps[0] | steps[1] << kLeanBits | steps[2] << (2 * kLeanBits));
 }
 
 std::array<float, 3> unpacked_lean(float packed) {

@@ -13,15 +13,13 @@
 #include <numeric>
 #include <utility>
 
+#include "base/four.h"
+
 namespace lamina {
 namespace {
 
 /// Normals are summed in units of 1 / kUnit: far finer than what is asked of the sums.
 constexpr double kUnit = 1 << 9;
-
-std::uint32_t in_units(float v) {
-  return static_cast<std::uint32_t>(std::lrint(v * static_cast<float>(kUnit)));
-}
 
 std::int64_t cell_row(std::int64_t z, std::int64_t side) {
   return z / side - static_cast<std::int64_t>(z % side < 0);
@@ -66,20 +64,12 @@ std::uint32_t SheetRefinement::touch(const Cell& block, std::uint8_t level) {
 SheetRefinement::Directions SheetRefinement::directions_near(float x, float y, float z) {
   constexpr auto kNear = static_cast<float>(kCancelledShare + 0.015);
   constexpr float kNearCorner = std::numbers::sqrt3_v<float> * kNear;
-  unsigned near = 0;
-  unsigned bit = 1;
-  const auto look = [&](float along, float least) {
-    near |= (along > least ? bit : 0U) | (along < -least ? bit << 1 : 0U);
-    bit <<= 2;
+  const auto near = [](const FourFloats& along, float least) {
+    return bits_of(along > FourFloats{} + least) | bits_of(along < FourFloats{} - least) << 4;
   };
-  look(x, kNear);
-  look(y, kNear);
-  look(z, kNear);
-  look(x + y + z, kNearCorner);
-  look(x + y - z, kNearCorner);
-  look(x - y + z, kNearCorner);
-  look(x - y - z, kNearCorner);
-  return static_cast<Directions>(near);
+  const FourFloats faces{x, y, z, 0};
+  const FourFloats corners = FourFloats{x, x, x, x} + FourFloats{y, y, -y, -y} + FourFloats{z, -z, z, -z};
+  return static_cast<Directions>(near(faces, kNear) | near(corners, kNearCorner) << 8);
 }
 
 void SheetRefinement::push(const LocalSamples& samples, const std::vector<std::uint8_t>& level,
@@ -173,10 +163,12 @@ void SheetRefinement::add(const LocalSamples& samples, const WaitingBucket& buck
       std::atomic_ref(districts_[findings.district]).fetch_and(near, std::memory_order_relaxed);
     }
     CellNormals& c = blocks_[cell / kCells]->cells[cell % kCells];
+    const FourFloats normal{samples.nx[i], samples.ny[i], samples.nz[i], 0};
+    const FourInts units = rounded(normal * static_cast<float>(kUnit));
+    c.x += static_cast<std::uint32_t>(units[0]);
+    c.y += static_cast<std::uint32_t>(units[1]);
+    c.z += static_cast<std::uint32_t>(units[2]);
     ++c.samples;
-    c.x += in_units(samples.nx[i]);
-    c.y += in_units(samples.ny[i]);
-    c.z += in_units(samples.nz[i]);
   }
 }
 
