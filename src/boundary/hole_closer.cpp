@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <iterator>
 #include <limits>
-#include <map>
 #include <set>
 
 #include "boundary/fill.h"
@@ -105,7 +104,7 @@ void HoleCloser::fill_all(std::vector<Closing>& closings) const {
                     [&](std::size_t i) { closings[i].filling = fill_loop(loops_[i].first, settings_.longest); });
 }
 
-std::vector<std::vector<std::size_t>> HoleCloser::find_occupants(const std::vector<Closing>& closings) const {
+std::vector<HoleCloser::Occupants> HoleCloser::find_occupants(const std::vector<Closing>& closings) const {
   struct Seat {
     double x;
     std::size_t loop, vertex;
@@ -116,7 +115,7 @@ std::vector<std::vector<std::size_t>> HoleCloser::find_occupants(const std::vect
     for (std::size_t v = 0; v < vertices.size(); ++v) seats.push_back({vertices[v].position[0], l, v});
   }
   std::sort(seats.begin(), seats.end(), [](const Seat& a, const Seat& b) { return a.x < b.x; });
-  std::vector<std::vector<std::size_t>> occupants(loops_.size());
+  std::vector<Occupants> occupants(loops_.size());
   tbb::parallel_for(std::size_t{0}, loops_.size(), [&](std::size_t l) {
     if (closings[l].filling.verdict != Verdict::filled) return;
     const auto& [loop, extent] = loops_[l];
@@ -124,38 +123,42 @@ std::vector<std::vector<std::size_t>> HoleCloser::find_occupants(const std::vect
     float radius = 0;
     for (const BoundaryVertex& v : loop.vertices) radius = std::max(radius, v.radius);
     const double margin = static_cast<double>(radius);
-    std::set<std::size_t> found;
     auto seat = std::lower_bound(seats.begin(), seats.end(), extent.low[0] - margin,
                                  [](const Seat& s, double x) { return s.x < x; });
     for (; seat != seats.end() && seat->x <= extent.high[0] + margin; ++seat) {
-      if (seat->loop == l || found.contains(seat->loop)) continue;
+      if (seat->loop == l) continue;
       const BoundaryVertex& v = loops_[seat->loop].first.vertices[seat->vertex];
       bool inside = true;
       for (std::size_t k = 1; k < 3; ++k)
         inside = inside && v.position[k] >= extent.low[k] - margin && v.position[k] <= extent.high[k] + margin;
-      if (inside && place.holds(v)) found.insert(seat->loop);
+      if (inside && place.holds(v)) ++occupants[l][seat->loop];
     }
-    occupants[l].assign(found.begin(), found.end());
   });
   return occupants;
 }
 
-void HoleCloser::pass_over_holes_beside(const std::vector<Closing>& closings,
-                                        std::vector<std::vector<std::size_t>>& occupants) const {
+void HoleCloser::pass_over_holes_beside(const std::vector<Closing>& closings, std::vector<Occupants>& occupants) const {
   tbb::parallel_for(std::size_t{0}, loops_.size(), [&](std::size_t l) {
-    std::erase_if(occupants[l], [&](std::size_t o) {
+    std::erase_if(occupants[l], [&](const auto& occupant) {
+      const std::size_t o = occupant.first;
       return closings[o].filling.verdict == Verdict::filled && lies_beside(loops_[o].first, loops_[l].first);
     });
   });
 }
 
-bool HoleCloser::take_islands(std::size_t outer, const std::vector<std::size_t>& occupants,
-                              const std::vector<Closing>& closings, Closing& out) const {
+bool HoleCloser::is_occupied(std::size_t gap, const Occupants& occupants) const {
+  std::size_t vertices = 0;
+  for (const auto& [loop, held] : occupants) vertices += held;
+  return static_cast<double>(vertices) > kMostOccupied * static_cast<double>(loops_[gap].first.vertices.size());
+}
+
+bool HoleCloser::take_islands(std::size_t outer, const Occupants& occupants, const std::vector<Closing>& closings,
+                              Closing& out) const {
   const Loop& loop = loops_[outer].first;
   const FilledPlace place(loop, closings[outer].filling);
   std::vector<const Loop*> islands;
   std::vector<std::size_t> others;
-  for (const std::size_t o : occupants) {
+  for (const auto& [o, held] : occupants) {
     if (closings[o].filling.verdict == Verdict::outer_boundary && place.surrounds(loops_[o].first)) {
       islands.push_back(&loops_[o].first);
       out.islands.push_back(o);
@@ -175,7 +178,7 @@ bool HoleCloser::take_islands(std::size_t outer, const std::vector<std::size_t>&
 }
 
 void HoleCloser::settle_occupied(std::vector<Closing>& closings) const {
-  std::vector<std::vector<std::size_t>> occupants = find_occupants(closings);
+  std::vector<Occupants> occupants = find_occupants(closings);
   pass_over_holes_beside(closings, occupants);
   const std::vector<Closing> before = closings;
   tbb::parallel_for(std::size_t{0}, loops_.size(), [&](std::size_t l) {
@@ -183,7 +186,7 @@ void HoleCloser::settle_occupied(std::vector<Closing>& closings) const {
     Closing with;
     if (take_islands(l, occupants[l], before, with)) {
       closings[l] = std::move(with);
-    } else {
+    } else if (is_occupied(l, occupants[l])) {
       closings[l].filling = {};
       closings[l].filling.verdict = Verdict::occupied;
     }
@@ -213,10 +216,10 @@ void HoleCloser::bridge_gaps(std::vector<Closing>& closings) const {
     bridges[l].filling = std::move(closure.filling);
     bridges[l].filling.verdict = Verdict::filled;
   });
-  std::vector<std::vector<std::size_t>> occupants = find_occupants(bridges);
+  std::vector<Occupants> occupants = find_occupants(bridges);
   pass_over_holes_beside(closings, occupants);
   for (std::size_t l = 0; l < loops_.size(); ++l) {
-    if (bridges[l].is_closed() && occupants[l].empty()) closings[l] = std::move(bridges[l]);
+    if (bridges[l].is_closed() && !is_occupied(l, occupants[l])) closings[l] = std::move(bridges[l]);
   }
 }
 

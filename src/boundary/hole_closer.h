@@ -2,6 +2,7 @@
 #pragma once
 #include <array>
 #include <cstdint>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -27,6 +28,9 @@ inline constexpr double kMostLeadsAway = 0.2;
 /// rim: at rims of 10 radii 70 degrees on the average, of 25 60, of 50 41. What a wide gap hides may look otherwise.
 inline constexpr double kBridgeLeadsIn = 0.25;
 inline constexpr double kBridgePerRadius = 0.012;
+/// Other loops run through a filling with no more vertices than this for each of the rim: scraps of surface that lie
+/// on it here and there, as noise and scans that disagree leave them, say nothing against it.
+inline constexpr double kMostOccupied = 0.1;
 /// Loops of more edges are not looked at, whatever their length, but where all are to be closed.
 inline constexpr std::uint64_t kMostEdges = 4096;
 
@@ -67,13 +71,16 @@ class HoleCloser {
     }
   };
   void fill_all(std::vector<Closing>& closings) const;
-  /// By loop, the other loops that run through its filling.
-  [[nodiscard]] std::vector<std::vector<std::size_t>> find_occupants(const std::vector<Closing>& closings) const;
+  /// Loops that run through a filling, and how many of their vertices do.
+  using Occupants = std::map<std::size_t, std::size_t>;
+  /// By loop, the others in its filling.
+  [[nodiscard]] std::vector<Occupants> find_occupants(const std::vector<Closing>& closings) const;
   /// Takes out of each gap's occupants those that are holes in the surface along its rim.
-  void pass_over_holes_beside(const std::vector<Closing>& closings,
-                              std::vector<std::vector<std::size_t>>& occupants) const;
+  void pass_over_holes_beside(const std::vector<Closing>& closings, std::vector<Occupants>& occupants) const;
+  /// Whether a filling would be one surface twice.
+  [[nodiscard]] bool is_occupied(std::size_t gap, const Occupants& occupants) const;
   /// Fills around the occupants where they are islands; false where they are not, or no filling goes around them.
-  bool take_islands(std::size_t outer, const std::vector<std::size_t>& occupants, const std::vector<Closing>& closings,
+  bool take_islands(std::size_t outer, const Occupants& occupants, const std::vector<Closing>& closings,
                     Closing& out) const;
   void settle_occupied(std::vector<Closing>& closings) const;
   /// Closes what is `bent` where the surface leads into it and no other loop lies in the way.

@@ -7,7 +7,7 @@
 #include <deque>
 #include <vector>
 
-#include "boundary/fan_hashes.h"
+#include "meshes/fan_hashes.h"
 #include "meshes/mesh_slab.h"
 
 namespace lamina {

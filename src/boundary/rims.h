@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "boundary/fan_hashes.h"
+#include "meshes/fan_hashes.h"
 #include "meshes/mesh_slab.h"
 
 namespace lamina {

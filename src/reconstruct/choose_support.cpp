@@ -44,6 +44,7 @@ void choose_for_noise(const CloudSurvey& survey, const SurfaceSettings& s, doubl
   plan.refit.support = static_cast<double>(plan.refit.per_blend) * plan.feed.blend;
   plan.feed.cell = {cell, Length::Unit::sample_radius};
   plan.trim = rim_overhang(plan.feed.blend);
+  plan.settle_normals = true;
   if (s.cell && s.cell->unit != Length::Unit::sample_radius) return;
   plan.feed.band_cells = kNoisyBand;
   plan.feed.band_radii = kNoisyReach;

@@ -22,7 +22,7 @@
 
 namespace lamina {
 
-static_assert(kFlipSlabs == kFlipReach);
+static_assert(kFlipSlabs == kFlipReach && kSettleSlabs == kSettleReach);
 
 namespace {
 
@@ -165,6 +165,7 @@ MeshOutput::MeshOutput(const ReconstructionPlan& plan, SlabSink& sink)
     : plan_(plan), sink_(sink), clusterer_(ClusterSettings{plan.cluster}), distinct_(plan.double_positions) {
   const auto level = static_cast<float>(plan.trim);
   if (plan.projection.creases) flips_.emplace(kLeastBend);
+  if (plan.settle_normals) settler_.emplace();
   if (level > 0) rims_.emplace(Rims{RimSmoother(level), RimTrimmer(level), {}});
 }
 
@@ -235,6 +236,10 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
     while (flips_->pop(mesh_)) hand_to_rims(mesh_);
   }
   if (rims_) trim(last);
+  if (settler_ && last) {
+    settler_->finish();
+    while (settler_->pop(mesh_)) pass_on(mesh_);
+  }
 }
 
 /// Which pass it on where there are none.
@@ -242,7 +247,7 @@ void MeshOutput::hand_to_rims(MeshSlab& slab) {
   if (rims_) {
     rims_->smoother.push(std::exchange(slab, rims_->trimmer.spare()));
   } else {
-    pass_on(slab);
+    settle(slab);
   }
 }
 
@@ -253,7 +258,17 @@ void MeshOutput::trim(bool last) {
   if (last) rims_->trimmer.finish();
   while (rims_->trimmer.pop(trimmed_)) rims_->fairer.push(std::exchange(trimmed_, std::exchange(faired_, {})));
   if (last) rims_->fairer.finish();
-  while (rims_->fairer.pop(faired_)) pass_on(faired_);
+  while (rims_->fairer.pop(faired_)) settle(faired_);
+}
+
+/// Passes a slab on, with settled normals later.
+void MeshOutput::settle(MeshSlab& slab) {
+  if (!settler_) {
+    pass_on(slab);
+    return;
+  }
+  settler_->push(std::exchange(slab, {}));
+  while (settler_->pop(slab)) pass_on(slab);
 }
 
 void MeshOutput::pass_on(MeshSlab& slab) {

@@ -17,6 +17,7 @@
 #include "boundary/rims.h"
 #include "clustering/clusterer.h"
 #include "clustering/crease_flips.h"
+#include "clustering/settled_normals.h"
 #include "isosurface/iso_mesh.h"
 #include "lamina/frame.h"
 #include "lamina/mesh_receiver.h"
@@ -96,6 +97,7 @@ class MeshOutput {
   void work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last);
   void hand_to_rims(MeshSlab& slab);
   void trim(bool last);
+  void settle(MeshSlab& slab);
   void pass_on(MeshSlab& slab);
 
   const ReconstructionPlan& plan_;
@@ -113,6 +115,7 @@ class MeshOutput {
     RimFairer fairer;
   };
   std::optional<Rims> rims_;
+  std::optional<NormalSettler> settler_;  ///< where normals are settled
   MeshSlab trimmed_, faired_;
   DistinctPositions distinct_;
   std::mutex mutex_;  ///< of spares_

@@ -68,6 +68,7 @@ struct ReconstructionPlan {
   bool vertex_curvature = false;  ///< SurfaceSettings::vertex_curvature
   RadiusRule vertex_radii;        ///< the influence radius around each vertex, by the finest cell around its corner
   double trim = 0;                ///< R, > 0: the mesh is cut where its overhang is this (boundary/rims.h)
+  bool settle_normals = false;    ///< triangles have a say in their vertices' normals (clustering/settled_normals.h)
   HoleSettings holes;
   PruneRule pruning;
   SimplifySettings simplify;
@@ -82,7 +83,7 @@ struct ReconstructionPlan {
 
   /// The slabs each stage works on for the finished slabs of a span.
   [[nodiscard]] StageSpans stages_of(const SlabSpan& span) const {
-    return {span, slabs, {projection.centres, projection.creases}};
+    return {span, slabs, {projection.centres, projection.creases, settle_normals}};
   }
 };
 

@@ -47,6 +47,8 @@ inline constexpr std::array<StageReach, kStages> kStageReach{{
 
 /// Slabs more either way where edges turn along creases (kFlipReach), which the triangles of the slabs around say.
 inline constexpr std::int32_t kFlipSlabs = 2;
+/// And where normals are settled by the triangles around (kSettleReach).
+inline constexpr std::int32_t kSettleSlabs = 1;
 
 constexpr const StageReach& reach_of(Stage stage) {
   return kStageReach[static_cast<std::size_t>(stage)];
@@ -69,6 +71,7 @@ inline SlabSpan all_slabs(const Lattice& lattice, const Extent& extent) {
 struct WiderReach {
   bool diffuse = false;  ///< corners follow the centres of the slab below
   bool creases = false;  ///< edges turn along them
+  bool settles = false;  ///< triangles settle the normals of their vertices
 };
 
 /// The slabs each stage works on for the finished slabs of a span.
@@ -76,11 +79,11 @@ class StageSpans {
  public:
   /// `all`: all_slabs().
   StageSpans(const SlabSpan& span, const SlabSpan& all, const WiderReach& wider) {
-    const std::int32_t flips = wider.creases ? kFlipSlabs : 0;
+    const std::int32_t more = (wider.creases ? kFlipSlabs : 0) + (wider.settles ? kSettleSlabs : 0);
     for (std::size_t s = 0; s < kStages; ++s) {
       const bool centres = wider.diffuse && s == static_cast<std::size_t>(Stage::project);
-      const std::int32_t below = kStageReach[s].below + flips + (centres ? 1 : 0);
-      spans_[s] = {std::max(all.begin, span.begin - below), std::min(all.end, span.end + kStageReach[s].above + flips)};
+      const std::int32_t below = kStageReach[s].below + more + (centres ? 1 : 0);
+      spans_[s] = {std::max(all.begin, span.begin - below), std::min(all.end, span.end + kStageReach[s].above + more)};
     }
   }
   [[nodiscard]] const SlabSpan& of(Stage stage) const { return spans_[static_cast<std::size_t>(stage)]; }

@@ -30,6 +30,8 @@ TEST(Stages, SpansGrowByTheTableAndEndWithTheCloud) {
   const SlabSpan turned = StageSpans({15, 20}, all, {.creases = true}).of(Stage::triangulate);
   const SlabSpan plain = inner.of(Stage::triangulate);
   EXPECT_EQ(turned, (SlabSpan{plain.begin - kFlipSlabs, plain.end + kFlipSlabs}));
+  const SlabSpan settled = StageSpans({15, 20}, all, {.settles = true}).of(Stage::triangulate);
+  EXPECT_EQ(settled, (SlabSpan{plain.begin - kSettleSlabs, plain.end + kSettleSlabs}));
 }
 
 TEST(Stages, EachStageCoversWhatTheNextOneNeeds) {

@@ -31,6 +31,7 @@ struct MeshQuality {
   double layers = 0;    ///< mesh area within 2 of the truth over the truth's area within 2 of the mesh
   double flipped = 0;   ///< of the mesh's area: facing away from the nearest truth
   double normals = 0;   ///< degrees, 95th percentile of the faces' within 3 of the truth, sides not told apart
+  double shading = 0;   ///< the same of the vertices' own normals, by vertex
   double parts = 0;
   double flakes = 0;      ///< of the triangles: in parts of fewer than 100
   double folds = 0;       ///< of the edges: where two triangles meet at less than 80 degrees
@@ -42,9 +43,9 @@ struct MeshQuality {
 
 inline std::ostream& operator<<(std::ostream& out, const MeshQuality& q) {
   return out << "error " << q.error << ", missing " << q.missing << ", invented " << q.invented << ", layers "
-             << q.layers << ", flipped " << q.flipped << ", normals " << q.normals << ", parts " << q.parts
-             << ", flakes " << q.flakes << ", folds " << q.folds << ", loops " << q.loops << ", ragged " << q.ragged
-             << ", turn " << q.turn << ", coincident " << q.coincident;
+             << q.layers << ", flipped " << q.flipped << ", normals " << q.normals << ", shading " << q.shading
+             << ", parts " << q.parts << ", flakes " << q.flakes << ", folds " << q.folds << ", loops " << q.loops
+             << ", ragged " << q.ragged << ", turn " << q.turn << ", coincident " << q.coincident;
 }
 
 /// Whether points lie near a given one: cells of the distance asked for.
@@ -219,6 +220,26 @@ inline void judge_shape(const TriangleMesh& mesh, double spacing, MeshQuality& q
   judge_boundary(mesh, std::move(next), spacing, quality);
 }
 
+inline double high_quantile(std::vector<double>& values) {
+  if (values.empty()) return 0;
+  const auto at = values.begin() + static_cast<long>(0.95 * static_cast<double>(values.size()));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// MeshQuality::shading.
+inline double judge_shading(const TriangleMesh& mesh, const TriangleMesh& truth, const measure::TriangleBvh& truth_tree,
+                            double spacing) {
+  std::vector<double> tilts;
+  for (std::size_t v = 0; v < mesh.normals.size(); ++v) {
+    const auto nearest = truth_tree.nearest(mesh.positions[v]);
+    if (nearest.distance > 3 * spacing) continue;
+    const double tilt = degrees_between(to_double(mesh.normals[v]), face_normal(truth, nearest.triangle));
+    tilts.push_back(std::min(tilt, 180 - tilt));
+  }
+  return high_quantile(tilts);
+}
+
 }  // namespace quality_detail
 
 /// Of a mesh of the scan of the truth.
@@ -250,11 +271,8 @@ inline MeshQuality judge_mesh(const TriangleMesh& raw, const TriangleMesh& truth
     if (nearest.distance < 3 * spacing) tilts.push_back(std::min(tilt, 180 - tilt));
   }
   q.error = std::sqrt(squares / kSamples) / spacing;
-  if (!tilts.empty()) {
-    const auto at = tilts.begin() + static_cast<long>(0.95 * static_cast<double>(tilts.size()));
-    std::nth_element(tilts.begin(), at, tilts.end());
-    q.normals = *at;
-  }
+  q.normals = quality_detail::high_quantile(tilts);
+  q.shading = quality_detail::judge_shading(raw, truth, truth_tree, spacing);
   const auto far_share = [&](const std::vector<Vec3>& places) {
     const auto far =
         std::count_if(places.begin(), places.end(), [&](const Vec3& p) { return mesh_tree.distance(p) > 2 * spacing; });
