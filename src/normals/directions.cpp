@@ -98,7 +98,8 @@ class DirectionFinder {
   void run() {
     tbb::parallel_for(blocks_of_core(), [&](const auto& range) {
       NearestSearch nearest(tree_);
-      for (std::size_t i = range.begin(); i < range.end(); ++i) search(i, nearest);
+      std::array<Neighbour, SampleTree::kMostNeighbours> found;
+      for (std::size_t i = range.begin(); i < range.end(); ++i) search(i, nearest, found);
     });
     // Noise is no matter of single samples: levels that neighbours do not share are chance.
     const std::vector<std::uint8_t> chosen = level_;
@@ -114,10 +115,10 @@ class DirectionFinder {
   }
   [[nodiscard]] tbb::blocked_range<std::size_t> blocks_of_core() const { return {0, links_.core.size(), 512}; }
 
-  void search(std::size_t i, NearestSearch& nearest) {
+  /// `found`: room for what is found.
+  void search(std::size_t i, NearestSearch& nearest, std::array<Neighbour, SampleTree::kMostNeighbours>& found) {
     const auto k = static_cast<std::size_t>(settings_.k);
     const std::uint32_t place = links_.core[i];
-    std::array<Neighbour, SampleTree::kMostNeighbours> found;
     std::size_t wanted = std::max(k, kLeastLinked);
     std::size_t count = nearest.nearest(place, wanted, bound_, found.data());
     std::size_t taken = std::min(count, k);

@@ -32,36 +32,68 @@ constexpr BytesOfFour bytes_by_mask() {
   return all;
 }
 
+/// Those of four values that a mask has, one after another.
+class PackedFour {
+ public:
+  explicit PackedFour(unsigned mask) : mask_(mask) {
+    static constexpr BytesOfFour kBytes = bytes_by_mask();
+    std::memcpy(&bytes_, kBytes[mask].data(), sizeof(bytes_));
+  }
+  [[nodiscard]] std::size_t count() const { return static_cast<std::size_t>(std::popcount(mask_)); }
+  /// From four values of four bytes to room for as many.
+  void write(const void* from, void* to) const {
+    __m128i four;
+    std::memcpy(&four, from, sizeof(four));
+    four = _mm_shuffle_epi8(four, bytes_);
+    std::memcpy(to, &four, sizeof(four));
+  }
+
+ private:
+  unsigned mask_;
+  __m128i bytes_;
+};
+
 /// Samples within a distance of one of them, itself left out, in the order in which they were found.
 class Near {
  public:
-  Near(const SampleTree& tree, std::uint32_t place, float bound)
-      : tree_(&tree), place_(place), bound_(bound), at_(tree.position(place)) {}
+  Near(const SampleTree& tree, std::uint32_t place, float bound) : tree_(&tree), place_(place), bound_(bound) {}
   [[nodiscard]] bool is_full() const { return count_ > kMost; }
   [[nodiscard]] std::size_t count() const { return count_; }
 
-  void take(const SampleTree::Block& block) {
-    for (unsigned leaves = block.within(ItemBox::of(at_), bound_); leaves != 0; leaves &= leaves - 1) {
-      const auto leaf = static_cast<std::size_t>(std::countr_zero(leaves));
-      take_places(block.begin[leaf], block.begin[leaf + 1]);
+  /// From at most kMostBlocks blocks. First the leaves in reach are listed: which ones are is as good as random, and
+  /// a branch for each could not be guessed.
+  void take(std::span<const SampleTree::Block* const> blocks) {
+    const std::array<std::int32_t, 3> at = tree_->position(place_);
+    const ItemBox box = ItemBox::of(at);
+    std::array<std::int32_t, 4 * kMostBlocks + 4> begins;
+    std::array<std::int32_t, 4 * kMostBlocks + 4> ends;
+    std::size_t leaves = 0;
+    for (const SampleTree::Block* const block : blocks) {
+      const PackedFour in_reach(block->within(box, bound_));
+      in_reach.write(block->begin.data(), begins.data() + leaves);
+      in_reach.write(block->begin.data() + 1, ends.data() + leaves);
+      leaves += in_reach.count();
     }
+    for (std::size_t i = 0; i < leaves; ++i) take_places(at, begins[i], ends[i]);
   }
 
   /// Writes the nearest ones in order and returns how many.
   std::size_t write(std::span<Neighbour> found) {
-    const std::size_t n = std::min(found.size(), count_);
+    std::array<std::uint64_t, kMost> sorted;  // distance, then place: as bits that compare like neighbours
+    const auto key = [&](std::size_t i) {
+      return std::uint64_t{std::bit_cast<std::uint32_t>(squared_[i])} << 32 | static_cast<std::uint32_t>(places_[i]);
+    };
     if (rank()) {
-      Neighbour none;
-      for (std::size_t i = 0; i < count_; ++i) {
-        const auto rank = static_cast<std::size_t>(ranks_[i]);
-        (rank < n ? found[rank] : none) = neighbour(i);
-      }
+      // All of them: which ones are among the first is as good as random, a branch could not be guessed.
+      for (std::size_t i = 0; i < count_; ++i) sorted[static_cast<std::size_t>(ranks_[i])] = key(i);
     } else {
-      std::array<Neighbour, kMost> sorted;
-      for (std::size_t i = 0; i < count_; ++i) sorted[i] = neighbour(i);
+      for (std::size_t i = 0; i < count_; ++i) sorted[i] = key(i);
       std::sort(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(count_));
-      std::copy_n(sorted.begin(), n, found.begin());
     }
+    const std::size_t n = std::min(found.size(), count_);
+    for (std::size_t i = 0; i < n; ++i)
+      found[i] = {std::bit_cast<float>(static_cast<std::uint32_t>(sorted[i] >> 32)),
+                  static_cast<std::uint32_t>(sorted[i])};
     return n;
   }
 
@@ -69,25 +101,22 @@ class Near {
   static constexpr std::size_t kMost = 64;
   static constexpr std::size_t kRankedAtOnce = 8;
 
-  void take_places(std::uint32_t begin, std::uint32_t end) {
-    static constexpr BytesOfFour kBytes = bytes_by_mask();
-    tree_->fours_of(at_, begin, end, [&](const SampleTree::FourSamples& four) {
-      if (is_full()) return;
-      const FourInts wanted = (four.squared <= bound_) & (four.places != static_cast<std::int32_t>(place_));
-      const unsigned mask = bits_of(wanted);
-      __m128i bytes;
-      std::memcpy(&bytes, kBytes[mask].data(), sizeof(bytes));
-      const __m128i squared = _mm_shuffle_epi8(std::bit_cast<__m128i>(four.squared), bytes);
-      const __m128i places = _mm_shuffle_epi8(std::bit_cast<__m128i>(four.places), bytes);
-      std::memcpy(squared_.data() + count_, &squared, sizeof(squared));
-      std::memcpy(places_.data() + count_, &places, sizeof(places));
-      count_ += static_cast<std::size_t>(std::popcount(mask));
+  void take_places(const std::array<std::int32_t, 3>& at, std::int32_t begin, std::int32_t end) {
+    // Copies that what is written to the lists cannot change.
+    const float bound = bound_;
+    const auto place = static_cast<std::int32_t>(place_);
+    std::size_t count = count_;
+    const auto places_end = static_cast<std::size_t>(end);
+    tree_->fours_of(at, static_cast<std::size_t>(begin), places_end, [&](const SampleTree::FourSamples& four) {
+      if (count > kMost) return;
+      const PackedFour wanted(bits_of((four.squared <= bound) & (four.places != place)));
+      wanted.write(&four.squared, squared_.data() + count);
+      wanted.write(&four.places, places_.data() + count);
+      count += wanted.count();
     });
+    count_ = count;
   }
 
-  [[nodiscard]] Neighbour neighbour(std::size_t i) const {
-    return {squared_[i], static_cast<std::uint32_t>(places_[i])};
-  }
   /// How many are nearer than each. False where some are as far as others.
   bool rank() {
     constexpr float kFar = std::numeric_limits<float>::infinity();
@@ -117,7 +146,6 @@ class Near {
   const SampleTree* tree_;
   std::uint32_t place_;
   float bound_;  ///< squared
-  std::array<std::int32_t, 3> at_;
   std::size_t count_ = 0;
   std::array<float, kMost + kRankedAtOnce> squared_;
   std::array<std::int32_t, kMost + kRankedAtOnce> places_, ranks_;
@@ -131,7 +159,7 @@ std::size_t NearestSearch::nearest(std::uint32_t place, std::size_t k, float bou
   for (const float guess : {kGuessedReach * farthest_, reach_}) {
     if (around_.empty() || guess > reach_) continue;
     Near near(tree_, place, std::min(bound, guess * guess));
-    for (const SampleTree::Block* const block : around_) near.take(*block);
+    near.take(around_);
     if (near.is_full() || (near.count() < k && guess * guess < bound)) continue;
     const std::size_t count = near.write(std::span(found, k));
     if (count == k) farthest_ = std::sqrt(found[k - 1].squared);
