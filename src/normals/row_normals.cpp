@@ -1,14 +1,9 @@
 #include "normals/row_normals.h"
 
-#include <fmt/format.h>
-#include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <span>
 #include <utility>
@@ -16,35 +11,12 @@
 
 #include "base/spill_file.h"
 #include "lamina/error.h"
-#include "normals/sample_window.h"
 #include "points/formats.h"
-#include "store/block_codec.h"
 
 namespace lamina::normals {
 namespace {
 
 constexpr std::size_t kRowsAtOnce = std::size_t{1} << 15;
-
-std::array<float, 3> normal_of(const NormalCode& code) {
-  std::array<float, 3> n{};
-  unpack_normals({&code[0], &code[1], &code[2]}, 1, {&n[0], &n[1], &n[2]});
-  return n;
-}
-
-NormalCode turned(const NormalCode& code) {
-  if (code == kKeep) return kTurn;
-  if (code == kTurn) return kKeep;
-  if (code == kNoNormal) return code;
-  const std::array<float, 3> n = normal_of(code);
-  return code_of({-n[0], -n[1], -n[2]});
-}
-
-RowRecord record_at(const std::byte* bytes) {
-  RowRecord r{};
-  std::memcpy(r.code.data(), bytes, sizeof(NormalCode));
-  std::memcpy(&r.node, bytes + sizeof(NormalCode), sizeof r.node);
-  return r;
-}
 
 class WithRowNormals final : public WithNormals {
  public:
@@ -59,26 +31,23 @@ class WithRowNormals final : public WithNormals {
 
 }  // namespace
 
-void write_record(const RowRecord& record, std::byte* to) {
-  std::memcpy(to, record.code.data(), sizeof(NormalCode));
-  std::memcpy(to + sizeof(NormalCode), &record.node, sizeof record.node);
+RowNormals::RowNormals(RowRecords& records, const PatchSigns& signs, std::uint64_t rows, const std::string& directory,
+                       const RunContext& run) {
+  if (records.on_disk()) {
+    file_.emplace(directory);
+    write_file(records, signs, rows, run);
+  } else {
+    by_row_ = records.take();
+    apply_signs(by_row_, signs);
+  }
 }
 
-NormalCode code_of(const std::array<float, 3>& normal) {
-  NormalCode code{};
-  pack_normals({&normal[0], &normal[1], &normal[2]}, 1, {&code[0], &code[1], &code[2]});
-  return code;
-}
-
-RowNormals::RowNormals(edit::RecordSorter& records, const PatchSigns& signs, std::uint64_t rows,
-                       const std::string& directory, const RunContext& run)
-    : file_(directory) {
+void RowNormals::write_file(RowRecords& records, const PatchSigns& signs, std::uint64_t rows, const RunContext& run) {
   BackgroundWriter writer(SpillFile::kBufferBytes, 4);
   std::vector<NormalCode> codes;
-  std::vector<NormalCode> signed_codes;
   std::uint64_t next = 0;
   const auto write = [&] {
-    file_.append(std::as_bytes(std::span(codes)), writer);
+    file_->append(std::as_bytes(std::span(codes)), writer);
     next += codes.size();
     codes.clear();
   };
@@ -88,49 +57,52 @@ RowNormals::RowNormals(edit::RecordSorter& records, const PatchSigns& signs, std
       if (codes.size() == kRowsAtOnce) write();
     }
   };
-  records.drain(kRowsAtOnce, [&](std::span<const std::uint64_t> keys, const std::byte* bytes) {
+  records.drain(kRowsAtOnce, [&](std::span<const std::uint64_t> keys, std::span<RowRecord> batch) {
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
-    signed_codes.resize(keys.size());
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, keys.size(), 1024), [&](const auto& range) {
-      for (std::size_t i = range.begin(); i < range.end(); ++i) {
-        const RowRecord r = record_at(bytes + i * kRecordBytes);
-        signed_codes[i] = r.node != kNoNode && signs.sign[r.node] < 0 ? turned(r.code) : r.code;
-      }
-    });
+    apply_signs(batch, signs);
     for (std::size_t i = 0; i < keys.size(); ++i) {
       skip_to(keys[i]);
-      codes.push_back(signed_codes[i]);
+      codes.push_back(batch[i].code);
       if (codes.size() == kRowsAtOnce) write();
     }
     if (run.progress) run.progress({"signs", next, rows, 0, 0});
   });
   skip_to(rows);
   write();
-  file_.flush(writer);
-  file_.check(writer.drain());
+  file_->flush(writer);
+  file_->check(writer.drain());
+}
+
+void RowNormals::codes_of(std::uint64_t first, std::span<NormalCode> codes) const {
+  if (file_) {
+    if (!codes.empty()) file_->read(first * sizeof(NormalCode), std::as_writable_bytes(codes));
+    return;
+  }
+  for (std::size_t i = 0; i < codes.size(); ++i) codes[i] = by_row_.empty() ? kKeep : by_row_[first + i].code;
 }
 
 void RowNormals::apply(SampleBatch& batch) const {
   const std::size_t n = batch.size();
   std::vector<NormalCode> codes(n);
-  if (n > 0) file_.read(batch.first * sizeof(NormalCode), std::as_writable_bytes(std::span(codes)));
+  codes_of(batch.first, codes);
+  std::array<std::vector<float>, 3> found{std::vector<float>(n), std::vector<float>(n), std::vector<float>(n)};
+  unpack_codes(codes, {found[0].data(), found[1].data(), found[2].data()});
   const bool has = !batch.nx.empty();
-  for (auto* axis : {&batch.nx, &batch.ny, &batch.nz}) axis->resize(n);
   for (std::size_t i = 0; i < n; ++i) {
-    std::array<float, 3> normal{};
     const bool own = codes[i] == kKeep || codes[i] == kTurn;
+    if (!own && codes[i] != kNoNormal) continue;
+    std::array<float, 3> normal{};
     if (own && has) {
       normal = {batch.nx[i], batch.ny[i], batch.nz[i]};
       const bool finite = std::isfinite(normal[0]) && std::isfinite(normal[1]) && std::isfinite(normal[2]);
       if (!finite) normal = {};
       if (codes[i] == kTurn) normal = {-normal[0], -normal[1], -normal[2]};
-    } else if (!own && codes[i] != kNoNormal) {
-      normal = normal_of(codes[i]);
     }
-    batch.nx[i] = normal[0];
-    batch.ny[i] = normal[1];
-    batch.nz[i] = normal[2];
+    for (std::size_t a = 0; a < 3; ++a) found[a][i] = normal[a];
   }
+  batch.nx.swap(found[0]);
+  batch.ny.swap(found[1]);
+  batch.nz.swap(found[2]);
 }
 
 std::unique_ptr<PointSource> give_normals(std::unique_ptr<PointSource> source, std::unique_ptr<RowNormals> normals) {

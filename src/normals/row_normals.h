@@ -1,4 +1,4 @@
-// Normals in the order of the rows, on disk, and the rows with them: what became of each row's normal, and, of
+// Normals in the order of the rows, and the rows with them: what became of each row's normal, and, of
 // organised scans, what the faces between neighbouring places of the grid say.
 #pragma once
 #include <Eigen/Core>
@@ -6,47 +6,37 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "base/spill_file.h"
-#include "edit/rows.h"
 #include "lamina/normals.h"
 #include "lamina/points.h"
 #include "lamina/run.h"
+#include "normals/row_records.h"
 #include "normals/sides.h"
 #include "points/scans.h"
 
 namespace lamina::normals {
 
-/// Six bytes: a packed unit normal, or what is to be done with the input's.
-using NormalCode = std::array<std::uint16_t, 3>;
-
-/// Packed normals never have both coordinates' first 16 bits and a low byte 0.
-inline constexpr NormalCode kKeep{0, 0, 0};
-inline constexpr NormalCode kTurn{0, 1, 0};
-inline constexpr NormalCode kNoNormal{0, 2, 0};
-NormalCode code_of(const std::array<float, 3>& normal);
-
-/// A row's normal before its patch has a sign.
-struct RowRecord {
-  NormalCode code;
-  std::uint32_t node = 0;
-};
-inline constexpr std::size_t kRecordBytes = 10;
-void write_record(const RowRecord& record, std::byte* to);
-
 class RowNormals {
  public:
   /// Gives the records' normals the signs of their patches. Rows without a record keep what the input has for them, or
   /// have none where it has none.
-  RowNormals(edit::RecordSorter& records, const PatchSigns& signs, std::uint64_t rows, const std::string& directory,
+  RowNormals(RowRecords& records, const PatchSigns& signs, std::uint64_t rows, const std::string& directory,
              const RunContext& run);
   /// Sets the batch's normals. Safe from several threads.
   void apply(SampleBatch& batch) const;
 
  private:
-  SpillFile file_;
+  void write_file(RowRecords& records, const PatchSigns& signs, std::uint64_t rows, const RunContext& run);
+  /// Of the rows from `first` on.
+  void codes_of(std::uint64_t first, std::span<NormalCode> codes) const;
+
+  std::vector<RowRecord> by_row_;  ///< where they fit into memory
+  std::optional<SpillFile> file_;  ///< of codes, where they do not
 };
 
 /// The rows of a source with these normals.

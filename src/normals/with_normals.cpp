@@ -5,17 +5,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <optional>
 #include <utility>
 
 #include "base/descriptor.h"
 #include "base/run.h"
-#include "edit/rows.h"
 #include "lamina/error.h"
 #include "lamina/normals.h"
 #include "normals/directions.h"
 #include "normals/row_normals.h"
+#include "normals/row_records.h"
 #include "normals/sample_window.h"
 #include "normals/sides.h"
 #include "samples/sampling_survey.h"
@@ -26,7 +25,7 @@ namespace {
 
 using namespace normals;
 
-constexpr std::size_t kMemory = std::size_t{64} << 20;  ///< for records on their way to their rows
+constexpr std::size_t kMemory = std::size_t{64} << 20;  ///< for what is found, on its way to its rows
 constexpr std::uint64_t kSurveyed = 1 << 18;            ///< samples the spacing is taken from
 constexpr std::uint64_t kLeastSlab = 1 << 17;           ///< samples that keep all threads busy
 constexpr double kPatches = 150'000;  ///< of a large cloud; cells and slabs cut them to about twice as many
@@ -112,9 +111,7 @@ class Job {
             : settings_.viewpoints;
     const Viewpoints viewpoints(everywhere, scanners_of(source_.info(), settings_), frame);
     const std::size_t memory = run_.max_memory > 0 ? std::min(kMemory, run_.max_memory / 4) : kMemory;
-    edit::RecordSorter records(
-        kRecordBytes, static_cast<std::size_t>(std::min<std::uint64_t>(memory, in.store.total() * (kRecordBytes + 12))),
-        directory);
+    RowRecords records(source_.info().count, memory, directory);
     const Scale scale = scale_of(settings_, in.store, frame);
     require_memory(in.store, scale, memory);
     graph_.cell = static_cast<float>(scale.patches.cell / PatchNode::kUnit);
@@ -149,7 +146,7 @@ class Job {
                             static_cast<double>(run_.max_memory) / 1e6));
   }
 
-  void sweep(const SlabStore& store, const Scale& scale, const Viewpoints& viewpoints, edit::RecordSorter& records) {
+  void sweep(const SlabStore& store, const Scale& scale, const Viewpoints& viewpoints, RowRecords& records) {
     SampleWindow window(store, scale.window);
     Links links;
     while (window.advance()) {
@@ -179,7 +176,7 @@ class Job {
   }
 
   void hand_over(const WindowSamples& s, const Links& links, const std::vector<std::array<float, 3>>& given,
-                 edit::RecordSorter& records) {
+                 RowRecords& records) {
     if (settings_.mode == NormalsMode::check) {
       for (const std::uint32_t p : links.core) report_.without += s.has_normal(p) ? 0 : 1;
       return;
@@ -201,7 +198,6 @@ class Job {
         }
       }
     });
-    std::vector<std::byte> bytes(rows.size() * kRecordBytes);
     std::size_t n = 0;
     for (std::size_t i = 0; i < rows.size(); ++i) {
       const std::uint32_t p = links.core[i];
@@ -211,16 +207,16 @@ class Job {
       if (has && s.given[p] != 0) count_given(made[i]);
       if (has && s.given[p] == 0) ++report_.estimated;
       rows[n] = rows[i];
-      write_record(made[i], bytes.data() + kRecordBytes * n++);
+      made[n++] = made[i];
     }
-    rows.resize(n);
-    records.add(rows, bytes.data());
+    records.add(std::span(rows).first(n), std::span(made).first(n));
   }
 
   /// Given normals, by patch, as they stand and turned.
   void count_given(const RowRecord& r) {
-    given_.resize(std::max<std::size_t>(given_.size(), std::size_t{r.node} + 1));
-    ++(r.code == kTurn ? given_[r.node].second : given_[r.node].first);
+    const std::uint32_t node = r.node();
+    given_.resize(std::max<std::size_t>(given_.size(), std::size_t{node} + 1));
+    ++(r.code == kTurn ? given_[node].second : given_[node].first);
   }
   void count_flipped(const PatchSigns& signs) {
     for (std::size_t i = 0; i < given_.size(); ++i)
