@@ -27,11 +27,11 @@ void link(const Neighbour* found, std::size_t count, std::uint32_t place, std::s
   links.scale[i] = count > 0 ? found[count - 1].squared : 0.0F;
 }
 
-Plane plane_of(const SampleTree& tree, std::uint32_t place, const Neighbour* found, std::size_t count) {
+Moments moments_of(const SampleTree& tree, std::uint32_t place, const Neighbour* found, std::size_t count) {
   Moments m;
   m.count = 1;  // the sample itself
   for (std::size_t n = 0; n < count; ++n) m.add(tree.offset(place, found[n].sample));
-  return fit_plane(m);
+  return m;
 }
 
 bool is_line(const Plane& plane) {
@@ -98,8 +98,13 @@ class DirectionFinder {
   void run() {
     tbb::parallel_for(blocks_of_core(), [&](const auto& range) {
       NearestSearch nearest(tree_);
-      std::array<Neighbour, SampleTree::kMostNeighbours> found;
-      for (std::size_t i = range.begin(); i < range.end(); ++i) search(i, nearest, found);
+      std::array<Around, 2> two;
+      for (std::size_t i = range.begin(); i < range.end(); i += two.size()) {
+        const std::size_t n = std::min(two.size(), range.end() - i);
+        for (std::size_t k = 0; k < n; ++k) find_nearest(i + k, nearest, two[k]);
+        const std::array<Plane, 2> planes = fit_planes({two[0].moments, two[1].moments});
+        for (std::size_t k = 0; k < n; ++k) search(i + k, two[k], planes[k]);
+      }
     });
     // Noise is no matter of single samples: levels that neighbours do not share are chance.
     const std::vector<std::uint8_t> chosen = level_;
@@ -115,19 +120,32 @@ class DirectionFinder {
   }
   [[nodiscard]] tbb::blocked_range<std::size_t> blocks_of_core() const { return {0, links_.core.size(), 512}; }
 
-  /// `found`: room for what is found.
-  void search(std::size_t i, NearestSearch& nearest, std::array<Neighbour, SampleTree::kMostNeighbours>& found) {
-    const auto k = static_cast<std::size_t>(settings_.k);
+  /// The nearest samples around one.
+  struct Around {
+    std::array<Neighbour, SampleTree::kMostNeighbours> found;
+    std::size_t count = 0;
+    Moments moments;  ///< of those that its plane is fitted to
+  };
+  [[nodiscard]] std::size_t wanted_at_first() const {
+    return std::max(static_cast<std::size_t>(settings_.k), kLeastLinked);
+  }
+  void find_nearest(std::size_t i, NearestSearch& nearest, Around& out) const {
     const std::uint32_t place = links_.core[i];
-    std::size_t wanted = std::max(k, kLeastLinked);
-    std::size_t count = nearest.nearest(place, wanted, bound_, found.data());
-    std::size_t taken = std::min(count, k);
-    Plane plane = plane_of(tree_, place, found.data(), taken);
+    out.count = nearest.nearest(place, wanted_at_first(), bound_, out.found.data());
+    const std::size_t taken = std::min(out.count, static_cast<std::size_t>(settings_.k));
+    out.moments = moments_of(tree_, place, out.found.data(), taken);
+  }
+
+  void search(std::size_t i, Around& around, Plane plane) {
+    const std::uint32_t place = links_.core[i];
+    auto& [found, count, moments] = around;
+    std::size_t wanted = wanted_at_first();
+    std::size_t taken = std::min(count, static_cast<std::size_t>(settings_.k));
     const std::size_t most = std::min(4 * wanted, SampleTree::kMostNeighbours);
     while (is_line(plane) && count == wanted && wanted < most) {
       wanted = std::min(2 * wanted, most);
       taken = count = tree_.nearest(place, wanted, bound_, found.data());
-      plane = plane_of(tree_, place, found.data(), count);
+      plane = fit_plane(moments_of(tree_, place, found.data(), count));
     }
     float squared = taken > 0 ? found[taken - 1].squared : 0.0F;
     AcrossLines& across = across_.local();

@@ -1,76 +1,105 @@
 #include "normals/planes.h"
 
-#include <algorithm>
-#include <cmath>
+#include <emmintrin.h>
 
-#include "meshes/vec3.h"
+#include <algorithm>
+#include <bit>
 
 namespace lamina::normals {
 namespace {
 
-using meshes::cross;
-using meshes::dot;
-using meshes::Vec3;
+typedef double TwoDoubles __attribute__((vector_size(16)));      // NOLINT(modernize-use-using): attributes on typedefs
+typedef std::int64_t TwoLongs __attribute__((vector_size(16)));  // NOLINT(modernize-use-using): attributes on typedefs
+using TwoVectors = std::array<TwoDoubles, 3>;
 
-/// The least root of l^3 - t l^2 + s l - d, all of whose roots are real and not negative: Newton's steps from 0 never
-/// pass it.
-double least_root(double t, double s, double d) {
-  double l = 0;
+TwoDoubles square_root(const TwoDoubles& v) {
+  return std::bit_cast<TwoDoubles>(_mm_sqrt_pd(std::bit_cast<__m128d>(v)));
+}
+bool any_of(const TwoLongs& mask) {
+  return _mm_movemask_pd(std::bit_cast<__m128d>(mask)) != 0;
+}
+TwoDoubles at_least_zero(const TwoDoubles& v) {
+  return v > 0 ? v : TwoDoubles{};
+}
+TwoDoubles dot(const TwoVectors& a, const TwoVectors& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+TwoVectors cross(const TwoVectors& a, const TwoVectors& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+/// The least root of l^3 - t l^2 + s l - d with t = 1, all of whose roots are real and not negative: Newton's steps
+/// from 0 never pass it.
+TwoDoubles least_root(const TwoDoubles& s, const TwoDoubles& d) {
+  TwoDoubles l{};
   for (int i = 0; i < 64; ++i) {
-    const double value = ((l - t) * l + s) * l - d;
-    const double slope = (3 * l - 2 * t) * l + s;
-    if (!(value < 0) || !(slope > 0)) break;
-    const double next = l - value / slope;
-    if (!(next > l)) break;
-    l = next;
+    const TwoDoubles value = ((l - 1) * l + s) * l - d;
+    const TwoDoubles slope = (3 * l - 2) * l + s;
+    const TwoDoubles next = l - value / slope;
+    const TwoLongs nearer = (value < 0) & (slope > 0) & (next > l);
+    if (!any_of(nearer)) break;
+    l = nearer ? next : l;
   }
   return l;
 }
 
 }  // namespace
 
-Plane fit_plane(const Moments& m) {
-  Plane plane;
-  if (m.count < 3) return plane;
-  const double n = 1 / m.count;
-  const Vec3 mean{m.sum[0] * n, m.sum[1] * n, m.sum[2] * n};
-  double xx = m.products[0] * n - mean[0] * mean[0];
-  double xy = m.products[1] * n - mean[0] * mean[1];
-  double xz = m.products[2] * n - mean[0] * mean[2];
-  double yy = m.products[3] * n - mean[1] * mean[1];
-  double yz = m.products[4] * n - mean[1] * mean[2];
-  double zz = m.products[5] * n - mean[2] * mean[2];
-  const double trace = xx + yy + zz;
-  if (!(trace > 0)) return plane;
+std::array<Plane, 2> fit_planes(const std::array<Moments, 2>& m) {
+  const auto both = [&](const auto& of) { return TwoDoubles{of(m[0]), of(m[1])}; };
+  const TwoDoubles count = both([](const Moments& one) { return one.count; });
+  const TwoDoubles n = 1 / count;
+  TwoVectors mean;
+  for (std::size_t a = 0; a < 3; ++a) mean[a] = both([a](const Moments& one) { return one.sum[a]; }) * n;
+  const auto variance = [&](std::size_t product, std::size_t a, std::size_t b) {
+    const TwoDoubles sum = both([product](const Moments& one) { return one.products[product]; });
+    return sum * n - mean[a] * mean[b];
+  };
+  TwoDoubles xx = variance(0, 0, 0);
+  TwoDoubles xy = variance(1, 0, 1);
+  TwoDoubles xz = variance(2, 0, 2);
+  TwoDoubles yy = variance(3, 1, 1);
+  TwoDoubles yz = variance(4, 1, 2);
+  TwoDoubles zz = variance(5, 2, 2);
+  const TwoDoubles trace = xx + yy + zz;
   // Of trace one: what follows is a matter of ratios.
-  const double scale = 1 / trace;
-  for (double* v : {&xx, &xy, &xz, &yy, &yz, &zz}) *v *= scale;
-  const double s = xx * yy - xy * xy + xx * zz - xz * xz + yy * zz - yz * yz;
-  const double d = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
-  const double least = std::clamp(least_root(1, s, d), 0.0, 1.0 / 3);
-  const double sum = 1 - least;  // of the other two
-  const double product = std::max(0.0, s - least * sum);
-  const double half = 0.5 * sum;
-  const double most = half + std::sqrt(std::max(0.0, half * half - product));
-  plane.least = least * trace;
-  plane.middle = product / most * trace;
-  plane.most = most * trace;
+  const TwoDoubles scale = 1 / trace;
+  for (TwoDoubles* v : {&xx, &xy, &xz, &yy, &yz, &zz}) *v *= scale;
+  const TwoDoubles s = xx * yy - xy * xy + xx * zz - xz * xz + yy * zz - yz * yz;
+  const TwoDoubles d = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
+  const TwoDoubles root = least_root(s, d);
+  const TwoDoubles third = TwoDoubles{} + 1.0 / 3;
+  const TwoDoubles least = root > third ? third : root;
+  const TwoDoubles sum = 1 - least;  // of the other two
+  const TwoDoubles product = at_least_zero(s - least * sum);
+  const TwoDoubles half = 0.5 * sum;
+  const TwoDoubles most = half + square_root(at_least_zero(half * half - product));
 
-  const Vec3 r0{xx - least, xy, xz};
-  const Vec3 r1{xy, yy - least, yz};
-  const Vec3 r2{xz, yz, zz - least};
-  const std::array<Vec3, 3> candidates{cross(r0, r1), cross(r0, r2), cross(r1, r2)};
-  const Vec3* best = candidates.data();
-  for (const Vec3& c : candidates) {
-    if (dot(c, c) > dot(*best, *best)) best = &c;
+  const TwoVectors r0{xx - least, xy, xz};
+  const TwoVectors r1{xy, yy - least, yz};
+  const TwoVectors r2{xz, yz, zz - least};
+  TwoVectors best = cross(r0, r1);
+  TwoDoubles squared = dot(best, best);
+  for (const TwoVectors& c : {cross(r0, r2), cross(r1, r2)}) {
+    const TwoDoubles longer = dot(c, c);
+    const TwoLongs is_longer = longer > squared;
+    for (std::size_t a = 0; a < 3; ++a) best[a] = is_longer ? c[a] : best[a];
+    squared = is_longer ? longer : squared;
   }
-  const double squared = dot(*best, *best);
-  // The rows span a line where the two smaller variances are equal: no plane is the best.
-  constexpr double kNone = 1e-18;
-  if (!(squared > kNone)) return plane;
-  const double inverse = 1 / std::sqrt(squared);
-  for (std::size_t a = 0; a < 3; ++a) plane.normal[a] = static_cast<float>((*best)[a] * inverse);
-  return plane;
+  const TwoDoubles inverse = 1 / square_root(squared);
+
+  std::array<Plane, 2> planes;
+  for (std::size_t i = 0; i < 2; ++i) {
+    if (!(count[i] >= 3 && trace[i] > 0)) continue;
+    planes[i].least = least[i] * trace[i];
+    planes[i].middle = product[i] / most[i] * trace[i];
+    planes[i].most = most[i] * trace[i];
+    // The rows span a line where the two smaller variances are equal: no plane is the best.
+    constexpr double kNone = 1e-18;
+    if (!(squared[i] > kNone)) continue;
+    for (std::size_t a = 0; a < 3; ++a) planes[i].normal[a] = static_cast<float>(best[a][i] * inverse[i]);
+  }
+  return planes;
 }
 
 inline void FourMoments::add(const std::array<FourFloats, 3>& d, const FourFloats& weight) {

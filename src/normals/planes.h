@@ -54,11 +54,14 @@ struct Plane {
   [[nodiscard]] bool valid() const { return normal[0] != 0 || normal[1] != 0 || normal[2] != 0; }
 };
 
-/// Only sums, products, quotients and square roots: the same bits on every processor. The sign of the normal means
-/// nothing.
-Plane fit_plane(const Moments& moments);
+/// Two at a time: what takes long is the waiting of one division for the one before. Only sums, products, quotients and
+/// square roots: the same bits on every processor. The sign of the normal means nothing.
+std::array<Plane, 2> fit_planes(const std::array<Moments, 2>& moments);
+inline Plane fit_plane(const Moments& moments) {
+  return fit_planes({moments, moments})[0];
+}
 
-/// The same of four samples at a time, in floats: what they lose is a millionth of the largest variance, and so is a
+/// Moments of four samples at a time, in floats: what they lose is a millionth of the largest variance, and so is a
 /// direction's error.
 struct FourMoments {
   FourFloats count{};
