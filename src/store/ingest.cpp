@@ -275,8 +275,16 @@ Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, c
 
 namespace {
 
-constexpr std::size_t kDigits = RowIdSource::kDigits;
-constexpr std::uint64_t kGiven = 1ULL << 47;  ///< no file has so many rows
+/// Of a row's id, for so many rows: one bit is that of given normals.
+std::size_t digits_for(std::uint64_t rows) {
+  std::size_t digits = 1;
+  while (rows >> (16 * digits - 1) != 0) ++digits;
+  return digits;
+}
+/// The highest bit of an id.
+std::uint64_t given_bit(std::size_t digits) {
+  return std::uint64_t{1} << (16 * digits - 1);
+}
 
 bool is_usable(float x, float y, float z) {
   const double squared = double{x} * double{x} + double{y} * double{y} + double{z} * double{z};
@@ -285,7 +293,8 @@ bool is_usable(float x, float y, float z) {
 
 std::uint64_t id_of(const LocalSamples& samples, std::size_t i) {
   std::uint64_t id = 0;
-  for (std::size_t d = 0; d < kDigits; ++d) id |= static_cast<std::uint64_t>(samples.attributes[d][i]) << (16 * d);
+  for (std::size_t d = 0; d < samples.attributes.size(); ++d)
+    id |= static_cast<std::uint64_t>(samples.attributes[d][i]) << (16 * d);
   return id;
 }
 
@@ -297,7 +306,8 @@ RowIdSource::RowIdSource(PointSource& source, bool with_normals)
   info_.count = source.info().count;
   info_.random_access = source.info().random_access;
   info_.has_normals = true;
-  for (std::size_t d = 0; d < kDigits; ++d) info_.attributes.push_back({fmt::format("row{}", d), ScalarType::uint16});
+  const std::size_t digits = digits_for(info_.count);
+  for (std::size_t d = 0; d < digits; ++d) info_.attributes.push_back({fmt::format("row{}", d), ScalarType::uint16});
 }
 
 void RowIdSource::read(std::uint64_t first, std::size_t count, SampleBatch& out) {
@@ -311,27 +321,29 @@ void RowIdSource::read(std::uint64_t first, std::size_t count, SampleBatch& out)
   out.radius.clear();
   out.quality.clear();
   out.exact.clear();
-  out.attributes.resize(kDigits);
-  for (auto& digits : out.attributes) digits.resize(n);
+  const std::size_t digits = info_.attributes.size();
+  const std::uint64_t given = given_bit(digits);
+  out.attributes.resize(digits);
+  for (auto& digit : out.attributes) digit.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
     std::uint64_t id = first + i;
     if (is_usable(out.nx[i], out.ny[i], out.nz[i])) {
-      id |= kGiven;
+      id |= given;
     } else {
       out.nx[i] = 0;
       out.ny[i] = 0;
       out.nz[i] = 1;
     }
-    for (std::size_t d = 0; d < kDigits; ++d) out.attributes[d][i] = static_cast<float>((id >> (16 * d)) & 0xFFFFU);
+    for (std::size_t d = 0; d < digits; ++d) out.attributes[d][i] = static_cast<float>((id >> (16 * d)) & 0xFFFFU);
   }
 }
 
 std::uint64_t row_of(const LocalSamples& samples, std::size_t i) {
-  return id_of(samples, i) & ~kGiven;
+  return id_of(samples, i) & ~given_bit(samples.attributes.size());
 }
 
 bool has_given_normal(const LocalSamples& samples, std::size_t i) {
-  return (id_of(samples, i) & kGiven) != 0;
+  return (id_of(samples, i) & given_bit(samples.attributes.size())) != 0;
 }
 
 }  // namespace lamina

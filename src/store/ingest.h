@@ -147,12 +147,11 @@ struct IngestSettings {
 Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, const StorePlace& place,
                 const RunContext& run, const IngestSettings& settings = {});
 
-/// What else the source has is left out. Rows without a usable normal, and all of them without `with_normals`, get
+/// Ids are attributes: as many digits of 16 bits, which the store keeps in two bytes each, as the last row takes. What
+/// else the source has is left out. Rows without a usable normal, and all of them without `with_normals`, get
 /// (0, 0, 1).
 class RowIdSource final : public PointSource {
  public:
-  static constexpr std::size_t kDigits = 3;  ///< of a row's id, 16 bits each: the store keeps them in two bytes
-
   explicit RowIdSource(PointSource& source, bool with_normals = true);
   void read(std::uint64_t first, std::size_t count, SampleBatch& out) override;
 
