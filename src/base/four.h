@@ -3,8 +3,11 @@
 #include <smmintrin.h>
 
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <type_traits>
+#include <vector>
 
 namespace lamina {
 
@@ -18,6 +21,19 @@ inline FourInts load_four(const std::int32_t* from) {
   FourInts four;
   std::memcpy(&four, from, sizeof(four));
   return four;
+}
+inline FourInts load_four(const std::uint32_t* from) {
+  FourInts four;
+  std::memcpy(&four, from, sizeof(four));
+  return four;
+}
+/// The values with four numbers; what is no float becomes an int of 32 bits.
+template <class T>
+auto four_at(const std::vector<T>& values, const std::uint32_t* numbers) {
+  using Four = std::conditional_t<std::is_same_v<T, float>, FourFloats, FourInts>;
+  using One = std::conditional_t<std::is_same_v<T, float>, float, std::int32_t>;
+  const auto value = [&](std::size_t lane) { return static_cast<One>(values[numbers[lane]]); };
+  return Four{value(0), value(1), value(2), value(3)};
 }
 inline FourFloats to_floats(const FourInts& v) {
   return __builtin_convertvector(v, FourFloats);

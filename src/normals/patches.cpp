@@ -3,17 +3,21 @@
 #include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
-#include <tbb/parallel_sort.h>
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 #include <optional>
 #include <utility>
 
+#include "base/four.h"
 #include "base/union_find.h"
+#include "base/vectors.h"
 #include "lattice/lattice.h"
+#include "normals/judgement.h"
 
 namespace lamina::normals {
 namespace {
@@ -30,17 +34,6 @@ Vector3f normal_of(const WindowSamples& s, std::uint32_t i) {
 }
 float dot(const Vector3f& a, const Vector3f& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-/// Whether two neighbours lie beside each other on one surface, so that opposite normals contradict each other: across
-/// a thin wall and around an edge they do not.
-bool lie_along(const Vector3f& offset, const Vector3f& a, const Vector3f& b) {
-  const float squared = dot(offset, offset);
-  constexpr float kSine2 = 0.25F;
-  const float along_a = dot(offset, a);
-  const float along_b = dot(offset, b);
-  return squared > 0 && along_a * along_a < kSine2 * squared && along_b * along_b < kSine2 * squared &&
-         std::abs(dot(a, b)) > 0.5F;
 }
 
 /// Samples of a cell: places in `order`.
@@ -60,7 +53,7 @@ class PatchGrower {
 
   void run() {
     sort_into_cells();
-    judge_links();
+    judge();
     for_cells([&](Cell& cell) { grow(cell); });
     auto node = static_cast<std::uint32_t>(graph_.nodes.size());
     for (Cell& cell : cells_) {
@@ -83,18 +76,34 @@ class PatchGrower {
 
   [[nodiscard]] bool is_fixed(std::uint32_t place) const { return settings_.given_stay && samples_.given[place] != 0; }
 
-  void sort_into_cells() {
+  /// The number of a core sample's cell and its own.
+  using Keyed = std::pair<std::uint64_t, std::uint32_t>;
+  std::vector<Keyed> keyed_samples(std::uint64_t& largest) const {
     const FloorDivider cell_of(settings_.cell);
-    constexpr std::int64_t kMiddle = 1 << 20;
-    const auto key = [&](std::uint32_t p) {
-      const auto part = [&](std::int32_t v) { return static_cast<std::uint64_t>(cell_of(v) + kMiddle); };
-      return part(samples_.z[p]) << 42 | part(samples_.y[p]) << 21 | part(samples_.x[p]);
-    };
-    std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(links_.core.size());
+    const std::array axes{&samples_.x, &samples_.y, &samples_.z};
+    std::array<std::int64_t, 3> low{};
+    std::array<std::uint64_t, 3> extent{1, 1, 1};
+    for (std::size_t a = 0; a < 3 && samples_.size() > 0; ++a) {
+      const auto [least, most] = std::minmax_element(axes[a]->begin(), axes[a]->end());
+      low[a] = cell_of(*least);
+      extent[a] = static_cast<std::uint64_t>(cell_of(*most) - low[a] + 1);
+    }
+    largest = extent[0] * extent[1] * extent[2] - 1;
+    std::vector<Keyed> keys(links_.core.size());
     tbb::parallel_for(std::size_t{0}, keys.size(), [&](std::size_t i) {
-      keys[i] = {key(links_.core[i]), static_cast<std::uint32_t>(i)};
+      std::uint64_t key = 0;
+      for (std::size_t a = 3; a-- > 0;)
+        key = key * extent[a] + static_cast<std::uint64_t>(cell_of((*axes[a])[links_.core[i]]) - low[a]);
+      keys[i] = {key, static_cast<std::uint32_t>(i)};
     });
-    tbb::parallel_sort(keys.begin(), keys.end());
+    return keys;
+  }
+
+  void sort_into_cells() {
+    std::uint64_t largest = 0;
+    std::vector<Keyed> keys = keyed_samples(largest);
+    std::vector<Keyed> scratch;
+    digit_sort(keys, scratch, largest, [](const Keyed& k) { return k.first; });
     order_.resize(keys.size());
     cell_of_.assign(samples_.size(), kNoNode);
     slot_.resize(samples_.size());
@@ -113,42 +122,13 @@ class PatchGrower {
     std::uint32_t from, to;  ///< slots
     bool opposite;
   };
-  /// What a sample's links say of normals as they were found; a bit for each link besides.
-  struct Judgement {
-    std::array<float, Links::kMost> agreement{};
-    std::uint8_t along = 0, same = 0;
-  };
-  void judge_links() {
+  void judge() {
     judged_.resize(links_.core.size());
     turned_.assign(samples_.size(), 0);
     tbb::parallel_for(tbb::blocked_range<std::size_t>(0, judged_.size(), 1024), [&](const auto& range) {
-      for (std::size_t i = range.begin(); i < range.end(); ++i) judged_[i] = judge(i);
+      for (std::size_t i = range.begin(); i < range.end(); ++i) judged_[i] = judge_links(tree_, samples_, links_, i);
     });
   }
-  [[nodiscard]] Judgement judge(std::size_t i) const {
-    Judgement out;
-    const std::uint32_t place = links_.core[i];
-    const Vector3f n = normal_of(samples_, place);
-    for (std::size_t l = 0; l < Links::kMost; ++l) {
-      const std::uint32_t other = links_.neighbours[i][l];
-      const Vector3f m = normal_of(samples_, other);
-      const Vector3f d = offset(place, other);
-      out.agreement[l] = agreement(d, n, m, links_.scale[i]);
-      if (lie_along(d, n, m)) out.along = static_cast<std::uint8_t>(out.along | 1U << l);
-      if (dot(n, m) > 0) out.same = static_cast<std::uint8_t>(out.same | 1U << l);
-    }
-    return out;
-  }
-
-  /// Between the sheets that the two belong to.
-  [[nodiscard]] Vector3f offset(std::uint32_t place, std::uint32_t other) const {
-    Vector3f d = tree_.offset(place, other);
-    const Vector3f n = normal_of(samples_, place);
-    const Vector3f m = normal_of(samples_, other);
-    for (std::size_t a = 0; a < 3; ++a) d[a] += samples_.lift[other] * m[a] - samples_.lift[place] * n[a];
-    return d;
-  }
-
   /// Joins samples of the cell along their links, the strongest first, until there is nothing left to join: mostly the
   /// strongest links do it all.
   void grow(Cell& cell) {
@@ -163,24 +143,48 @@ class PatchGrower {
       const std::uint32_t i = order_[s];
       const std::uint32_t place = links_.core[i];
       if (!takes_part(place)) continue;
-      for (std::size_t l = 0; l < Links::kMost; ++l) {
-        const float w = judged_[i].agreement[l];
-        const float strength = std::min(std::abs(w), 1.0F);
-        if (strength < kWeakest) continue;
+      const StrongLinks strong = strong_links(i);
+      for (unsigned left = strong.links; left != 0; left &= left - 1) {
+        const auto l = static_cast<std::size_t>(std::countr_zero(left));
         const std::uint32_t other = links_.neighbours[i][l];
-        if (other == place || cell_of_[other] != cell_of_[place] || is_fixed(other)) continue;
-        const auto bin = std::min(kStrengths - 1, static_cast<int>((1 - strength) / (1 - kWeakest) * kStrengths));
-        const Link link{static_cast<std::uint32_t>(s), slot_[other], w < 0};
+        if (is_fixed(other)) continue;
+        const Link link{static_cast<std::uint32_t>(s), slot_[other], judged_[i].agreement[l] < 0};
+        const auto bin = static_cast<std::size_t>(strong.bin[l]);
         if (bin == 0) {
           join(link);
         } else {
-          weaker[static_cast<std::size_t>(bin)].push_back(link);
+          weaker[bin].push_back(link);
         }
       }
     }
     for (const std::vector<Link>& links : weaker) {
       for (std::size_t l = 0; l < links.size() && cell.patches > 1; ++l) join(links[l]);
     }
+  }
+
+  /// Links within the cell that are strong enough to join at all: a bit for each, and how far from the strongest.
+  struct StrongLinks {
+    unsigned links = 0;
+    std::array<std::int32_t, Links::kMost> bin{};
+  };
+  [[nodiscard]] StrongLinks strong_links(std::size_t i) const {
+    StrongLinks out;
+    const auto place = static_cast<std::int32_t>(links_.core[i]);
+    const auto cell = static_cast<std::int32_t>(cell_of_[links_.core[i]]);
+    for (std::size_t first = 0; first < Links::kMost; first += 4) {
+      const std::uint32_t* const others = &links_.neighbours[i][first];
+      const FourInts places = load_four(others);
+      FourFloats strength;
+      std::memcpy(&strength, &judged_[i].agreement[first], sizeof(strength));
+      strength = strength < 0 ? -strength : strength;
+      strength = strength > 1 ? FourFloats{} + 1 : strength;
+      const FourInts within = (places != place) & (four_at(cell_of_, others) == cell);
+      out.links |= bits_of(within & (strength >= kWeakest)) << first;
+      FourInts bin = __builtin_convertvector((1 - strength) / (1 - kWeakest) * kStrengths, FourInts);
+      bin = bin > kStrengths - 1 ? four_times(kStrengths - 1) : bin;
+      std::memcpy(&out.bin[first], &bin, sizeof(bin));
+    }
+    return out;
   }
 
   /// Gives the cell's patches their nodes, and the samples their signs.
@@ -259,22 +263,60 @@ class PatchGrower {
       const std::uint32_t place = links_.core[i];
       const std::uint32_t node = samples_.node[place];
       if (node == kNoNode) continue;
-      for (std::size_t l = 0; l < Links::kMost; ++l) {
-        const std::uint32_t other = links_.neighbours[i][l];
-        if (other == place || samples_.node[other] == kNoNode) continue;
-        const bool turned = turned_[place] != turned_[other];
-        const bool along = (judged_[i].along >> l & 1) != 0;
-        const bool same = (judged_[i].same >> l & 1) != (turned ? 1 : 0);
-        if (samples_.node[other] == node) {
-          if (along) ++(same ? cell.same : cell.opposite);
-          continue;
-        }
-        const float w = turned ? -judged_[i].agreement[l] : judged_[i].agreement[l];
-        cell.edges.push_back({std::min(node, samples_.node[other]), std::max(node, samples_.node[other]),
-                              w * std::min(std::abs(w), 1.0F), along && same ? 1U : 0U, along && !same ? 1U : 0U});
+      const Ends ends = ends_of(i);
+      const unsigned along = judged_[i].along;
+      const unsigned same = judged_[i].same ^ ends.turned;
+      cell.same += static_cast<std::uint64_t>(std::popcount(ends.within & along & same));
+      cell.opposite += static_cast<std::uint64_t>(std::popcount(ends.within & along & ~same));
+      for (unsigned left = ends.beyond; left != 0; left &= left - 1) {
+        const auto l = static_cast<std::size_t>(std::countr_zero(left));
+        const std::uint32_t other = samples_.node[links_.neighbours[i][l]];
+        const float w = (ends.turned >> l & 1) != 0 ? -judged_[i].agreement[l] : judged_[i].agreement[l];
+        add(cell.edges, {std::min(node, other), std::max(node, other), w * std::min(std::abs(w), 1.0F),
+                         (along & same) >> l & 1, (along & ~same) >> l & 1});
       }
     }
     add_up(cell.edges);
+  }
+
+  /// Where a sample's links end, a bit for each.
+  struct Ends {
+    unsigned within = 0, beyond = 0;  ///< in its own patch, in another
+    unsigned turned = 0;              ///< one end has been turned and the other has not
+  };
+  [[nodiscard]] Ends ends_of(std::size_t i) const {
+    Ends out;
+    const std::uint32_t place = links_.core[i];
+    const auto node = static_cast<std::int32_t>(samples_.node[place]);
+    for (std::size_t first = 0; first < Links::kMost; first += 4) {
+      const std::uint32_t* const others = &links_.neighbours[i][first];
+      const FourInts places = load_four(others);
+      const FourInts nodes = four_at(samples_.node, others);
+      const FourInts is_link = (places != static_cast<std::int32_t>(place)) & (nodes != std::int32_t{-1});
+      static_assert(kNoNode == ~0U);
+      out.within |= bits_of(is_link & (nodes == node)) << first;
+      out.beyond |= bits_of(is_link & (nodes != node)) << first;
+      out.turned |= bits_of(four_at(turned_, others) != std::int32_t{turned_[place]}) << first;
+    }
+    return out;
+  }
+
+  /// A cell has few neighbours, and mostly few patches: the first edges are summed up as they come, in the order in
+  /// which add_up() would; the others are left to it.
+  static void add(std::vector<PatchEdge>& edges, const PatchEdge& e) {
+    constexpr std::size_t kSummedAtOnce = 16;
+    const auto end = edges.begin() + static_cast<std::ptrdiff_t>(std::min(edges.size(), kSummedAtOnce));
+    const auto known = std::find_if(edges.begin(), end, [&](const PatchEdge& k) { return k.a == e.a && k.b == e.b; });
+    if (known == end) {
+      edges.push_back(e);
+    } else {
+      include(e, *known);
+    }
+  }
+  static void include(const PatchEdge& e, PatchEdge& sum) {
+    sum.agreement += e.agreement;
+    sum.same += e.same;
+    sum.opposite += e.opposite;
   }
 
   static void add_up(std::vector<PatchEdge>& edges) {
@@ -283,9 +325,7 @@ class PatchGrower {
     std::size_t n = 0;
     for (const PatchEdge& e : edges) {
       if (n > 0 && edges[n - 1].a == e.a && edges[n - 1].b == e.b) {
-        edges[n - 1].agreement += e.agreement;
-        edges[n - 1].same += e.same;
-        edges[n - 1].opposite += e.opposite;
+        include(e, edges[n - 1]);
       } else {
         edges[n++] = e;
       }
@@ -324,14 +364,6 @@ class PatchGrower {
 };
 
 }  // namespace
-
-float agreement(const std::array<float, 3>& offset, const std::array<float, 3>& a, const std::array<float, 3>& b,
-                float scale) {
-  constexpr float kNoise = 0.25F;  // offsets of half the neighbourhood's radius are mirrored by half
-  const float cosine = dot(a, b);
-  const float squared = dot(offset, offset) + kNoise * scale;
-  return squared > 0 ? cosine - 2 * dot(a, offset) * dot(b, offset) / squared : cosine;
-}
 
 void grow_patches(const SampleTree& tree, const PatchSettings& settings, const Viewpoints& viewpoints,
                   const Links& links, WindowSamples& samples, PatchGraph& graph) {

@@ -98,12 +98,6 @@ class SampleWindow {
 
 // Neighbouring samples grow together to patches of one sign: pieces of the surface within which links agree.
 
-/// What two neighbours say about each other's sign, in -1..1: the cosine between one's normal and the other's mirrored
-/// at the plane between them. On a sphere, around an edge and across a thin wall that tells the sign where the plain
-/// cosine does not; `scale` keeps noise between very near samples from passing for a wall.
-float agreement(const std::array<float, 3>& offset, const std::array<float, 3>& a, const std::array<float, 3>& b,
-                float scale);
-
 struct PatchSettings {
   std::int32_t cell = 1;    ///< steps: patches lie within cubes of this side, on its multiples
   int neighbours = 16;      ///< samples that lie within Links::scale

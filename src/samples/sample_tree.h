@@ -106,6 +106,12 @@ class SampleTree {
     return {static_cast<float>(at_[0][b] - at_[0][a]), static_cast<float>(at_[1][b] - at_[1][a]),
             static_cast<float>(at_[2][b] - at_[2][a])};
   }
+  /// The same to the samples at four places.
+  [[nodiscard]] std::array<FourFloats, 3> offsets(std::uint32_t a, const std::uint32_t* places) const {
+    std::array<FourFloats, 3> offsets;
+    for (std::size_t axis = 0; axis < 3; ++axis) offsets[axis] = to_floats(four_at(at_[axis], places) - at_[axis][a]);
+    return offsets;
+  }
 
  private:
   struct Node {
