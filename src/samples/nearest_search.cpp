@@ -154,7 +154,13 @@ class Near {
 }  // namespace
 
 std::size_t NearestSearch::nearest(std::uint32_t place, std::size_t k, float bound, Neighbour* found) {
-  if (block_ == nullptr || !block_->holds(place) || k != k_ || bound != bound_) gather(place, k, bound);
+  if (k != k_ || bound != bound_) {
+    k_ = k;
+    bound_ = bound;
+    block_ = nullptr;
+    farthest_ = 0;
+  }
+  if (block_ == nullptr || !block_->holds(place)) gather(place);
   // Mostly its neighbours lie about as far as those of the sample before: enough within a guess are the nearest.
   for (const float guess : {kGuessedReach * farthest_, reach_}) {
     if (around_.empty() || guess > reach_) continue;
@@ -165,20 +171,32 @@ std::size_t NearestSearch::nearest(std::uint32_t place, std::size_t k, float bou
     if (count == k) farthest_ = std::sqrt(found[k - 1].squared);
     return count;
   }
-  return tree_.nearest(place, k, bound, found);
+  const std::size_t count = tree_.nearest(place, k, bound, found);
+  if (count == k && !around_.empty()) {
+    farthest_ = std::sqrt(found[k - 1].squared);
+    // Samples may lie farther apart here than where the blocks were gathered for.
+    if (kGuessedReach * farthest_ > reach_) block_ = nullptr;
+  }
+  return count;
 }
 
-void NearestSearch::gather(std::uint32_t place, std::size_t k, float bound) {
+void NearestSearch::gather(std::uint32_t place) {
   block_ = &tree_.block_of(place);
-  k_ = k;
-  bound_ = bound;
   around_.clear();
   std::array<Neighbour, kMostWanted> found;
-  if (k == 0 || k > found.size()) return;
-  const std::size_t count = tree_.nearest(place, k, bound, found.data());
-  farthest_ = std::sqrt(count == k ? found[k - 1].squared : bound);
-  reach_ = std::min(kGatheredReach * farthest_, std::sqrt(bound) * kRounding);
+  if (k_ == 0 || k_ > found.size()) return;
+  // The block before lay beside this one, mostly.
+  if (farthest_ > 0) list_blocks();
+  if (!around_.empty()) return;
+  const std::size_t count = tree_.nearest(place, k_, bound_, found.data());
+  farthest_ = std::sqrt(count == k_ ? found[k_ - 1].squared : bound_);
+  list_blocks();
+}
+
+void NearestSearch::list_blocks() {
+  reach_ = std::min(kGatheredReach * farthest_, std::sqrt(bound_) * kRounding);
   const SampleTree::Around around{block_->box(), kRounding * reach_ * reach_};
+  around_.clear();
   tree_.for_blocks(around, [&](const SampleTree::Block& block) {
     if (around_.size() <= kMostBlocks && block.within(around.box, around.squared) != 0) around_.push_back(&block);
   });

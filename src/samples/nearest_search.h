@@ -21,7 +21,8 @@ class NearestSearch {
   std::size_t nearest(std::uint32_t place, std::size_t k, float bound, Neighbour* found);
 
  private:
-  void gather(std::uint32_t place, std::size_t k, float bound);
+  void gather(std::uint32_t place);
+  void list_blocks();
 
   const SampleTree& tree_;
   const SampleTree::Block* block_ = nullptr;
