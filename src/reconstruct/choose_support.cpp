@@ -125,7 +125,8 @@ void choose_support(const SurfaceSettings& s, const CloudSurvey& survey, const P
   plan.holes.mark = s.vertex_filled;
   plan.holes.all = s.fill_all;
   if (s.watertight) plan.holes.watertight = *s.watertight ? Watertight::any_loops : Watertight::no;
-  plan.holes.bridge = s.bridge.value_or(!s.blend && (info.found_normals || tells_scans(info)));
+  // What is clean and has normals was mostly taken from a surface, which ends where it does.
+  plan.holes.bridge = s.bridge.value_or(!s.blend && (survey.noisy || info.found_normals || tells_scans(info)));
   if (plan.holes.longest == 0) {
     plan.holes.watertight = Watertight::no;
     plan.holes.bridge = false;
