@@ -142,9 +142,9 @@ void CreaseFinder::accumulate(const RowSamples& rows) {
   std::array<SampleRange, RowSamples::kRows> ranges{};
   for (std::size_t g = 0; g < state_.at.size(); ++g) {
     const Queries& q = state_.at[g];
-    const auto [y_lo, y_hi] = std::minmax_element(q.y.v.begin(), q.y.v.end());
-    const auto [z_lo, z_hi] = std::minmax_element(q.z.v.begin(), q.z.v.end());
-    const int n = rows.ranges(*y_lo, *y_hi, *z_lo, *z_hi, ranges.data());
+    const auto [y_lo, y_hi] = extremes_of(q.y);
+    const auto [z_lo, z_hi] = extremes_of(q.z);
+    const int n = rows.ranges(y_lo, y_hi, z_lo, z_hi, ranges.data());
     if (state_.splitting) {
       rule_.kernel.accumulate_moments(rows.samples(), ranges.data(), n, q, state_.regions[0][g],
                                       &state_.moments[g * (kMoments + 1)]);

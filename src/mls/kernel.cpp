@@ -11,7 +11,7 @@ namespace lamina {
 
 void TileSamples::resize(std::size_t n, std::size_t attribute_count) {
   all.resize(n);
-  for (std::vector<float>* v : {&x, &y, &z, &inv_support2}) v->resize(n);
+  for (std::vector<float>* v : {&x, &y, &z, &inv_support2}) v->resize(n + kLanes);
   attributes.resize(attribute_count);
   for (std::vector<float>& a : attributes) a.resize(n);
 }

@@ -2,6 +2,7 @@
 // One source (kernel_source.h), compiled per processor kind; all kinds give the same bits (no fused multiply-add, no
 // reassociation, every query's sum in the order of the samples).
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -46,7 +47,7 @@ struct TileSample {
 /// Samples of a tile, set by put(): records, and some of their numbers once more as arrays.
 struct TileSamples {
   std::vector<TileSample> all;
-  std::vector<float> x, y, z, inv_support2;  ///< what tells those near a box, several samples at once
+  std::vector<float> x, y, z, inv_support2;  ///< what tells those near a box, eight samples at once: eight longer
   bool banded = true;                        ///< some sample's band is narrower than its support
   std::vector<std::vector<float>> attributes;
   void resize(std::size_t n, std::size_t attribute_count);
@@ -68,6 +69,21 @@ struct alignas(32) Lanes {
   float& operator[](int i) { return v[static_cast<std::size_t>(i)]; }
   float operator[](int i) const { return v[static_cast<std::size_t>(i)]; }
 };
+
+/// The least and the greatest of eight. Always inlined: processor kinds must not share it.
+struct Extremes {
+  float least, most;
+};
+[[gnu::always_inline]] inline Extremes extremes_of(const Lanes& l) {
+  std::array<float, 4> least;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled next
+  std::array<float, 4> most;   // NOLINT(cppcoreguidelines-pro-type-member-init)
+  for (std::size_t i = 0; i < 4; ++i) {
+    least[i] = std::min(l.v[i], l.v[i + 4]);
+    most[i] = std::max(l.v[i], l.v[i + 4]);
+  }
+  return {std::min(std::min(least[0], least[1]), std::min(least[2], least[3])),
+          std::max(std::max(most[0], most[1]), std::max(most[2], most[3]))};
+}
 
 struct Queries {
   Lanes x, y, z;

@@ -21,75 +21,7 @@ inline Vec load(const float* p) {
   return v;
 }
 
-/// The box of a group's query points, a little wider than it is: rounding must not lose a sample.
-struct QueryBox {
-  float x, y, z;     ///< middle
-  float hx, hy, hz;  ///< half its sides
-};
-
-inline QueryBox box_of(const Queries& q) {
-  constexpr float kWider = 1e-3F;
-  const auto [x0, x1] = std::minmax_element(q.x.v.begin(), q.x.v.end());
-  const auto [y0, y1] = std::minmax_element(q.y.v.begin(), q.y.v.end());
-  const auto [z0, z1] = std::minmax_element(q.z.v.begin(), q.z.v.end());
-  return {0.5F * (*x0 + *x1),          0.5F * (*y0 + *y1),          0.5F * (*z0 + *z1),
-          0.5F * (*x1 - *x0) + kWider, 0.5F * (*y1 - *y0) + kWider, 0.5F * (*z1 - *z0) + kWider};
-}
-
-/// Goes over the samples of ranges, eight at a time, and picks those that act on a box.
-class Picker {
- public:
-  static constexpr int kMost = 128;
-
-  Picker(const TileSamples& s, const SampleRange* ranges, int count, const Queries& query)
-      : s_(s), range_(ranges), end_(ranges + count), box_(box_of(query)) {
-    if (count > 0) at_ = range_->begin;
-  }
-  /// The next ones in their order; none when all have been looked at.
-  int next(std::uint32_t* out) {
-    int n = 0;
-    while (range_ != end_ && n <= kMost - kLanes) {
-      if (at_ >= range_->end) {
-        if (++range_ != end_) at_ = range_->begin;
-        continue;
-      }
-      const int left = static_cast<int>(range_->end - at_);
-      const IntVec keep = acting(at_) & (IntVec{0, 1, 2, 3, 4, 5, 6, 7} < IntVec{} + left);
-      for (int l = 0; l < kLanes; ++l) {
-        out[n] = at_ + static_cast<std::uint32_t>(l);
-        n -= keep[l];
-      }
-      at_ += kLanes;
-    }
-    return n;
-  }
-
- private:
-  /// Of eight samples; those behind the last one are anything.
-  IntVec acting(std::uint32_t i) const {
-    const Vec dx = outside(some(s_.x, i), box_.x, box_.hx);
-    const Vec dy = outside(some(s_.y, i), box_.y, box_.hy);
-    const Vec dz = outside(some(s_.z, i), box_.z, box_.hz);
-    return (dx * dx + dy * dy + dz * dz) * some(s_.inv_support2, i) < splat(1.0F);
-  }
-  static Vec outside(const Vec& v, float middle, float half) {
-    const Vec d = v - splat(middle);
-    const Vec far = (d > -d ? d : -d) - splat(half);
-    return far > splat(0.0F) ? far : splat(0.0F);
-  }
-  static Vec some(const std::vector<float>& v, std::uint32_t i) {
-    if (i + kLanes <= v.size()) return load(v.data() + i);
-    Vec out = splat(0.0F);
-    for (std::size_t l = 0; i + l < v.size(); ++l) out[l] = v[i + l];
-    return out;
-  }
-
-  const TileSamples& s_;
-  const SampleRange* range_;
-  const SampleRange* end_;
-  std::uint32_t at_ = 0;
-  QueryBox box_;
-};
+#include "mls/kernel_picker.h"
 
 /// `A`: number of attributes where known at compile time, else negative. `B`: whether samples have bands narrower than
 /// their supports; otherwise every contributing sample is near enough. `F`: whether samples whose normals point away

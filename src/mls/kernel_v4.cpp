@@ -1,6 +1,9 @@
 // The projection kernel for x86-64-v4 processors (flags set in src/CMakeLists.txt).
+#include <smmintrin.h>
+
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <vector>

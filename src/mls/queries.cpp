@@ -92,9 +92,9 @@ void TileSteps::accumulate(const RowSamples& rows) {
   std::array<SampleRange, RowSamples::kRows> ranges{};
   for (std::size_t g = 0; g < batch.points.size(); ++g) {
     const Queries& q = batch.points[g];
-    const auto [y_lo, y_hi] = std::minmax_element(q.y.v.begin(), q.y.v.end());
-    const auto [z_lo, z_hi] = std::minmax_element(q.z.v.begin(), q.z.v.end());
-    const int n = rows.ranges(*y_lo, *y_hi, *z_lo, *z_hi, ranges.data());
+    const auto [y_lo, y_hi] = extremes_of(q.y);
+    const auto [z_lo, z_hi] = extremes_of(q.z);
+    const int n = rows.ranges(y_lo, y_hi, z_lo, z_hi, ranges.data());
     Lanes* const sums = &batch.sums[g * rule_.channels];
     if (batch.facing.empty()) {
       rule_.kernel.accumulate(rows.samples(), ranges.data(), n, q, sums);

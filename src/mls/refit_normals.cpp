@@ -128,9 +128,9 @@ class TileRefit {
       e.facing.y[l] = s_.ny[i];
       e.facing.z[l] = s_.nz[i];
     }
-    const auto [y_lo, y_hi] = std::minmax_element(e.at.y.v.begin(), e.at.y.v.end());
-    const auto [z_lo, z_hi] = std::minmax_element(e.at.z.v.begin(), e.at.z.v.end());
-    e.ranges = scratch_.rows.ranges(*y_lo, *y_hi, *z_lo, *z_hi, scratch_.ranges.data());
+    const auto [y_lo, y_hi] = extremes_of(e.at.y);
+    const auto [z_lo, z_hi] = extremes_of(e.at.z);
+    e.ranges = scratch_.rows.ranges(y_lo, y_hi, z_lo, z_hi, scratch_.ranges.data());
     e.sums[kNearest].v.fill(1e30F);
     return e;
   }

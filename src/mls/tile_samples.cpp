@@ -340,7 +340,7 @@ void RowSamples::place(const Lattice& lattice, int level, std::span<const Run> r
   const float inv = 1.0F / static_cast<float>(lattice.cell_size(level));
   const std::size_t attributes = runs.empty() ? 0 : runs.front().from->attributes.size();
   // Longer than that they may stay: what lies behind the ranges is not looked at.
-  if (samples_.x.size() < count_ || samples_.attributes.size() != attributes) samples_.resize(count_, attributes);
+  if (samples_.all.size() < count_ || samples_.attributes.size() != attributes) samples_.resize(count_, attributes);
   const std::span<const Found> found(found_.data(), count_);
   row_begin_.assign(kRows * kRows + 1, 0);
   for (const Found& f : found) ++row_begin_[static_cast<std::size_t>(f.row) + 1];
