@@ -64,10 +64,9 @@ class Picker {
       const std::uint32_t left = range_->end - at_;
       const unsigned keep = acting(at_) & (left < kLanes ? (1U << left) - 1 : 0xFFU);
       // All eight are written, what is not kept is written over: which are is as good as random.
-      ByteVec lanes;
-      __builtin_memcpy(&lanes, &kListedLanes[keep], sizeof(lanes));
-      const IntVec numbers = __builtin_convertvector(lanes, IntVec) + static_cast<int>(at_);
-      __builtin_memcpy(out + n, &numbers, sizeof(numbers));
+      const std::uint64_t lanes = kListedLanes[keep];
+      put_numbers(static_cast<std::uint32_t>(lanes), out + n);
+      put_numbers(static_cast<std::uint32_t>(lanes >> 32), out + n + 4);
       n += std::popcount(keep);
       at_ += kLanes;
     }
@@ -75,8 +74,11 @@ class Picker {
   }
 
  private:
-  typedef unsigned char ByteVec __attribute__((vector_size(8)));  // NOLINT(modernize-use-using)
-
+  /// Of four samples whose lanes are the bytes of a word. The compiler would make numbers of bytes one by one.
+  void put_numbers(std::uint32_t lanes, std::uint32_t* out) const {
+    const __m128i four = _mm_cvtepu8_epi32(_mm_cvtsi32_si128(static_cast<int>(lanes)));
+    _mm_storeu_si128(reinterpret_cast<__m128i*>(out), _mm_add_epi32(four, _mm_set1_epi32(static_cast<int>(at_))));
+  }
   /// Of eight samples, a bit each; those behind the last one are anything.
   unsigned acting(std::uint32_t i) const {
     const Vec dx = outside(load(x_ + i), box_.x, box_.hx);
