@@ -127,6 +127,7 @@ void put_overhang(const CornerPlace& at, const float* record, int slab_layers, c
 void fill_corners(const Window& window, const TileView& tile, const CornerRule& rule, IsoSlab& out) {
   const CornerBlock& leaf = tile.leaf();
   const int attributes = window.attributes();
+  const int first = window.first_attribute();
   const int slab_layers = window.slab_layers(tile.level);
   const auto size = static_cast<float>(window.lattice().cell_size(tile.level));
   std::vector<float> extra(static_cast<std::size_t>(attributes));
@@ -151,7 +152,7 @@ void fill_corners(const Window& window, const TileView& tile, const CornerRule& 
       if ((trusted & one) != 0) {
         const float* const v = record();
         value = {v[kDistance], {v[kNormalX], v[kNormalY], v[kNormalZ]}, v[kCurvature], v[kOffsetFromMean]};
-        for (int a = 0; a < attributes; ++a) extra[a] = v[kFirstAttribute + a];
+        for (int a = 0; a < attributes; ++a) extra[a] = v[first + a];
         c.offset_from_mean = value.offset_from_mean;
       } else {
         corner_value(window, tile.level, cell, value, extra.data());  // there is one: both ends of the edge are defined
@@ -166,7 +167,7 @@ void fill_corners(const Window& window, const TileView& tile, const CornerRule& 
           takes_crease(window, tile.level, cell, static_cast<std::int32_t>(out.slab), record()))
         put_on_crease(record(), cell_of_value(window, tile.level, cell), c);
       const float* const own = (leaf.seen.words[z] & active & one) != 0 ? record() : nullptr;
-      if (own != nullptr) c.density = own[kDensity];
+      if (own != nullptr && window.has_rare()) c.density = own[kDensity];
       if (rule.trim > 0) put_overhang({&leaf, z * 64 + bit, tile.level}, own, slab_layers, rule, value.normal, c);
       for (int a = 0; a < attributes; ++a) out.corner_attributes[a][id] = extra[a];
       out.corners[id++] = c;

@@ -95,7 +95,7 @@ void Band::collect_level(const Window& window, std::int32_t slab) {
         brick->plane[at] = plane;
         masks.add(bit, plane);
         for (std::size_t c = 0; c < settings_.channels.size(); ++c)
-          brick->extra[c * 512 + at] = values.channel(settings_.channels[c])[i];
+          brick->extra[c * 512 + at] = values.channel(window.place_of(settings_.channels[c]))[i];
       }
       brick->know(z, masks);
     }

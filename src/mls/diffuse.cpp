@@ -72,9 +72,12 @@ class CentresMean {
     record[kCurvature] = sum_.curvature * inv;
     record[kOffsetFromMean] = sum_.offset_from_mean * inv;
     for (float& l : sum_.lean) l *= inv;
-    record[kLean] = packed_lean(sum_.lean);
-    record[kDensity] = sum_.density * inv;
-    for (std::size_t c = 0; c < attributes_.size(); ++c) record[kFirstAttribute + c] = attributes_[c] * inv;
+    if (window_.has_rare()) {
+      record[kLean] = packed_lean(sum_.lean);
+      record[kDensity] = sum_.density * inv;
+    }
+    float* const attributes = record + window_.first_attribute();
+    for (std::size_t c = 0; c < attributes_.size(); ++c) attributes[c] = attributes_[c] * inv;
     return trusted ? Found::trusted : Found::seen;
   }
   [[nodiscard]] bool is_outside() const { return sum_.distance >= 0; }  ///< the last corner
@@ -124,11 +127,14 @@ class CentresMean {
     sum_.distance += w * (v[kDistance] + along + 0.5F * v[kCurvature] * across);
     sum_.curvature += w * v[kCurvature];
     sum_.offset_from_mean += w * v[kOffsetFromMean];
-    sum_.density += w * v[kDensity];
-    const std::array<float, 3> lean = unpacked_lean(v[kLean]);
-    for (int k = 0; k < 3; ++k) sum_.lean[k] += w * lean[k];
+    if (window_.has_rare()) {
+      sum_.density += w * v[kDensity];
+      const std::array<float, 3> lean = unpacked_lean(v[kLean]);
+      for (int k = 0; k < 3; ++k) sum_.lean[k] += w * lean[k];
+    }
     for (int k = 0; k < 3; ++k) sum_.normal[k] += w * n[k];
-    for (std::size_t c = 0; c < attributes_.size(); ++c) attributes_[c] += w * v[kFirstAttribute + c];
+    const float* const attributes = v + window_.first_attribute();
+    for (std::size_t c = 0; c < attributes_.size(); ++c) attributes_[c] += w * attributes[c];
   }
 
   const Window& window_;

@@ -209,7 +209,8 @@ void read_record(const Window& window, const float* record, CornerValue& out, fl
          {record[kNormalX], record[kNormalY], record[kNormalZ]},
          record[kCurvature],
          record[kOffsetFromMean]};
-  for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] = record[kFirstAttribute + c];
+  for (int c = 0; attributes != nullptr && c < window.attributes(); ++c)
+    attributes[c] = record[window.first_attribute() + c];
 }
 
 /// Normals whose weighted sum is shorter than this cancel.
@@ -222,12 +223,13 @@ bool extended_value(const Window& window, int level, const Place& here, CornerVa
   CornerValue sum;
   float total = 0;
   for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] = 0;
+  const int first = window.first_attribute();
   const auto add = [&](int dx, int dy, int dz, const float* v) {
     const float w = neighbour_weight(dx, dy, dz);
     sum.distance += w * plane_of(v).seen_from(dx, dy, dz, cell);
     for (int k = 0; k < 3; ++k) sum.normal[k] += w * v[kNormalX + k];
     sum.curvature += w * v[kCurvature];
-    for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] += w * v[kFirstAttribute + c];
+    for (int c = 0; attributes != nullptr && c < window.attributes(); ++c) attributes[c] += w * v[first + c];
     total += w;
   };
   for_records_around(*here.block, here.offset, &Projected::trusted, window.slab_layers(level), add);

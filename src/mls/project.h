@@ -31,6 +31,9 @@ struct ProjectSettings {
   bool leans = true;            ///< values have kLean; else 0
   bool densities = true;        ///< and kDensity
   bool creases = false;         ///< sharp edges where normals fall into two or three groups (creases.h); corners only
+
+  /// Whether values have channels that not all runs want.
+  [[nodiscard]] bool rare_channels() const { return leans || densities || creases; }
 };
 
 struct ProjectCounts {

@@ -36,19 +36,52 @@ void fill(QueryBatch& batch, std::size_t count, std::size_t channels, const At& 
   for (std::size_t g = 0; g < groups; ++g) batch.sums[g * channels + kNearest].v.fill(1e30F);
 }
 
-/// From the points of a group to their corners; `corner` tells that of the batch's i-th point, of so many.
+/// The corners of a group's points; `corner` tells that of the batch's i-th point, of so many.
 template <typename Corner>
-FitInput offsets(const ProjectRule& rule, const QueryBatch& batch, std::size_t g, std::size_t count,
-                 const Corner& corner) {
+Queries corners_of(std::size_t g, std::size_t count, const Corner& corner) {
+  Queries out{};
+  for (int l = 0; l < kLanes; ++l) {
+    const Point at = corner(std::min(g * kLanes + static_cast<std::size_t>(l), count - 1));
+    out.x[l] = at.x;
+    out.y[l] = at.y;
+    out.z[l] = at.z;
+  }
+  return out;
+}
+
+/// From the points of a group to their corners.
+FitInput offsets(const ProjectRule& rule, const Queries& from, const Queries& to) {
   FitInput in;
   in.sphere = rule.settings.fit == Fit::sphere;
   for (int l = 0; l < kLanes; ++l) {
-    const Point at = corner(std::min(g * kLanes + static_cast<std::size_t>(l), count - 1));
-    in.offset.x[l] = at.x - batch.points[g].x[l];
-    in.offset.y[l] = at.y - batch.points[g].y[l];
-    in.offset.z[l] = at.z - batch.points[g].z[l];
+    in.offset.x[l] = to.x[l] - from.x[l];
+    in.offset.y[l] = to.y[l] - from.y[l];
+    in.offset.z[l] = to.z[l] - from.z[l];
   }
   return in;
+}
+
+/// Where a step takes a group's points.
+struct Step {
+  Queries to;
+  unsigned moves = 0;  ///< a bit for each point that it moves noticeably, and whose surface is near enough for steps
+};
+
+/// Of all eight at once, without branches: which of them move is as good as random.
+Step step_of(const FitOutput& fit, const Queries& from, const Queries& corners, const Lanes* sums, float tolerance) {
+  Step out{};
+  for (int l = 0; l < kLanes; ++l) {
+    const float d = fit.distance[l];
+    const Point p{corners.x[l] - d * fit.nx[l], corners.y[l] - d * fit.ny[l], corners.z[l] - d * fit.nz[l]};
+    const Point by{p.x - from.x[l], p.y - from.y[l], p.z - from.z[l]};
+    const float still = std::max(kStill, tolerance * sums[kWR][l] / sums[kW][l]);
+    const bool stays = by.x * by.x + by.y * by.y + by.z * by.z <= still * still;
+    out.to.x[l] = p.x;
+    out.to.y[l] = p.y;
+    out.to.z[l] = p.z;
+    out.moves |= static_cast<unsigned>(!((d > kStepLimit) | (d < -kStepLimit) | stays)) << l;
+  }
+  return out;
 }
 
 }  // namespace
@@ -110,7 +143,13 @@ struct TileSteps::Next {
   std::vector<Point> to;
   std::vector<Point> facing;
   bool any_facing = false;
+  FitOutput fit{};  ///< of the group at hand
 
+  explicit Next(std::size_t most) {
+    moving.reserve(most);
+    to.reserve(most);
+    facing.reserve(most);
+  }
   void add(std::uint32_t query, const Point& point, const Point& side) {
     moving.push_back(query);
     to.push_back(point);
@@ -137,17 +176,18 @@ bool TileSteps::any_sees_two_sheets(const Lanes* sums) const {
 
 /// Finds those of a group's points that go on, and where.
 void TileSteps::advance_group(std::size_t g, std::size_t count, int pass, Next& next) const {
+  FitOutput& fit = next.fit;
   const QueryBatch& from = state_.stepped ? state_.moved : state_.all;
   const Lanes* const sums = &from.sums[g * rule_.channels];
   // Most groups, where one step is all.
   if (!state_.stepped && pass >= rule_.settings.steps && !any_sees_two_sheets(sums)) return;
-  FitOutput fit{};
-  bool fitted = false;
+  Step step{};
+  bool stepped = false;
   for (std::size_t i = g * kLanes; i < std::min(count, (g + 1) * kLanes); ++i) {
     const int l = static_cast<int>(i - g * kLanes);
     if (sums[kW][l] <= 0) continue;
-    const Point here{from.points[g].x[l], from.points[g].y[l], from.points[g].z[l]};
     if (!state_.stepped && sees_two_sheets(sums, l)) {
+      const Point here{from.points[g].x[l], from.points[g].y[l], from.points[g].z[l]};
       next.add(query_of(i), here, {sums[kNx][l], sums[kNy][l], sums[kNz][l]});
       continue;
     }
@@ -155,26 +195,25 @@ void TileSteps::advance_group(std::size_t g, std::size_t count, int pass, Next& 
     if (!from.facing.empty()) side = {from.facing[g].x[l], from.facing[g].y[l], from.facing[g].z[l]};
     const bool behind = !side.is_zero();
     if (pass >= rule_.settings.steps + (behind ? 1 : 0)) continue;
-    const auto corner_of = [&](std::size_t k) { return point_of(queries_[query_of(k)], rule_.shift()); };
-    if (!fitted) rule_.kernel.fit(sums, offsets(rule_, from, g, count, corner_of), fit);
-    fitted = true;
-    const float d = fit.distance[l];
-    if (d > kStepLimit || d < -kStepLimit) continue;
-    const Point corner = corner_of(i);
-    const Point p{corner.x - d * fit.nx[l], corner.y - d * fit.ny[l], corner.z - d * fit.nz[l]};
-    const Point by{p.x - here.x, p.y - here.y, p.z - here.z};
-    const float still = std::max(kStill, rule_.settings.tolerance * sums[kWR][l] / sums[kW][l]);
-    if (by.x * by.x + by.y * by.y + by.z * by.z <= still * still) continue;
-    next.add(query_of(i), p, behind ? Point{fit.nx[l], fit.ny[l], fit.nz[l]} : Point{});
+    if (!stepped) {
+      const Queries corners =
+          corners_of(g, count, [&](std::size_t k) { return point_of(queries_[query_of(k)], rule_.shift()); });
+      rule_.kernel.fit(sums, offsets(rule_, from.points[g], corners), fit);
+      step = step_of(fit, from.points[g], corners, sums, rule_.settings.tolerance);
+      stepped = true;
+    }
+    if (((step.moves >> l) & 1U) == 0) continue;
+    next.add(query_of(i), {step.to.x[l], step.to.y[l], step.to.z[l]},
+             behind ? Point{fit.nx[l], fit.ny[l], fit.nz[l]} : Point{});
   }
 }
 
 bool TileSteps::advance(int pass) {
   const std::size_t count = state_.stepped ? state_.moving.size() : queries_.size();
-  Next next;
+  Next next(count);
   for (std::size_t g = 0; g * kLanes < count; ++g) advance_group(g, count, pass, next);
   settle();
-  state_.moving = std::move(next.moving);
+  state_.moving.assign(next.moving.begin(), next.moving.end());
   if (state_.moving.empty()) return false;
   state_.sums += state_.moving.size();
   fill(state_.moved, next.to.size(), rule_.channels, [&](std::size_t i) { return next.to[i]; });
@@ -228,7 +267,8 @@ void TileSteps::settle() {
     Lanes* const all = &state_.all.sums[to * rule_.channels];
     const Lanes* const moved = &state_.moved.sums[from * rule_.channels];
     if (!state_.moved.facing.empty()) {
-      if (l == 0) rule_.kernel.fit(moved, offsets(rule_, state_.moved, from, count, corner_of), fit);
+      if (l == 0)
+        rule_.kernel.fit(moved, offsets(rule_, state_.moved.points[from], corners_of(from, count, corner_of)), fit);
       const Queries& f = state_.moved.facing[from];
       if (f.x[l] != 0 || f.y[l] != 0 || f.z[l] != 0) {
         if (!is_apart(all, lane, moved, l)) continue;
@@ -247,8 +287,8 @@ void TileSteps::settle() {
 
 FitInput fit_input(const ProjectRule& rule, const TileState& state, const std::vector<Query>& queries,
                    std::size_t group) {
-  return offsets(rule, state.all, group, queries.size(),
-                 [&](std::size_t i) { return point_of(queries[i], rule.shift()); });
+  const auto corner_of = [&](std::size_t i) { return point_of(queries[i], rule.shift()); };
+  return offsets(rule, state.all.points[group], corners_of(group, queries.size(), corner_of));
 }
 
 }  // namespace lamina

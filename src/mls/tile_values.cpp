@@ -162,23 +162,29 @@ void store_values(const ProjectRule& rule, Window& window, const Work& work, con
   CornerBlock& leaf = *work.tile.leaf;
   const bool corners = work.corners();
   const auto [begin, end] = work.layers;
-  for (int z = begin; z < end; ++z) {
-    points.seen.words[z] = points.trusted.words[z] = 0;
-    if (corners) leaf.outside.words[z] = leaf.creased.words[z] = 0;
-  }
-  for (std::size_t i = 0; i < queries.size(); ++i) {
-    if (fit.seen[i] == 0) continue;
-    const Query& q = queries[i];
-    const std::uint64_t one = std::uint64_t{1} << (q.x + 8 * q.y);
-    points.seen.words[q.z] |= one;
-    if (fit.trusted[i] != 0) points.trusted.words[q.z] |= one;
-    if (corners && fit.fits[i / kLanes].distance[static_cast<int>(i % kLanes)] >= 0) leaf.outside.words[q.z] |= one;
-    if (!fit.creases.empty() && fit.creases[i] != std::array<float, 2>{}) leaf.creased.words[q.z] |= one;
-  }
+  // Without branches: which are seen, trusted and outside is as good as random.
+  BlockMask seen, trusted, outside, creased;
   std::array<std::uint16_t, 512> numbers;  // of queries, by place
   for (std::size_t i = 0; i < queries.size(); ++i) {
     const Query& q = queries[i];
+    const int bit = q.x + 8 * q.y;
+    const std::uint64_t is_seen = fit.seen[i];
+    const bool positive = fit.fits[i / kLanes].distance[static_cast<int>(i % kLanes)] >= 0;
+    seen.words[q.z] |= is_seen << bit;
+    trusted.words[q.z] |= (is_seen & fit.trusted[i]) << bit;
+    outside.words[q.z] |= (is_seen & static_cast<std::uint64_t>(positive)) << bit;
     numbers[static_cast<std::size_t>(BlockMask::offset(q.x, q.y, q.z))] = static_cast<std::uint16_t>(i);
+  }
+  for (std::size_t i = 0; i < fit.creases.size(); ++i) {
+    if (fit.seen[i] == 0 || fit.creases[i] == std::array<float, 2>{}) continue;
+    creased.set(BlockMask::offset(queries[i].x, queries[i].y, queries[i].z));
+  }
+  for (int z = begin; z < end; ++z) {
+    points.seen.words[z] = seen.words[z];
+    points.trusted.words[z] = trusted.words[z];
+    if (!corners) continue;
+    leaf.outside.words[z] = outside.words[z];
+    leaf.creased.words[z] = creased.words[z];
   }
   std::uint32_t count = 0;
   for (int z = begin; z < end; ++z) {
@@ -189,6 +195,7 @@ void store_values(const ProjectRule& rule, Window& window, const Work& work, con
   CornerValues& values = points.values[window.slab_in_leaf(level, begin)];
   values.allocate(count, window.channels());
   const float cell = rule.cell;
+  const int first = window.first_attribute();
   std::uint32_t at = 0;
   for (int z = begin; z < end; ++z) {
     const std::uint64_t shared = corners ? leaf.shared.words[z] : 0;
@@ -210,12 +217,14 @@ void store_values(const ProjectRule& rule, Window& window, const Work& work, con
       v[kNormalZ] = out.nz[l];
       v[kCurvature] = out.curvature[l] / cell;
       v[kOffsetFromMean] = out.offset_from_mean[l];
-      v[kLean] = rule.settings.leans ? packed_lean({out.lean_x[l], out.lean_y[l], out.lean_z[l]}) : 0.0F;
-      v[kDensity] = rule.settings.densities ? density(sums, l) / (cell * cell) : 0.0F;
-      v[kCrease] = fit.creases.empty() ? 0.0F : fit.creases[query][0];
-      v[kCreaseEnd] = fit.creases.empty() ? 0.0F : fit.creases[query][1];
+      if (window.has_rare()) {
+        v[kLean] = rule.settings.leans ? packed_lean({out.lean_x[l], out.lean_y[l], out.lean_z[l]}) : 0.0F;
+        v[kDensity] = rule.settings.densities ? density(sums, l) / (cell * cell) : 0.0F;
+        v[kCrease] = fit.creases.empty() ? 0.0F : fit.creases[query][0];
+        v[kCreaseEnd] = fit.creases.empty() ? 0.0F : fit.creases[query][1];
+      }
       const float inv = 1.0F / sums[kW][l];
-      for (int c = 0; c < window.attributes(); ++c) v[kFirstAttribute + c] = sums[kSums + c][l] * inv;
+      for (int c = 0; c < window.attributes(); ++c) v[first + c] = sums[kSums + c][l] * inv;
     }
   }
 }

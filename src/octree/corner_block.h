@@ -20,7 +20,8 @@ namespace lamina {
 /// from its normal, as a sphere seen from outside); offset from the mean is |projected point - weighted average| in
 /// units of the local support radius. Of a corner that is not trusted the projected point is that average itself (its
 /// offset is the fit's). Where a sharp edge passes the corner the crease channels, two, hold the place and the normal
-/// of its vertex (mls/sheets.h), else zero. Density is that of the samples along the surface, 1/steps^2.
+/// of its vertex (mls/sheets.h), else zero. Density is that of the samples along the surface, 1/steps^2. Channels from
+/// kLean to kCreaseEnd are rare: where no stage wants any of them records go without (Window::place_of()).
 enum Channel : int {
   kDistance = 0,
   kNormalX,

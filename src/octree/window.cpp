@@ -179,8 +179,8 @@ struct Window::Trees {
   }
 };
 
-Window::Window(const Lattice& lattice, int attributes, const Bounds& bounds)
-    : lattice_(lattice), attributes_(attributes), trees_(std::make_unique<Trees>(lattice.levels)) {
+Window::Window(const Lattice& lattice, int attributes, const Bounds& bounds, bool rare)
+    : lattice_(lattice), attributes_(attributes), rare_(rare), trees_(std::make_unique<Trees>(lattice.levels)) {
   for (int l = 0; l < lattice.levels; ++l) {
     Trees::Level& level = trees_->levels[l];
     // Cells reach 2^28 steps, eight of them more than an int; one block holds every bound then, whatever its end.

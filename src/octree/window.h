@@ -3,6 +3,7 @@
 #pragma once
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <compare>
 #include <cstdint>
 #include <memory>
@@ -56,7 +57,8 @@ template <typename Parts>
 class Window {
  public:
   /// `bounds`: where leaves are expected across the sweep axis; lookups inside take a table instead of the tree.
-  Window(const Lattice& lattice, int attributes, const Bounds& bounds = {});
+  /// `rare`: records have the rare channels (Channel).
+  Window(const Lattice& lattice, int attributes, const Bounds& bounds = {}, bool rare = true);
   ~Window();
   Window(const Window&) = delete;
   Window& operator=(const Window&) = delete;
@@ -64,10 +66,18 @@ class Window {
   [[nodiscard]] const Lattice& lattice() const { return lattice_; }
   [[nodiscard]] int levels() const { return lattice_.levels; }
   [[nodiscard]] int attributes() const { return attributes_; }
-  [[nodiscard]] int channels() const { return kFirstAttribute + attributes_; }
+  [[nodiscard]] bool has_rare() const { return rare_; }
+  /// Where a channel lies in a record; attributes come behind the last one there is.
+  [[nodiscard]] int place_of(int channel) const {
+    return channel < kFirstAttribute || rare_ ? channel : channel - kFirstAttribute + kLean;
+  }
+  [[nodiscard]] int first_attribute() const { return place_of(kFirstAttribute); }
+  [[nodiscard]] int channels() const { return first_attribute() + attributes_; }
   /// Layers of a slab inside one leaf of a level (1..8), and the leaf layers [first, first + n) a slab covers there.
   [[nodiscard]] int slab_layers(int level) const { return lattice_.layers(level) < 8 ? lattice_.layers(level) : 8; }
-  [[nodiscard]] int slab_in_leaf(int level, int leaf_layer) const { return leaf_layer / slab_layers(level); }
+  [[nodiscard]] int slab_in_leaf(int level, int leaf_layer) const {
+    return leaf_layer >> std::countr_zero(static_cast<unsigned>(slab_layers(level)));
+  }
 
   /// Null where there is none. Safe from several threads while no leaf is added or removed.
   [[nodiscard]] const CornerBlock* probe(int level, const Block& b) const;
@@ -95,6 +105,7 @@ class Window {
 
   Lattice lattice_;
   int attributes_;
+  bool rare_;
   std::unique_ptr<Trees> trees_;
 };
 

@@ -121,7 +121,8 @@ double mesh_memory(const ReconstructionPlan& plan, const SlabStore& store, doubl
   // Around each cell of surface lie some four and a half corners, and one and a half cells cross it.
   const auto attributes = static_cast<double>(plan.attributes.size());
   const double cells = cells_per_sample(plan.feed);
-  const double corner_bytes = 4.5 * cells * (4.0 * (static_cast<double>(kFirstAttribute) + attributes) + 12);
+  const auto channels = static_cast<double>(plan.projection.rare_channels() ? kFirstAttribute : kLean) + attributes;
+  const double corner_bytes = 4.5 * cells * (4.0 * channels + 12);
   const double surface_bytes = 1.5 * cells * (56 + 4.0 * attributes + 2 * 12 + 1.5 * 16);
   const double per_sample = slabs_with_values(plan) * corner_bytes + slabs_with_surface(plan) * surface_bytes;
   const double cached = std::min(static_cast<double>(plan.feed.cache_bytes),

@@ -18,7 +18,7 @@ Pipeline::Pipeline(const ReconstructionPlan& plan, SampleFeed& feed, const SlabS
       feed_(feed),
       volume_(output.volume),
       kernel_(select_kernel()),
-      window_(plan.lattice, static_cast<int>(plan.attributes.size()), plan.extent),
+      window_(plan.lattice, static_cast<int>(plan.attributes.size()), plan.extent, plan.projection.rare_channels()),
       projector_(plan.projection, kernel_),
       output_(plan, output.mesh),
       stages_(plan.stages_of(span)),
