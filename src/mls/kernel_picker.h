@@ -36,7 +36,7 @@ constexpr std::array<std::uint64_t, 256> list_lanes() {
   }
   return out;
 }
-constexpr std::array<std::uint64_t, 256> kListedLanes = list_lanes();
+inline constexpr std::array<std::uint64_t, 256> kListedLanes = list_lanes();
 
 /// Goes over the samples of ranges, eight at a time, and picks those that act on a box.
 class Picker {

@@ -138,6 +138,16 @@ FourInts from_origin(const ClusterSample& s, const FourWords& origin) {
   return std::bit_cast<FourInts>(at - origin);
 }
 
+/// Asks for the samples of a run, which lie anywhere in memory, before they are looked at. Always inlined: the compiler
+/// takes a function that does nothing else for one without effect.
+[[gnu::always_inline]] inline void ask_for(const Run& run) {
+  constexpr std::size_t kLine = 64;  // bytes
+  const ClusterSample* const samples = run.from->samples.data();
+  const char* const end = reinterpret_cast<const char*>(samples + run.end);
+  for (const char* at = reinterpret_cast<const char*>(samples + run.begin); at < end; at += kLine)
+    __builtin_prefetch(at);
+}
+
 /// The row of cells that a sample lies in. By the very coordinates the sums use: what ranges() cuts off lies beyond the
 /// support in these, too.
 std::int32_t row_of(const FourFloats& at) {
@@ -321,6 +331,7 @@ void RowSamples::select(const Lattice& lattice, const QueryLayers& layers, const
 
   std::size_t n = 0;
   for (std::uint32_t r = 0; r < runs.size(); ++r) {
+    if (r + 1 < runs.size()) ask_for(runs[r + 1]);
     const std::size_t count = runs[r].end - runs[r].begin;
     if (n + count > found_.size()) found_.resize(2 * found_.size() + count);
     for (const ClusterSample& s : std::span(runs[r].from->samples).subspan(runs[r].begin, count)) {

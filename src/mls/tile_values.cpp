@@ -12,12 +12,7 @@ namespace {
 /// Of the support's own disc, what is left of it at least where it cuts the samples' plane far from its middle.
 constexpr float kLeastDisc = 0.25F;
 
-/// Whether a sample close enough contributed to a point.
-bool is_seen(const Lanes* sums, int lane) {
-  return sums[kW][lane] > 0 && sums[kNearest][lane] <= 1;
-}
-
-/// Whether those that a seen point sees do.
+/// Whether the normals of the samples that a seen point sees contradict each other.
 bool is_torn(const Lanes* sums, int lane) {
   const float x = sums[kNx][lane];
   const float y = sums[kNy][lane];
@@ -25,9 +20,35 @@ bool is_torn(const Lanes* sums, int lane) {
   return x * x + y * y + z * z < kTorn * kTorn * sums[kW][lane] * sums[kW][lane];
 }
 
+/// What became of a group's points, a bit each.
+struct LaneStates {
+  unsigned seen = 0;     ///< a sample close enough contributed, and there is a normal
+  unsigned trusted = 0;  ///< of these, whose fit is believed
+  unsigned torn = 0;     ///< of these, whose samples' normals contradict each other
+};
+
+/// Of the first so many. Without branches: which points are what is as good as random.
+LaneStates states_of(const Lanes* sums, const FitOutput& fit, const ProjectSettings& settings, int lanes) {
+  const auto samples = static_cast<float>(settings.trusted_samples);
+  LaneStates out;
+  for (int l = 0; l < kLanes; ++l) {
+    const bool has_normal = (fit.nx[l] != 0) | (fit.ny[l] != 0) | (fit.nz[l] != 0);
+    const bool seen = (sums[kW][l] > 0) & (sums[kNearest][l] <= 1) & has_normal;
+    const bool trusts = (fit.offset_from_mean[l] <= settings.trusted_offset) & (sums[kSeen][l] >= samples);
+    out.seen |= static_cast<unsigned>(seen) << l;
+    out.trusted |= static_cast<unsigned>(trusts) << l;
+    out.torn |= static_cast<unsigned>(is_torn(sums, l)) << l;
+  }
+  out.seen &= (1U << lanes) - 1;
+  out.trusted &= out.seen;
+  out.torn &= out.seen;
+  return out;
+}
+
+/// Whether samples close enough contributed to any point of a group.
 bool any_seen(const Lanes* sums) {
   bool any = false;
-  for (int l = 0; l < kLanes; ++l) any = any || is_seen(sums, l);
+  for (int l = 0; l < kLanes; ++l) any |= (sums[kW][l] > 0) & (sums[kNearest][l] <= 1);
   return any;
 }
 
@@ -137,19 +158,20 @@ void fit_tile(const ProjectRule& rule, const TileState& state, const std::vector
     const FitInput in = fit_input(rule, state, queries, g);
     rule.kernel.fit(sums, in, fit);
     const int lanes = static_cast<int>(std::min<std::size_t>(kLanes, queries.size() - g * kLanes));
+    const LaneStates states = states_of(sums, fit, settings, lanes);
     for (int l = 0; l < lanes; ++l) {
-      const bool has_normal = fit.nx[l] != 0 || fit.ny[l] != 0 || fit.nz[l] != 0;
-      const bool seen = is_seen(sums, l) && has_normal;
-      const bool trusted = seen && fit.offset_from_mean[l] <= settings.trusted_offset &&
-                           sums[kSeen][l] >= static_cast<float>(settings.trusted_samples);
-      if (trusted && settings.residuals) fit.distance[l] -= left_out(sums, rule, l, fit.offset_from_mean[l]);
-      if (seen && !trusted && !settings.centres) keep_to_samples(sums, in, l, fit);
-      out.seen[g * kLanes + static_cast<std::size_t>(l)] = seen ? 1 : 0;
-      out.trusted[g * kLanes + static_cast<std::size_t>(l)] = trusted ? 1 : 0;
-      counts.seen += seen ? 1 : 0;
-      counts.trusted += trusted ? 1 : 0;
-      counts.torn += seen && is_torn(sums, l) ? 1 : 0;
+      out.seen[g * kLanes + static_cast<std::size_t>(l)] = static_cast<std::uint8_t>((states.seen >> l) & 1U);
+      out.trusted[g * kLanes + static_cast<std::size_t>(l)] = static_cast<std::uint8_t>((states.trusted >> l) & 1U);
     }
+    counts.seen += static_cast<std::uint64_t>(std::popcount(states.seen));
+    counts.trusted += static_cast<std::uint64_t>(std::popcount(states.trusted));
+    counts.torn += static_cast<std::uint64_t>(std::popcount(states.torn));
+    for (unsigned w = settings.residuals ? states.trusted : 0; w != 0; w &= w - 1) {
+      const int l = std::countr_zero(w);
+      fit.distance[l] -= left_out(sums, rule, l, fit.offset_from_mean[l]);
+    }
+    for (unsigned w = settings.centres ? 0 : states.seen & ~states.trusted; w != 0; w &= w - 1)
+      keep_to_samples(sums, in, std::countr_zero(w), fit);
   }
   out.creases.clear();
   for (const Crease& c : creases) take_crease(c, out, counts);
