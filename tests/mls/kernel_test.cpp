@@ -176,12 +176,12 @@ TEST(Kernel, SamplesThatFaceAwayDoNotCount) {
       kept.resize(0, 1);
       for (std::uint32_t i = 0; i < 120; ++i) {
         if (s.all[i].nx * facing.x[l] + s.all[i].ny * facing.y[l] + s.all[i].nz * facing.z[l] < 0) continue;
-        const auto n = kept.x.size();
+        const auto n = kept.all.size();
         kept.resize(n + 1, 1);
         kept.put(n, s.all[i]);
         kept.attributes[0][n] = s.attributes[0][i];
       }
-      const auto expected = sums_of(kernel, kept, {{0, static_cast<std::uint32_t>(kept.x.size())}}, q);
+      const auto expected = sums_of(kernel, kept, {{0, static_cast<std::uint32_t>(kept.all.size())}}, q);
       for (std::size_t c = 0; c < sums.size(); ++c) EXPECT_EQ(sums[c][l], expected[c][l]) << "sum " << c;
     }
   }

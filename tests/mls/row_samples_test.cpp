@@ -259,7 +259,7 @@ TEST(TileSamples, RowsHoldSamplesInCells) {
       std::array<SampleRange, RowSamples::kRows> ranges{};
       const int n = rows.ranges(y, y_high, z, z_high, ranges.data());
       ASSERT_LE(n, RowSamples::kRows);
-      std::vector<bool> covered(t.x.size(), false);
+      std::vector<bool> covered(t.all.size(), false);
       for (int r = 0; r < n; ++r) {
         ASSERT_LT(ranges[r].begin, ranges[r].end);
         ASSERT_LE(ranges[r].end, t.x.size());
@@ -268,7 +268,7 @@ TEST(TileSamples, RowsHoldSamplesInCells) {
         }
         for (std::uint32_t k = ranges[r].begin; k < ranges[r].end; ++k) covered[k] = true;
       }
-      for (std::size_t k = 0; k < t.x.size(); ++k) {
+      for (std::size_t k = 0; k < t.all.size(); ++k) {
         const bool inside =
             t.y[k] > y - largest && t.y[k] < y_high + largest && t.z[k] > z - largest && t.z[k] < z_high + largest;
         ASSERT_TRUE(!inside || covered[k]) << "y " << t.y[k] << " z " << t.z[k];
