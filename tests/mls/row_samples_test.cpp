@@ -262,7 +262,7 @@ TEST(TileSamples, RowsHoldSamplesInCells) {
       std::vector<bool> covered(t.all.size(), false);
       for (int r = 0; r < n; ++r) {
         ASSERT_LT(ranges[r].begin, ranges[r].end);
-        ASSERT_LE(ranges[r].end, t.x.size());
+        ASSERT_LE(ranges[r].end, t.all.size());
         if (r > 0) {
           ASSERT_LT(ranges[r - 1].end, ranges[r].begin);
         }
