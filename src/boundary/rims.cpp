@@ -36,16 +36,22 @@ void make_empty(VertexBatch& batch, const VertexBatch& other) {
   batch.overhang.clear();
 }
 
-void append_copy(const VertexBatch& from, std::size_t i, VertexBatch& to) {
-  to.x.push_back(from.x[i]);
-  to.y.push_back(from.y[i]);
-  to.z.push_back(from.z[i]);
-  to.nx.push_back(from.nx[i]);
-  to.ny.push_back(from.ny[i]);
-  to.nz.push_back(from.nz[i]);
-  for (std::size_t a = 0; a < from.attributes.size(); ++a) to.attributes[a].push_back(from.attributes[a][i]);
-  if (!from.radius.empty()) to.radius.push_back(from.radius[i]);
-  if (!from.density.empty()) to.density.push_back(from.density[i]);
+/// Vertices [begin, end).
+void append_copies(const VertexBatch& from, std::size_t begin, std::size_t end, VertexBatch& to) {
+  const auto append = [&](const auto& values, auto& out) {
+    if (values.empty()) return;
+    const auto first = values.begin();
+    out.insert(out.end(), first + static_cast<std::ptrdiff_t>(begin), first + static_cast<std::ptrdiff_t>(end));
+  };
+  append(from.x, to.x);
+  append(from.y, to.y);
+  append(from.z, to.z);
+  append(from.nx, to.nx);
+  append(from.ny, to.ny);
+  append(from.nz, to.nz);
+  for (std::size_t a = 0; a < from.attributes.size(); ++a) append(from.attributes[a], to.attributes[a]);
+  append(from.radius, to.radius);
+  append(from.density, to.density);
 }
 
 /// The point at t between two vertices.
@@ -98,11 +104,11 @@ bool RimTrimmer::pop(MeshSlab& out) {
   if (held_.size() <= at || (held_.size() == at + 1 && !finished_)) return false;
   const Held* const below = below_ ? &held_.front() : nullptr;
   const Held* const above = held_.size() > at + 1 ? &held_[at + 1] : nullptr;
-  const auto has_rim = [](const Held* held) { return held != nullptr && held->rim; };
-  if (has_rim(below) || held_[at].rim || has_rim(above)) {
+  // An edge of the slab that is cut has an end in it or below that does not stay.
+  if ((below != nullptr && below->rim) || held_[at].rim) {
     trim(below, held_[at], above, out);
   } else {
-    pass(below, held_[at], out);
+    pass(below, held_[at], above != nullptr && above->rim, out);
   }
   if (below_) {
     spare_ = std::move(held_.front().mesh);
@@ -120,8 +126,10 @@ void RimTrimmer::find_cuts(const Held* below, Held& here, const Held* above) con
   };
   const auto look = [&](const std::vector<std::array<std::uint32_t, 3>>& triangles) {
     for (const auto& t : triangles) {
+      // Nearly all: they have no edge of the slab, or none that is cut.
+      if ((t[0] < here.end()) + (t[1] < here.end()) + (t[2] < here.end()) < 2) continue;
       if (std::max({t[0], t[1], t[2]}) < here.end() && inside(t[0]) == inside(t[1]) && inside(t[1]) == inside(t[2]))
-        continue;  // nearly all
+        continue;
       for (std::size_t k = 0; k < 3; ++k) {
         const auto [low, high] = std::minmax(t[k], t[(k + 1) % 3]);
         if (high < here.first || high >= here.end() || inside(low) == inside(high)) continue;
@@ -130,7 +138,7 @@ void RimTrimmer::find_cuts(const Held* below, Held& here, const Held* above) con
     }
   };
   look(here.mesh.triangles);
-  if (above != nullptr) look(above->mesh.triangles);
+  if (above != nullptr && here.rim) look(above->mesh.triangles);
   std::sort(here.cuts.begin(), here.cuts.end());
   here.cuts.erase(std::unique(here.cuts.begin(), here.cuts.end()), here.cuts.end());
 }
@@ -183,8 +191,8 @@ void RimTrimmer::cut_triangles(const Held* below, const Held& here, MeshSlab& ou
   }
 }
 
-/// Neither its edges nor those that go to the slabs around are cut.
-void RimTrimmer::pass(const Held* below, Held& here, MeshSlab& out) {
+/// Neither its edges nor those to the slab below are cut. `stays`: those to the one above may be.
+void RimTrimmer::pass(const Held* below, Held& here, bool stays, MeshSlab& out) {
   const auto size = static_cast<std::uint32_t>(here.mesh.vertices.size());
   here.trimmed_first = trimmed_;
   here.kept = size;
@@ -201,8 +209,13 @@ void RimTrimmer::pass(const Held* below, Held& here, MeshSlab& out) {
       to[k] = h.trimmed_first + h.number[t[k] - h.first];
     }
   }
-  std::swap(out.vertices, here.mesh.vertices);
-  here.mesh.vertices.overhang = std::exchange(out.vertices.overhang, {});
+  if (stays) {
+    out.vertices = here.mesh.vertices;
+    out.vertices.overhang.clear();
+  } else {
+    std::swap(out.vertices, here.mesh.vertices);
+    here.mesh.vertices.overhang = std::exchange(out.vertices.overhang, {});
+  }
 }
 
 void RimTrimmer::trim(const Held* below, Held& here, const Held* above, MeshSlab& out) {
@@ -214,10 +227,14 @@ void RimTrimmer::trim(const Held* below, Held& here, const Held* above, MeshSlab
   out.triangles.clear();
   out.triangles.reserve(here.mesh.triangles.size() + here.cuts.size());
   make_empty(out.vertices, from);
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    if (from.overhang[i] >= level_) continue;
-    here.number[i] = here.kept++;
-    append_copy(from, i, out.vertices);
+  for (std::size_t i = 0, end = 0; i < from.size(); i = end) {  // run by run of those that stay, or go
+    const bool goes = from.overhang[i] >= level_;
+    for (end = i + 1; end < from.size() && (from.overhang[end] >= level_) == goes;) ++end;
+    if (goes) continue;
+    const auto numbers = here.number.begin();
+    std::iota(numbers + static_cast<std::ptrdiff_t>(i), numbers + static_cast<std::ptrdiff_t>(end), here.kept);
+    here.kept += static_cast<std::uint32_t>(end - i);
+    append_copies(from, i, end, out.vertices);
   }
   add_cut_vertices(below, here, out.vertices);
   trimmed_ += static_cast<std::uint32_t>(out.vertices.size());
@@ -278,6 +295,7 @@ void RimSmoother::smooth(Held& here, const Held* below, const Held* above) {
   around_.assign(here.overhang.size(), {});
   const auto add = [&](const MeshSlab& mesh) {
     for (const auto& t : mesh.triangles) {
+      if (std::min({t[0], t[1], t[2]}) >= here.end()) continue;  // most of those above
       std::array<std::uint32_t, 3> overhang, inside;
       for (std::size_t k = 0; k < 3; ++k) {
         const Held& of = t[k] < here.first ? *below : t[k] < here.end() ? here : *above;

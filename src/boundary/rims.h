@@ -43,14 +43,14 @@ class RimTrimmer {
     std::vector<Edge> cuts;             ///< ascending
     std::uint32_t kept = 0;             ///< vertices that stay
     bool rim = false;                   ///< not all of them do
-    /// A slab without a rim, beside others without, goes as it came: what is left of it are its overhangs.
+    /// A slab without a rim, upon one without, goes as it came: what is left of it are its overhangs.
     [[nodiscard]] std::uint32_t end() const {
       return first + static_cast<std::uint32_t>(mesh.vertices.overhang.size());
     }
   };
 
   void trim(const Held* below, Held& here, const Held* above, MeshSlab& out);
-  void pass(const Held* below, Held& here, MeshSlab& out);
+  void pass(const Held* below, Held& here, bool stays, MeshSlab& out);
   void find_cuts(const Held* below, Held& here, const Held* above) const;
   void add_cut_vertices(const Held* below, const Held& here, VertexBatch& out) const;
   void cut_triangles(const Held* below, const Held& here, MeshSlab& out) const;
