@@ -27,17 +27,20 @@ struct LaneStates {
   unsigned torn = 0;     ///< of these, whose samples' normals contradict each other
 };
 
+unsigned one_if(bool holds) {
+  return static_cast<unsigned>(holds);
+}
+
 /// Of the first so many. Without branches: which points are what is as good as random.
 LaneStates states_of(const Lanes* sums, const FitOutput& fit, const ProjectSettings& settings, int lanes) {
   const auto samples = static_cast<float>(settings.trusted_samples);
   LaneStates out;
   for (int l = 0; l < kLanes; ++l) {
-    const bool has_normal = (fit.nx[l] != 0) | (fit.ny[l] != 0) | (fit.nz[l] != 0);
-    const bool seen = (sums[kW][l] > 0) & (sums[kNearest][l] <= 1) & has_normal;
-    const bool trusts = (fit.offset_from_mean[l] <= settings.trusted_offset) & (sums[kSeen][l] >= samples);
-    out.seen |= static_cast<unsigned>(seen) << l;
-    out.trusted |= static_cast<unsigned>(trusts) << l;
-    out.torn |= static_cast<unsigned>(is_torn(sums, l)) << l;
+    const unsigned has_normal = one_if(fit.nx[l] != 0) | one_if(fit.ny[l] != 0) | one_if(fit.nz[l] != 0);
+    out.seen |= (one_if(sums[kW][l] > 0) & one_if(sums[kNearest][l] <= 1) & has_normal) << l;
+    out.trusted |= (one_if(fit.offset_from_mean[l] <= settings.trusted_offset) & one_if(sums[kSeen][l] >= samples))
+                   << l;
+    out.torn |= one_if(is_torn(sums, l)) << l;
   }
   out.seen &= (1U << lanes) - 1;
   out.trusted &= out.seen;
@@ -47,9 +50,9 @@ LaneStates states_of(const Lanes* sums, const FitOutput& fit, const ProjectSetti
 
 /// Whether samples close enough contributed to any point of a group.
 bool any_seen(const Lanes* sums) {
-  bool any = false;
-  for (int l = 0; l < kLanes; ++l) any |= (sums[kW][l] > 0) & (sums[kNearest][l] <= 1);
-  return any;
+  unsigned any = 0;
+  for (int l = 0; l < kLanes; ++l) any |= one_if(sums[kW][l] > 0) & one_if(sums[kNearest][l] <= 1);
+  return any != 0;
 }
 
 /// Samples per cell^2 of the surface around a seen point: those within its support lie on the disc that this cuts out
