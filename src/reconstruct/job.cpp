@@ -151,7 +151,8 @@ void note_input(const StoredCloud& cloud, SurfaceStats& stats) {
   stats.replaced_attributes = census.unusable_attributes;
   for (int k = 1; k < kDefects; ++k) {
     if (census.rejected[k] > 0)
-      stats.rejected.push_back({describe(static_cast<Defect>(k)), census.rejected[k], census.first_row[k]});
+      stats.rejected.push_back(
+          {reason_of(static_cast<Defect>(k), cloud.info), census.rejected[k], census.first_row[k]});
   }
 }
 

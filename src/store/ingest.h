@@ -31,7 +31,8 @@ Pick judge(const RowPick& pick, const SampleBatch& batch, std::size_t i, std::ui
 /// Why a sample cannot be used.
 enum class Defect : std::uint8_t { none, position, normal, radius, quality };
 inline constexpr int kDefects = 5;
-const char* describe(Defect defect);
+/// Why samples of the source with this defect are left out.
+const char* reason_of(Defect defect, const PointSourceInfo& source);
 /// The defect of sample i of a batch.
 Defect defect_of(const SampleBatch& batch, std::size_t i);
 

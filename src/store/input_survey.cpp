@@ -173,14 +173,14 @@ Pick judge(const RowPick& pick, const SampleBatch& batch, std::size_t i, std::ui
   return Pick::taken;
 }
 
-const char* describe(Defect defect) {
+const char* reason_of(Defect defect, const PointSourceInfo& source) {
   switch (defect) {
     case Defect::none:
       return "usable";
     case Defect::position:
       return "non-finite position";
     case Defect::normal:
-      return "zero or non-finite normal";
+      return source.found_normals ? "normal that its neighbours do not tell" : "zero or non-finite normal";
     case Defect::radius:
       return "radius not positive";
     case Defect::quality:
@@ -235,8 +235,11 @@ void judge(const Census& c, const PointSourceInfo& source, BadSamples bad, const
   const std::string path = name_of(source);
   for (int k = 1; k < kDefects; ++k) {
     if (c.rejected[k] == 0) continue;
+    const auto defect = static_cast<Defect>(k);
+    // A file is not to blame for normals it does not have; whoever looked for them has said how many found none.
+    if (defect == Defect::normal && source.found_normals) continue;
     const std::string what = fmt::format("{}: {} of {} samples have a {}, the first is row {} (counted from 0)", path,
-                                         c.rejected[k], source.count, describe(static_cast<Defect>(k)), c.first_row[k]);
+                                         c.rejected[k], source.count, reason_of(defect, source), c.first_row[k]);
     if (bad == BadSamples::refuse)
       throw Error(ExitCode::unreadable, what + "; clean the file or use --bad-samples drop");
     run.warn(what + "; dropped");
@@ -245,7 +248,12 @@ void judge(const Census& c, const PointSourceInfo& source, BadSamples bad, const
   if (c.usable == 0 && c.clipped > 0)
     throw Error(ExitCode::empty,
                 fmt::format("{}: none of its {} samples lies in the box to clip to", path, source.count));
-  if (c.rejected[static_cast<int>(Defect::normal)] == source.count)
+  const bool none_has_normal = c.rejected[static_cast<int>(Defect::normal)] == source.count;
+  if (none_has_normal && source.found_normals)
+    throw Error(ExitCode::empty, fmt::format("{}: none of its {} samples has a normal that its neighbours tell: they "
+                                             "are too few, or all on a line",
+                                             path, source.count));
+  if (none_has_normal)
     throw Error(ExitCode::empty,
                 fmt::format("{}: none of its {} samples has a normal that is not zero; --normals auto finds and "
                             "orients them, see also `lamina normal`",

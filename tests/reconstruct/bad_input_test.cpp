@@ -1,4 +1,5 @@
 // Input, output and settings that cannot work: one line that names the file and the place, and nothing left behind.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -96,6 +97,27 @@ TEST_F(SurfaceBadInput, NoNormals) {
   s.normals = NormalsChoice::file;
   s.input = test::write_file(folder_ / "in.ply", test::ply_bytes(model, PlyFormat::ascii));
   expect_failure(ExitCode::unreadable, {"in.ply", "no normals", "nx ny nz", "--normals auto"}, s);
+}
+
+TEST_F(SurfaceBadInput, PositionsThatTellNoNormal) {
+  SurfaceSettings s;
+  s.input = test::write_file(folder_ / "in.xyz", "0 0 0\n1 0 0\n2 0 0\n3 0 0\n");
+  expect_failure(ExitCode::empty, {"in.xyz", "none of its 4 samples", "on a line"}, s);
+}
+
+TEST_F(SurfaceBadInput, AFileIsNotRefusedForNormalsItDoesNotHave) {
+  std::string rows;
+  const Cloud cloud = test::sphere_cloud(5000);
+  for (const Point3& p : cloud.positions) rows += fmt::format("{} {} {}\n", p[0], p[1], p[2]);
+  for (int i = 0; i < 100; ++i) rows += fmt::format("{} 5 5\n", 5 + 0.01 * i);
+  SurfaceSettings s;
+  s.bad_samples = BadSamples::refuse;
+  s.input = test::write_file(folder_ / "in.xyz", rows);
+  s.output = folder_ / "out.ply";
+  const SurfaceStats stats = reconstruct_surface(s, {});
+  EXPECT_GT(stats.triangles, 1000U);
+  ASSERT_FALSE(stats.rejected.empty());
+  EXPECT_EQ(stats.rejected[0].reason, "normal that its neighbours do not tell");
 }
 
 TEST_F(SurfaceBadInput, TooFewPlaces) {
