@@ -31,18 +31,24 @@ std::uint16_t edge_offset(int edge) {
   return static_cast<std::uint16_t>(EdgeNumbers::offset(edge / 4, low[0], low[1], low[2]));
 }
 
-std::array<PlainCase, 256> plain_cases() {
-  std::array<PlainCase, 256> out;
-  for (int i = 0; i < 256; ++i) {
-    const CaseTriangles& c = case_table()[i];
-    out[i].count = c.count;
-    for (int k = 0; k < 3 * c.count; ++k) out[i].edges[k] = edge_offset(c.edges[k]);
-    for (std::size_t k = 0; k < c.loop_edges.size(); ++k) {
-      out[i].loop_edges[k] = edge_offset(c.loop_edges[k]);
-      out[i].loop_points[k] = edge_middle(c.loop_edges[k]);
-    }
+PlainCase plain_case(const CaseTriangles& c) {
+  PlainCase out;
+  out.count = c.count;
+  for (int k = 0; k < 3 * c.count; ++k) out.edges[k] = edge_offset(c.edges[k]);
+  for (std::size_t k = 0; k < c.loop_edges.size(); ++k) {
+    out.loop_edges[k] = edge_offset(c.loop_edges[k]);
+    out.loop_points[k] = edge_middle(c.loop_edges[k]);
   }
   return out;
+}
+
+const std::array<PlainCase, 256>& plain_cases() {
+  static const std::array<PlainCase, 256> cases = [] {
+    std::array<PlainCase, 256> out;
+    std::transform(case_table().begin(), case_table().end(), out.begin(), plain_case);
+    return out;
+  }();
+  return cases;
 }
 
 /// Words of a mask at layer z in [0, 8] over the tile and its three neighbours at greater x or y.
@@ -293,7 +299,7 @@ void triangulate(const Window& window, std::int32_t slab, IsoSlab& out, IsoSlab&
   const std::vector<TileView> views = slab_tiles(window, slab);
   using Parts = BlockParts<&CornerBlock::around, &CornerBlock::busy_layers, &CornerBlock::cells, &CornerBlock::outside,
                            &CornerBlock::accepted, &CornerBlock::numbers>;
-  const std::array<PlainCase, 256> cases = plain_cases();
+  const std::array<PlainCase, 256>& cases = plain_cases();
   std::vector<TriangleRun> runs((views.size() + kRunTiles - 1) / kRunTiles);
   tbb::parallel_for(std::size_t{0}, runs.size(), [&](std::size_t r) {
     BlockCache cache(window);

@@ -33,11 +33,12 @@ class TileExtender {
     level_ = level;
     leaf_ = t.leaf;
     layers_ = layers;
-    std::array<std::uint64_t, 8> beside{};  // corners beside trusted ones, not trusted themselves
-    bits::dilate_layers<-1, 1>(trusted_around(), layers.begin, layers.end, &beside[layers.begin]);
     std::uint64_t any = 0;
-    for (int z = layers.begin; z < layers.end; ++z) any |= beside[z] &= wanted(z);
-    if (any != 0) gather_field(beside);
+    std::uint64_t doubtful = 0;
+    for (int z = layers.begin; z < layers.end; ++z) any |= leaf_->corners.words[z], doubtful |= wanted(z);
+    if (any == 0) return;
+    std::array<std::uint64_t, 8> beside{};  // corners beside trusted ones, not trusted themselves
+    if (doubtful != 0) find_beside(beside);
     for (int z = layers.begin; z < layers.end; ++z) {
       const std::uint64_t corners = leaf_->corners.words[z];
       if (corners == 0) continue;
@@ -117,12 +118,24 @@ class TileExtender {
     return out & leaf_->seen.words[z];
   }
 
+  /// Finds the wanted corners beside trusted ones, and gathers what these say.
+  void find_beside(std::array<std::uint64_t, 8>& beside) {
+    bits::dilate_layers<-1, 1>(trusted_around(), layers_.begin, layers_.end, &beside[layers_.begin]);
+    std::uint64_t any = 0;
+    for (int z = layers_.begin; z < layers_.end; ++z) any |= beside[z] &= wanted(z);
+    if (any != 0) gather_field(beside);
+  }
+
   /// The trusted corners of the block and of its 26 neighbours.
   [[nodiscard]] bits::Neighbourhood trusted_around() const {
-    bits::Neighbourhood n{};
-    for (int i = 0; i < 27; ++i) {
-      const CornerBlock* const block = leaf_->around[i];
-      n[i / 9][i / 3 % 3][i % 3] = block == nullptr ? nullptr : &block->trusted;
+    bits::Neighbourhood n;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled next
+    for (std::size_t i = 0, z = 0; z < 3; ++z) {
+      for (std::size_t y = 0; y < 3; ++y) {
+        for (std::size_t x = 0; x < 3; ++x, ++i) {
+          const CornerBlock* const block = leaf_->around[i];
+          n[z][y][x] = block == nullptr ? nullptr : &block->trusted;
+        }
+      }
     }
     return n;
   }

@@ -145,17 +145,24 @@ struct TileSteps::Next {
   bool any_facing = false;
   FitOutput fit{};  ///< of the group at hand
 
-  explicit Next(std::size_t most) {
-    moving.reserve(most);
-    to.reserve(most);
-    facing.reserve(most);
-  }
+  explicit Next(std::size_t most) : most_(most) {}
   void add(std::uint32_t query, const Point& point, const Point& side) {
+    if (moving.empty()) reserve();
     moving.push_back(query);
     to.push_back(point);
     facing.push_back(side);
     any_facing = any_facing || !side.is_zero();
   }
+
+ private:
+  /// Only where a point goes on: in most tiles none does.
+  void reserve() {
+    moving.reserve(most_);
+    to.reserve(most_);
+    facing.reserve(most_);
+  }
+
+  std::size_t most_;
 };
 
 /// Whether the samples' mean normal is so short that they face several ways.
