@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "octree/corner_block.h"
@@ -59,6 +60,24 @@ class LayerTable {
     TablePage* const page = std::atomic_ref(pages_[page_of(x, y)]).load(std::memory_order_acquire);
     if (page == nullptr) return nullptr;
     return std::atomic_ref(page->at(x - extent_.x0, y - extent_.y0)).load(std::memory_order_acquire);
+  }
+
+  /// The leaves of a place and of the eight around it, [y][x], where the table covers all nine and one page has them.
+  [[nodiscard]] std::optional<std::array<CornerBlock*, 9>> find_around(std::int32_t x, std::int32_t y) const {
+    const std::int32_t in_x = (x - extent_.x0) % TablePage::kSide;
+    const std::int32_t in_y = (y - extent_.y0) % TablePage::kSide;
+    const auto inner = [](std::int32_t v) { return v > 0 && v + 1 < TablePage::kSide; };
+    if (!inner(in_x) || !inner(in_y) || !covers(x - 1, y - 1) || !covers(x + 1, y + 1)) return std::nullopt;
+    std::array<CornerBlock*, 9> out{};
+    TablePage* const page = std::atomic_ref(pages_[page_of(x, y)]).load(std::memory_order_acquire);
+    if (page == nullptr) return out;
+    for (std::size_t i = 0, dy = 0; dy < 3; ++dy) {
+      for (std::size_t dx = 0; dx < 3; ++dx, ++i) {
+        CornerBlock*& at = page->at(in_x - 1 + static_cast<std::int32_t>(dx), in_y - 1 + static_cast<std::int32_t>(dy));
+        out[i] = std::atomic_ref(at).load(std::memory_order_acquire);
+      }
+    }
+    return out;
   }
 
   /// At a place that the table covers. One thread at a time.

@@ -20,7 +20,9 @@ void set_bits(BlockMask& mask, int layer, std::uint64_t bits) {
   if ((word.load(std::memory_order_relaxed) & bits) != bits) word.fetch_or(bits, std::memory_order_relaxed);
 }
 
-typedef std::int16_t FourRows __attribute__((vector_size(8)));  // NOLINT(modernize-use-using)
+typedef std::int16_t FourRows __attribute__((vector_size(8)));     // NOLINT(modernize-use-using)
+typedef std::uint16_t EightRows __attribute__((vector_size(16)));  // NOLINT(modernize-use-using)
+typedef std::uint8_t EightBytes __attribute__((vector_size(8)));   // NOLINT(modernize-use-using)
 
 /// Four rows of 16 bits, from the lowest bits up.
 using RowWord = std::uint64_t;
@@ -89,44 +91,62 @@ class BlockMarks {
 
   void write_to(Window& window) const {
     if (level_ < 0) return;
+    const std::array<Words, 9> words = words_of_blocks();
+    // Blocks lie anywhere in memory: all are asked for before the first is written to.
+    std::array<CornerBlock*, 27> to{};
+    for (int i = 0; i < 27; ++i) {
+      std::uint64_t any = 0;
+      for (int z = first_layer(i / 9 - 1); z < end_layer(i / 9 - 1); ++z) any |= words[i % 9][z];
+      if (any == 0) continue;
+      to[i] = &window.touch_shared(level_, {home_.x + i % 3 - 1, home_.y + i / 3 % 3 - 1, home_.z + i / 9 - 1});
+      ask_for(to[i]->acted_on);
+    }
     CornerBlock& here = window.touch_shared(level_, home_);
     for (int z = 0; z < 8; ++z) set_bits(here.home, z, cells_[static_cast<std::size_t>(z)]);
-    unsigned layers = 0;  // with any corners
-    for (unsigned z = 0; z < kSide; ++z) {
-      const auto rows = corners_.begin() + z * kSide;
-      layers |= static_cast<unsigned>(std::any_of(rows, rows + kSide, [](unsigned row) { return row != 0; })) << z;
-    }
-    for (int dz = -1; dz <= 1; ++dz) {
-      for (int dy = -1; dy <= 1; ++dy) {
-        for (int dx = -1; dx <= 1; ++dx) write_to(window, layers, dx, dy, dz);
+    for (int i = 0; i < 27; ++i) {
+      if (to[i] == nullptr) continue;
+      const int dz = i / 9 - 1;
+      for (int z = first_layer(dz); z < end_layer(dz); ++z) {
+        if (words[i % 9][z] != 0) set_bits(to[i]->acted_on, z - 1 - 8 * dz, words[i % 9][z]);
       }
     }
   }
 
  private:
-  static constexpr int kSide = 12;  // from one corner below the block to three above its first beyond
+  static constexpr int kSide = 12;                 // from one corner below the block to three above its first beyond
+  using Words = std::array<std::uint64_t, kSide>;  // a layer each
 
-  /// The part of the corners in these layers that lies in the block (dx, dy, dz) from the samples' own.
-  void write_to(Window& window, unsigned layers, int dx, int dy, int dz) const {
-    CornerBlock* to = nullptr;
-    for (int z = std::max(0, -1 - 8 * dz); z < std::min(8, kSide - 1 - 8 * dz); ++z) {
-      if (((layers >> (z + 8 * dz + 1)) & 1U) == 0) continue;
-      std::uint64_t word = 0;
-      for (int y = std::max(0, -1 - 8 * dy); y < std::min(8, kSide - 1 - 8 * dy); ++y) {
-        const unsigned row = corners_[static_cast<std::size_t>((z + 8 * dz + 1) * kSide + y + 8 * dy + 1)];
-        word |= std::uint64_t{(dx < 0 ? row << 7 : row >> (8 * dx + 1)) & 0xFFU} << (8 * y);
+  /// The layers of the corners that lie in blocks so many above this one.
+  static constexpr int first_layer(int dz) { return std::max(0, 1 + 8 * dz); }
+  static constexpr int end_layer(int dz) { return std::min(kSide, 9 + 8 * dz); }
+
+  /// Of eight rows the corners that lie in blocks dx beside this one.
+  static std::uint64_t word_of(const std::uint16_t* rows, int dx) {
+    EightRows eight;
+    std::memcpy(&eight, rows, sizeof(eight));
+    return std::bit_cast<std::uint64_t>(
+        __builtin_convertvector(dx < 0 ? eight << 7 : eight >> (8 * dx + 1), EightBytes));
+  }
+
+  /// The corners as the nine blocks across the sweep axis have them, [y][x].
+  [[nodiscard]] std::array<Words, 9> words_of_blocks() const {
+    std::array<Words, 9> out;
+    for (int z = 0; z < kSide; ++z) {
+      const std::uint16_t* const rows = corners_.data() + z * kSide;
+      for (int dx = -1; dx <= 1; ++dx) {
+        out[1 + dx][z] = word_of(rows, dx) << 56;
+        out[4 + dx][z] = word_of(rows + 1, dx);
+        out[7 + dx][z] = word_of(rows + 9, dx) & 0xFFFFFF;
       }
-      if (word == 0) continue;
-      if (to == nullptr) to = &window.touch_shared(level_, {home_.x + dx, home_.y + dy, home_.z + dz});
-      set_bits(to->acted_on, z, word);
     }
+    return out;
   }
 
   int level_ = -1;
   Block home_;
   std::array<std::uint64_t, 8> cells_{};
-  /// [z + 1][y + 1], bit x + 1; four rows are marked at once.
-  std::array<std::uint16_t, kSide * kSide> corners_{};
+  /// [z + 1][y + 1], bit x + 1; four rows are marked at once, eight read, of which five may lie behind the last.
+  std::array<std::uint16_t, kSide * kSide + 5> corners_{};
 };
 
 }  // namespace

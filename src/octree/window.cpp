@@ -144,13 +144,26 @@ struct Window::Trees {
     const auto set = [](CornerBlock*& to, CornerBlock* other) {
       std::atomic_ref(to).store(other, std::memory_order_relaxed);
     };
-    for (int i = 0; i < 27; ++i) {
-      const Block at{b.x + i % 3 - 1, b.y + i / 3 % 3 - 1, b.z + i / 9 - 1};
-      CornerBlock* const other = i == 13 ? block : find(stranger.level, at);
-      if (other == nullptr) continue;
-      set(block->around[i], other);
-      set(other->around[26 - i], block);
+    for (int dz = -1; dz <= 1; ++dz) {
+      const std::array<CornerBlock*, 9> others = find_around(stranger.level, {b.x, b.y, b.z + dz});
+      const int first = CornerBlock::towards(-1, -1, dz);
+      for (int i = 0; i < 9; ++i) {
+        if (others[i] == nullptr) continue;
+        set(block->around[first + i], others[i]);
+        set(others[i]->around[26 - first - i], block);
+      }
     }
+  }
+
+  /// The block and the eight around it across the sweep axis, [y][x]; null where there is none.
+  std::array<CornerBlock*, 9> find_around(int l, const Block& b) {
+    Level& level = levels[l];
+    const std::int32_t z = b.z - level.z_base;
+    if (z < 0 || z >= static_cast<std::int32_t>(level.layers.size())) return {};  // every leaf has its layer
+    if (const auto known = level.layers[z].table.find_around(b.x, b.y)) return *known;
+    std::array<CornerBlock*, 9> out;
+    for (int i = 0; i < 9; ++i) out[i] = find(l, {b.x + i % 3 - 1, b.y + i / 3 - 1, b.z});
+    return out;
   }
 
   /// Of the neighbours only those above outlive a layer.
