@@ -20,6 +20,19 @@ void resize_anew(std::vector<T>& values, std::size_t size) {
   values.resize(size);
 }
 
+/// The least and the greatest of some. std::minmax_element(), which tells their places too, goes on by branches that
+/// are as good as random.
+template <typename T>
+std::pair<T, T> least_and_greatest(const std::vector<T>& values) {
+  T least = values.front();
+  T greatest = least;
+  for (const T& v : values) {
+    least = std::min(least, v);
+    greatest = std::max(greatest, v);
+  }
+  return {least, greatest};
+}
+
 /// The value that a share of all (0..1) lies below, at 0.5 the median; 0 of none. Changes their order.
 template <typename T>
 T quantile_of(std::vector<T>& values, double share) {

@@ -5,7 +5,7 @@
 
 #include "mls/kernel.h"
 #include "mls/project.h"
-#include "mls/tile_samples.h"
+#include "mls/row_samples.h"
 #include "octree/window.h"
 
 namespace lamina {
@@ -30,8 +30,8 @@ struct Work {
   }
 };
 
-/// A point to project, in the tile's compact order.
-struct Query {
+/// A point to project, in the tile's compact order. A word, so that four are made at once.
+struct alignas(4) Query {
   std::uint8_t x, y, z;
 };
 

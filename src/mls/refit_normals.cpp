@@ -12,7 +12,7 @@
 #include <Eigen/Core>
 
 #include "lattice/lattice.h"
-#include "mls/tile_samples.h"
+#include "mls/row_samples.h"
 #include "samples/consensus_plane.h"
 
 namespace lamina {

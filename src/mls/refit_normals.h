@@ -6,7 +6,7 @@
 
 #include "lattice/lattice.h"
 #include "mls/kernel.h"
-#include "mls/tile_samples.h"
+#include "mls/row_samples.h"
 #include "samples/sample_feed.h"
 #include "samples/support_field.h"
 

@@ -7,7 +7,7 @@
 #include "bench/benches.h"
 #include "bench/measure.h"
 #include "bench/replay.h"
-#include "mls/tile_samples.h"
+#include "mls/row_samples.h"
 
 namespace lamina::bench {
 namespace {

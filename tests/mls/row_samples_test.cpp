@@ -1,4 +1,4 @@
-#include "mls/tile_samples.h"
+#include "mls/row_samples.h"
 
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
@@ -80,15 +80,15 @@ TEST(Clumps, HoldEverySampleOnceInsideTheirBox) {
         left.erase(found);
         ASSERT_TRUE(!before || *before < s) << "order";
         before = s;
-        EXPECT_EQ(c.samples[i].x, bucket.samples.x[s]);
+        EXPECT_EQ(c.x[i], bucket.samples.x[s]);
         EXPECT_EQ(c.samples[i].nz, bucket.samples.nz[s]);
-        EXPECT_EQ(c.samples[i].support, bucket.support[s]);
+        EXPECT_EQ(c.support[i], bucket.support[s]);
         EXPECT_EQ(c.samples[i].weight, bucket.weight[s]);
         EXPECT_EQ(c.samples[i].band, bucket.band[s]);
-        const std::array<std::int32_t, 3> p{c.samples[i].x, c.samples[i].y, c.samples[i].z};
+        const std::array<std::int32_t, 3> p{c.x[i], c.y[i], c.z[i]};
         for (int a = 0; a < 3; ++a) {
-          EXPECT_LE(k.low[a], static_cast<double>(p[a]) - static_cast<double>(c.samples[i].support));
-          EXPECT_GE(k.high[a], static_cast<double>(p[a]) + static_cast<double>(c.samples[i].support));
+          EXPECT_LE(k.low[a], static_cast<double>(p[a]) - static_cast<double>(c.support[i]));
+          EXPECT_GE(k.high[a], static_cast<double>(p[a]) + static_cast<double>(c.support[i]));
         }
       }
     }
@@ -116,7 +116,7 @@ TEST(Clumps, OfAbsurdExtentsAndCells) {
     EXPECT_EQ(c.samples.size(), 16U);
     EXPECT_EQ(c.clusters.back().end, 16U);
     for (const SampleCluster& k : c.clusters) {
-      for (std::uint32_t i = k.begin; i < k.end; ++i) EXPECT_LE(k.low[0], c.samples[i].x);
+      for (std::uint32_t i = k.begin; i < k.end; ++i) EXPECT_LE(k.low[0], c.x[i]);
     }
   }
 }

@@ -1,5 +1,5 @@
 // A bucket's samples in the order in which tiles want them: in clusters, cubes of a few cells of the samples' own
-// level, so that tiles look for clusters instead of samples; and those that a tile takes, in rows.
+// level, so that tiles look for clusters instead of samples.
 #pragma once
 #include <array>
 #include <cstdint>
@@ -7,8 +7,6 @@
 #include <span>
 #include <vector>
 
-#include "base/four.h"
-#include "mls/kernel.h"
 #include "octree/window.h"
 #include "samples/sample_feed.h"
 
@@ -20,16 +18,21 @@ struct SampleCluster {
   std::array<std::int32_t, 3> low{}, high{};
 };
 
-/// What projection needs of a sample.
+/// What projection needs of a sample that acts on a tile.
 struct ClusterSample {
-  std::int32_t x, y, z;  ///< steps
-  float support;         ///< as in ActiveBucket, like the last two
-  float nx, ny, nz;      ///< unit normal
+  float nx, ny, nz;  ///< unit normal
   float weight, band;
 };
 
 /// A bucket's samples in clusters; those without a support are left out.
 struct ClusteredBucket {
+  /// Where they lie (steps) and how far they act: what tells whether a sample acts on a tile. Most of those looked at
+  /// do not, so that four are looked at together, and the rest of their numbers stays where it is.
+  std::vector<std::int32_t> x, y, z;
+  std::vector<float> support;
+  /// These arrays are so much longer than there are samples.
+  static constexpr std::size_t kBehind = 3;
+
   std::vector<ClusterSample> samples;
   /// One array per attribute and, where residuals are known, two more: the residual (steps) and its square.
   std::vector<std::vector<float>> attributes;
@@ -85,42 +88,5 @@ struct QueryLayers {
 /// Deterministic for any number of threads.
 TileRuns bin_clusters(const Lattice& lattice, const QueryLayers& layers, const ClusteredBatch& batch,
                       std::span<const Block> tiles);
-
-// The samples that can reach a tile's points, gathered in rows as the kernel reads them.
-
-/// A tile's samples sorted by rows of cells (z, then y; inside a row in the order of the runs).
-class RowSamples {
- public:
-  static constexpr int kLow =
-      -4;  ///< rows of cells kLow .. kLow + kRows - 1 relative to the tile; outer ones are clamped
-  static constexpr int kRows = 16;
-
-  /// Takes the samples that can reach a point of the block.
-  void gather(const Lattice& lattice, const QueryLayers& layers, const Block& block, std::span<const Run> runs);
-  /// Makes the supports so many times as wide, up to 1, until samples are gathered anew.
-  void scale_supports(float factor);
-  /// The arrays may be longer than size().
-  [[nodiscard]] const TileSamples& samples() const { return samples_; }
-  [[nodiscard]] std::size_t size() const { return count_; }
-  /// Ranges of samples within the largest support of a box (cells relative to the tile); `out` has kRows entries.
-  int ranges(float y_lo, float y_hi, float z_lo, float z_hi, SampleRange* out) const;
-
- private:
-  /// A sample on its way into its row.
-  struct Found {
-    FourFloats at;  ///< x, y, z and the support: cells, relative to the tile
-    const ClusterSample* sample;
-    std::int32_t row;
-    std::uint32_t run;
-  };
-  void select(const Lattice& lattice, const QueryLayers& layers, const Block& block, std::span<const Run> runs);
-  void place(const Lattice& lattice, int level, std::span<const Run> runs);
-
-  TileSamples samples_;
-  float max_support_ = 0;
-  std::vector<Found> found_;  ///< the first `count_` of them
-  std::size_t count_ = 0;
-  std::vector<std::uint32_t> row_begin_;
-};
 
 }  // namespace lamina
