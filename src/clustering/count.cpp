@@ -58,7 +58,8 @@ inline void count_triangle(const Tables& tables, const IsoTriangle& triangle) {
     return;
   }
   const bool e0 = corner[0] == corner[1], e1 = corner[1] == corner[2], e2 = corner[2] == corner[0];
-  const bool three = !(e0 || e1 || e2);
+  // Without branches, here and below: which corners triangles share is as good as random.
+  const bool three = !(e0 | e1 | e2);
   const auto marks = static_cast<std::uint8_t>(VertexNote::kUsed | (three ? VertexNote::kThree : 0));
   std::array<CornerNote*, 3> note;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -78,7 +79,7 @@ inline void count_triangle(const Tables& tables, const IsoTriangle& triangle) {
     const std::uint8_t bit = kPairBits[8 * vertex[k]->direction + vertex[after]->direction];
     note[k]->edges = static_cast<std::uint16_t>(note[k]->edges | inner[k] << bit);
   }
-  if (e0 && e1) ++note[0]->inner_triangles;
+  note[0]->inner_triangles += static_cast<std::uint8_t>(e0 & e1);
 }
 
 /// A chunk's own part of the tables: triangles inside it are counted by the chunk's thread without asking others.

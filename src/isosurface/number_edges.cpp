@@ -179,7 +179,9 @@ void fill_corners(const Window& window, const TileView& tile, const CornerRule& 
 /// Completes a vertex whose ends are both known: the surface meets the edge where the distances, whose signs differ,
 /// pass through zero.
 void place(IsoVertex& v, const SurfaceCorner& low, const SurfaceCorner& high) {
-  v.t = std::clamp(low.distance / (low.distance - high.distance), kEdgeMargin, 1.0F - kEdgeMargin);
+  // Which end is the nearer one is as good as random, and std::clamp() asks.
+  const float t = low.distance / (low.distance - high.distance);
+  v.t = std::min(std::max(t, kEdgeMargin), 1.0F - kEdgeMargin);
   v.near_high = v.t > 0.5F;
 }
 

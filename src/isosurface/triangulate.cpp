@@ -90,12 +90,11 @@ std::uint64_t cells_with(const TileView& tile, int z, const Edges& edges) {
   return out | upright.here | upright.next_column() | upright.next_row() | upright.next_both();
 }
 
-std::uint64_t valid_edges(const CornerBlock& b, int axis, int z) {
-  return b.accepted[axis].words[z];
-}
-std::uint64_t invalid_edges(const CornerBlock& b, int axis, int z) {
+// No functions: these would be called through their address.
+constexpr auto kValidEdges = [](const CornerBlock& b, int axis, int z) { return b.accepted[axis].words[z]; };
+constexpr auto kInvalidEdges = [](const CornerBlock& b, int axis, int z) {
   return b.crossing[axis].words[z] & ~b.accepted[axis].words[z];
-}
+};
 
 /// Signs of one plane of corners as a layer's cells need them: at (x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1).
 struct Plane {
@@ -173,8 +172,8 @@ class TilePass {
       std::uint64_t partial = 0;
       if (mixed != 0 && (doubtful & (3U << z)) != 0) {
         // Most cells with an invalid isovertex have nothing else: the far ends of what samples reach.
-        partial = mixed & cells_with(tile, z, invalid_edges);
-        mixed &= ~partial | cells_with(tile, z, valid_edges);
+        partial = mixed & cells_with(tile, z, kInvalidEdges);
+        if (partial != 0) mixed &= ~partial | cells_with(tile, z, kValidEdges);
         partial &= mixed;
       }
       const std::uint64_t creased = (mixed & ~partial) == 0 ? 0 : mixed & ~partial & beside_creased(tile, z);
@@ -226,10 +225,16 @@ class TilePass {
         emit_creased(tile, z * 64 + bit, signs, out);
         return;
       }
-      for (int t = 0; t < 3 * c.count; t += 3) {
-        *end++ = {SlabIndex{numbers_.at(base + c.edges[t])}, SlabIndex{numbers_.at(base + c.edges[t + 1])},
-                  SlabIndex{numbers_.at(base + c.edges[t + 2])}};
-      }
+      const auto triangle = [&](int t) {
+        return IsoTriangle{SlabIndex{numbers_.at(base + c.edges[3 * t])},
+                           SlabIndex{numbers_.at(base + c.edges[3 * t + 1])},
+                           SlabIndex{numbers_.at(base + c.edges[3 * t + 2])}};
+      };
+      // Most have fewer, which are written over: how many is as good as random.
+      constexpr int kAtOnce = CaseTriangles::kMost - 1;
+      for (int t = 0; t < kAtOnce; ++t) end[t] = triangle(t);
+      if (c.count > kAtOnce) end[kAtOnce] = triangle(kAtOnce);
+      end += c.count;
     });
     out.counts.crossing_cells += static_cast<unsigned>(std::popcount(kinds.mixed & ~special));
     flush();

@@ -37,6 +37,7 @@ class TileExtender {
     std::uint64_t doubtful = 0;
     for (int z = layers.begin; z < layers.end; ++z) any |= leaf_->corners.words[z], doubtful |= wanted(z);
     if (any == 0) return;
+    found_count_ = 0;
     std::array<std::uint64_t, 8> beside{};  // corners beside trusted ones, not trusted themselves
     if (doubtful != 0) find_beside(beside);
     for (int z = layers.begin; z < layers.end; ++z) {
@@ -47,6 +48,7 @@ class TileExtender {
       leaf_->defined.words[z] = signs.defined & corners;
       leaf_->supported.words[z] = signs.supported & corners;
     }
+    for (const Found& f : found()) field_.take_out(f.x, f.y, f.z);
   }
 
  private:
@@ -150,7 +152,6 @@ class TileExtender {
   /// asked for before the first is looked at.
   void gather_field(const std::array<std::uint64_t, 8>& beside) {
     const auto layer = [&](int z) { return z >= 0 && z < 8 ? beside[z] : 0; };
-    found_count_ = 0;
     for (int z = layers_.begin - 1; z <= layers_.end; ++z) {
       const std::uint64_t near = layer(z - 1) | layer(z) | layer(z + 1);
       if (near == 0) continue;
@@ -158,9 +159,9 @@ class TileExtender {
         for (int dx = -1; dx <= 1; ++dx) find_records(dx, dy, z, beside_in(near, dx, dy));
       }
     }
-    field_.clear(layers_.begin, layers_.end);
-    for (const Found& f : std::span(found_.data(), found_count_)) field_.put(f.x, f.y, f.z, plane_of(f.record));
+    for (const Found& f : found()) field_.put(f.x, f.y, f.z, plane_of(f.record));
   }
+  [[nodiscard]] std::span<const Found> found() const { return {found_.data(), found_count_}; }
 
   /// The corners beside those of a word, and those, as the block (dx, dy) blocks away has them in its word.
   static std::uint64_t beside_in(std::uint64_t w, int dx, int dy) {
@@ -172,9 +173,9 @@ class TileExtender {
   /// Trusted ones among `wanted`, of layer z, in [-1, 8], of the block's neighbour at (dx, dy) across the sweep axis.
   void find_records(int dx, int dy, int z, std::uint64_t wanted) {
     const CornerBlock* const from = leaf_->around[CornerBlock::towards(dx, dy, z >> 3)];
-    if (from == nullptr || wanted == 0) return;
     const int layer = z & 7;
-    std::uint64_t w = from->trusted.words[layer] & wanted;
+    // One question for three: which of them has an answer is as good as random.
+    std::uint64_t w = (from == nullptr ? bits::kNoBits : from->trusted).words[layer] & wanted;
     if (w == 0) return;
     const CornerValues& values = from->values[window_.slab_in_leaf(level_, layer)];
     if (values.count == 0) return;

@@ -16,15 +16,6 @@ void TileSamples::resize(std::size_t n, std::size_t attribute_count) {
   for (std::vector<float>& a : attributes) a.resize(n);
 }
 
-void CornerField::clear(int begin, int end) {
-  std::fill(any.begin() + begin * kRows, any.begin() + (end + 2) * kRows, 0);
-}
-
-void CornerField::begin_row(int row) {
-  for (auto* a : {&distance, &nx, &ny, &nz, &trusted}) std::fill_n(a->begin() + row * kRow, kRow, 0.0F);
-  any[row] = 1;
-}
-
 std::vector<Kernel> available_kernels() {
   __builtin_cpu_init();
   std::vector<Kernel> kernels{kernel_v2::kernel()};

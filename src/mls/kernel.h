@@ -149,30 +149,31 @@ struct TangentPlane {
 };
 
 /// Trusted corners of a tile and one corner around it, dense: [z + 1][y + 1][x + 1] with rows of kRow floats; zero
-/// where there is none, rows without any are not set. Lengths in steps.
+/// where there is none. Lengths in steps.
 struct CornerField {
   static constexpr int kRow = 16;
   static constexpr int kRows = 10;
   static constexpr int kPlane = kRows * kRow;
   static constexpr int kSize = 10 * kPlane;
-  std::array<float, kSize> distance, nx, ny, nz, trusted;
-  std::array<std::uint8_t, 10 * kRows> any;  ///< [z + 1][y + 1]: whether the row has trusted corners
+  std::array<float, kSize> distance{}, nx{}, ny{}, nz{}, trusted{};
+  std::array<std::uint8_t, 10 * kRows> any{};  ///< [z + 1][y + 1]: whether the row has trusted corners
 
-  /// Layers [begin - 1, end] have none.
-  void clear(int begin, int end);
-  void put(int x, int y, int z, const TangentPlane<float>& plane) {
+  void put(int x, int y, int z, const TangentPlane<float>& plane) { set(x, y, z, plane, true); }
+  /// Of what was put all or nothing is taken out. Quicker than rows cleared when the first corner comes: which corner
+  /// that is is as good as random.
+  void take_out(int x, int y, int z) { set(x, y, z, {}, false); }
+
+ private:
+  void set(int x, int y, int z, const TangentPlane<float>& plane, bool is_trusted) {
     const int row = (z + 1) * kRows + y + 1;
-    if (any[row] == 0) begin_row(row);
     const int at = row * kRow + x + 1;
+    any[row] = is_trusted ? 1 : 0;
     distance[at] = plane.distance;
     nx[at] = plane.nx;
     ny[at] = plane.ny;
     nz[at] = plane.nz;
-    trusted[at] = 1.0F;
+    trusted[at] = is_trusted ? 1.0F : 0.0F;
   }
-
- private:
-  void begin_row(int row);
 };
 
 /// What the trusted ones among 26 neighbours say about eight corners, a bit each.

@@ -62,7 +62,7 @@ class Picker {
         continue;
       }
       const std::uint32_t left = range_->end - at_;
-      const unsigned keep = acting(at_) & (left < kLanes ? (1U << left) - 1 : 0xFFU);
+      const unsigned keep = acting(at_) & ((1U << (left < kLanes ? left : kLanes)) - 1);
       // All eight are written, what is not kept is written over: which are is as good as random.
       const std::uint64_t lanes = kListedLanes[keep];
       put_numbers(static_cast<std::uint32_t>(lanes), out + n);

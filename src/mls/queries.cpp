@@ -4,6 +4,9 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstring>
+
+#include "base/four.h"
 
 namespace lamina {
 namespace {
@@ -84,15 +87,30 @@ Step step_of(const FitOutput& fit, const Queries& from, const Queries& corners, 
   return out;
 }
 
+/// For each set of the corners of a square, x first, their places as queries from its low corner on, one after the
+/// other; behind them anything.
+constexpr std::array<std::array<std::uint32_t, 4>, 16> list_squares() {
+  std::array<std::array<std::uint32_t, 4>, 16> out{};
+  for (unsigned set = 0; set < out.size(); ++set) {
+    std::size_t n = 0;
+    for (std::uint32_t corner = 0; corner < 4; ++corner) {
+      if (((set >> corner) & 1U) != 0) out[set][n++] = (corner & 1) | (corner >> 1) << 8;
+    }
+  }
+  return out;
+}
+constexpr std::array<std::array<std::uint32_t, 4>, 16> kListedSquares = list_squares();
+
 }  // namespace
 
 void list_queries(const Work& work, std::vector<Query>& out) {
-  out.clear();
   const auto [begin, end] = work.layers;
   const auto wanted = [&, begin = begin, end = end](int z) {
     if (z < begin || z >= end) return std::uint64_t{0};
     return work.own(z);
   };
+  std::array<Query, 512 + 3> list;  // NOLINT(cppcoreguidelines-pro-type-member-init): filled next
+  std::size_t n = 0;
   for (int z = begin & ~1; z < end; z += 2) {
     const std::array<std::uint64_t, 2> layers{wanted(z), wanted(z + 1)};
     for (int y = 0; y < 8; y += 2) {
@@ -100,17 +118,18 @@ void list_queries(const Work& work, std::vector<Query>& out) {
       for (int i = 0; i < 8; i += 2) {
         // To and fro: what follows lies beside.
         const int x = (y & 2) == 0 ? i : 6 - i;
-        const std::uint64_t group = std::uint64_t{0x0303} << (x + 8 * y);
         for (int k = 0; k < 2; ++k) {
-          for (std::uint64_t w = layers[static_cast<std::size_t>(k)] & group; w != 0; w &= w - 1) {
-            const int bit = std::countr_zero(w);
-            out.push_back({static_cast<std::uint8_t>(bit & 7), static_cast<std::uint8_t>(bit >> 3),
-                           static_cast<std::uint8_t>(z + k)});
-          }
+          const std::uint64_t rows = layers[static_cast<std::size_t>(k)] >> (x + 8 * y);
+          const std::size_t square = (rows & 3) | (rows >> 6 & 12);
+          // All four are written, what is not wanted is written over: which are is as good as random.
+          const FourInts four = load_four(kListedSquares[square].data()) + four_times(x | y << 8 | (z + k) << 16);
+          std::memcpy(&list[n], &four, sizeof(four));
+          n += static_cast<std::size_t>(std::popcount(square));
         }
       }
     }
   }
+  out.assign(list.data(), list.data() + n);
 }
 
 void TileSteps::start() {

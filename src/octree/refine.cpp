@@ -41,32 +41,36 @@ void for_tiles(Window& window, int level, std::int32_t slab, const Body& body) {
   });
 }
 
+/// Which of the three blocks along an axis the marks of a word come to lie in, a bit each: those at `low` move below
+/// the first, those at `high` above the last.
+unsigned spread_of(std::uint64_t w, std::uint64_t low, std::uint64_t high) {
+  return static_cast<unsigned>((w & low) != 0) | 2U | static_cast<unsigned>((w & high) != 0) << 2;
+}
+
 /// The blocks around a tile that its marked cells, moved by up to [lo, hi]^3, come to lie in; `layers` has the layers
 /// they may come to lie in.
 void list_missing(const Tile& t, const BlockMask& m, std::pair<std::int32_t, std::int32_t> layers, int lo, int hi,
                   std::vector<Block>& missing) {
-  std::array<std::uint64_t, 3> by_target{};  // layers that reach into the block below, this one, the one above
-  for (int z = 0; z < 8; ++z) {
-    if (m.words[z] == 0) continue;
-    const std::int32_t layer = t.block.z * 8 + z;
-    const std::int32_t from = std::max(layer + lo, layers.first);
-    const std::int32_t to = std::min(layer + hi, layers.second - 1);
-    if (from > to) continue;
-    for (std::int32_t bz = from >> 3; bz <= (to >> 3); ++bz) by_target[bz - t.block.z + 1] |= m.words[z];
-  }
+  // Without branches but for what is missing, which little is: where marks lie is as good as random.
+  std::uint32_t wanted = 0;  // as in CornerBlock::around
   for (int dz = -1; dz <= 1; ++dz) {
-    const std::uint64_t w = by_target[dz + 1];
-    if (w == 0) continue;
-    const bool left = lo < 0 && (w & bits::columns_below(-lo)) != 0;
-    const bool right = hi > 0 && (w & ~bits::columns_below(8 - hi)) != 0;
-    const bool down = lo < 0 && (w & ((std::uint64_t{1} << (8 * -lo)) - 1)) != 0;
-    const bool up = hi > 0 && (w >> (8 * (8 - hi))) != 0;
-    for (int dy = down ? -1 : 0; dy <= (up ? 1 : 0); ++dy) {
-      for (int dx = left ? -1 : 0; dx <= (right ? 1 : 0); ++dx) {
-        if (t.leaf->around[CornerBlock::towards(dx, dy, dz)] != nullptr) continue;
-        missing.push_back({t.block.x + dx, t.block.y + dy, t.block.z + dz});
-      }
-    }
+    const std::int32_t first = std::max(8 * dz, layers.first - t.block.z * 8);
+    const std::int32_t last = std::min(8 * dz + 8, layers.second - t.block.z * 8) - 1;
+    if (first > last) continue;
+    std::uint64_t w = 0;
+    for (int z = std::max(0, first - hi); z <= std::min(7, last - lo); ++z) w |= m.words[z];
+    const unsigned x = spread_of(w, bits::columns_below(-lo), ~bits::columns_below(8 - hi));
+    const unsigned y = spread_of(w, bits::rows_below(-lo), ~bits::rows_below(8 - hi));
+    const std::uint32_t across = x * ((y & 1) | (y & 2) << 2 | (y & 4) << 4);
+    wanted |= (w != 0 ? across : 0) << (9 * (dz + 1));
+  }
+  constexpr std::uint32_t kItself = 1U << 13;
+  if ((wanted & ~kItself) == 0) return;
+  std::uint32_t absent = 0;
+  for (int i = 0; i < 27; ++i) absent |= static_cast<std::uint32_t>(t.leaf->around[i] == nullptr) << i;
+  for (std::uint32_t left = wanted & absent; left != 0; left &= left - 1) {
+    const int i = std::countr_zero(left);
+    missing.push_back({t.block.x + i % 3 - 1, t.block.y + i / 3 % 3 - 1, t.block.z + i / 9 - 1});
   }
 }
 

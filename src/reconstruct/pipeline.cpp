@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/vectors.h"
 #include "lamina/error.h"
 #include "mls/extension.h"
 #include "mls/project.h"
@@ -38,8 +39,8 @@ Pipeline::Pipeline(const ReconstructionPlan& plan, SampleFeed& feed, const SlabS
 void Pipeline::mark(const ActiveBucket& bucket) {
   constexpr std::size_t kPiece = 1024;
   const std::size_t n = bucket.samples.size();
-  const auto [low, high] = std::minmax_element(bucket.samples.z.begin(), bucket.samples.z.end());
-  for (covered_ = std::min(covered_, plan_.lattice.slab_of(*low) - 1); covered_ <= plan_.lattice.slab_of(*high) + 2;
+  const auto [low, high] = least_and_greatest(bucket.samples.z);
+  for (covered_ = std::min(covered_, plan_.lattice.slab_of(low) - 1); covered_ <= plan_.lattice.slab_of(high) + 2;
        ++covered_) {
     window_.cover(covered_);
   }

@@ -5,6 +5,7 @@
 #include <deque>
 #include <limits>
 
+#include "base/vectors.h"
 #include "lamina/error.h"
 #include "lattice/lattice.h"
 #include "samples/cell_octree.h"
@@ -76,11 +77,11 @@ void RadiusEstimator::push(const LocalSamples& samples) {
   const std::size_t n = samples.size();
   WaitingBucket bucket;
   if (n > 0) {
-    const auto [low, high] = std::minmax_element(samples.z.begin(), samples.z.end());
+    const auto [low, high] = least_and_greatest(samples.z);
     const FloorDivider cell(s.settings.finest_cell);
     const int shift = s.octree.group_shift();
-    bucket.low = cell(*low) >> shift;
-    bucket.high = cell(*high) >> shift;
+    bucket.low = cell(low) >> shift;
+    bucket.high = cell(high) >> shift;
     if (s.complete == kUnset) s.complete = s.final = bucket.low;
     if (bucket.low < s.complete) {
       throw Error(ExitCode::internal, "radii: buckets must be pushed in ascending z");
