@@ -227,8 +227,10 @@ void lay_out(SlabRecord& record, std::shared_ptr<const IsoSlab> iso) {
                                 std::to_string(corners.size()));
     }
     VertexNote note;
-    note.direction = static_cast<std::uint8_t>(2 * (vertex.axis % 3) + (vertex.near_high ? 1 : 0));
-    note.corner = vertex.near_high ? vertex.high.bits : vertex.low.bits;
+    // Looked up, not asked for: which end is the nearer one is as good as random.
+    const std::size_t end = vertex.near_high ? 1 : 0;
+    note.direction = static_cast<std::uint8_t>(2 * (vertex.axis % 3) + end);
+    note.corner = std::array{vertex.low.bits, vertex.high.bits}[end];
     record.vertices[v] = note;
     if (vertex.high.next()) record.next_corners = std::max(record.next_corners, vertex.high.index() + 1);
     if (note.crossing()) record.crossing.push_back(static_cast<std::uint32_t>(v));

@@ -61,8 +61,7 @@ void number_corners(SlabRecord& here, Numberer& numberer, ClusterCounts& counts)
     const Verdict verdict = here.verdicts[c];
     if (verdict != Verdict::split) [[likely]] {  // written whether or not it counts: half the corners do, at random
       const bool collapses = verdict == Verdict::corner;
-      const std::uint32_t number = numberer.add(at_corner(c), collapses);
-      here.seats[c] = collapses ? number : here.seats[c];
+      here.seats[c] = numberer.add(at_corner(c), collapses);  // nobody asks for that of another verdict
       continue;
     }
     for (Component& component : here.unresolved[here.seats[c]].components) {
