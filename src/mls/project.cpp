@@ -32,7 +32,7 @@ struct Projector::Scratch {
   Clustered clustered;
   std::vector<std::shared_ptr<ClusteredBucket>> spare;  ///< storage of forgotten ones
   Clustered begun;                                      ///< by tasks
-  Batch loaded;                                         ///< what these are made of
+  Batch loaded;                                         ///< what these are made of, until the tasks are done
   tbb::enumerable_thread_specific<ClusterScratch> clustering;
   tbb::task_group tasks;
 
@@ -85,6 +85,7 @@ ClusteredBatch Projector::Scratch::load(const NumberedBuckets& batch, SampleFeed
   constexpr std::size_t kKeep = std::size_t{1} << 20;  // samples: a batch, or other levels would cluster it anew
   begin(batch, feed, lattice);
   tasks.wait();
+  loaded.clear();
   std::size_t kept = 0;
   for (const auto& [number, bucket] : clustered) kept += bucket->samples.size();
   ClusteredBatch out;
@@ -96,11 +97,13 @@ ClusteredBatch Projector::Scratch::load(const NumberedBuckets& batch, SampleFeed
     }
     const std::shared_ptr<ClusteredBucket>& bucket = begun.at(number);
     kept += bucket->samples.size();
-    if (kept <= kKeep) clustered.emplace(number, bucket);
+    if (kept <= kKeep) {
+      clustered.emplace(number, bucket);
+      feed.set_aside(number);  // both would be twice the memory
+    }
     out.push_back(bucket);
   }
   begun.clear();
-  loaded.clear();
   clustering.clear();  // large
   return out;
 }

@@ -83,9 +83,6 @@ void sort_by_block(LocalSamples& s, const Lattice& lattice, BlockOrderScratch& s
 
 namespace {
 
-/// Buckets forgotten whose memory is kept for the next ones.
-constexpr std::size_t kSpares = 3;
-
 std::size_t bytes_of(const LocalSamples& s) {
   constexpr std::size_t kAnnotation = 3 * sizeof(float) + 1;
   const std::size_t optional = (s.radius.empty() ? 0 : 1) + (s.quality.empty() ? 0 : 1) + s.attributes.size();
@@ -101,15 +98,7 @@ BucketCache::~BucketCache() {
   tasks_.wait();
 }
 
-std::shared_ptr<ActiveBucket> BucketCache::spare() {
-  if (spares_.empty()) return std::make_shared<ActiveBucket>();
-  auto bucket = std::move(spares_.back());
-  spares_.pop_back();
-  return bucket;
-}
-
 void BucketCache::load(std::size_t bucket, ActiveBucket& out) {
-  out.support.clear();
   store_.read(bucket, out.samples);
   sort_by_block(out.samples, lattice_, scratch_.local());
 }
@@ -118,7 +107,7 @@ void BucketCache::prefetch(std::size_t bucket) {
   if (store_.count(bucket) == 0 || here_.contains(bucket) || incoming_.contains(bucket)) return;
   ++reads_;
   Incoming& incoming = incoming_[bucket];
-  incoming.loaded = spare();
+  incoming.loaded = std::make_shared<ActiveBucket>();
   tasks_.run([this, bucket, &incoming] {
     try {
       load(bucket, *incoming.loaded);
@@ -139,7 +128,7 @@ std::shared_ptr<ActiveBucket> BucketCache::get(std::size_t bucket) {
     if (arrived.error) std::rethrow_exception(arrived.error);
     loaded = arrived.loaded;
   } else {
-    loaded = spare();  // an empty bucket is never read
+    loaded = std::make_shared<ActiveBucket>();  // an empty bucket is never read
     load(bucket, *loaded);
   }
   bytes_ += bytes_of(loaded->samples);
@@ -165,12 +154,7 @@ void BucketCache::drop(std::size_t bucket) {
   const auto found = here_.find(bucket);
   if (found == here_.end()) return;
   bytes_ -= bytes_of(found->second->samples);
-  recycle(std::move(found->second));
   here_.erase(found);
-}
-
-void BucketCache::recycle(std::shared_ptr<ActiveBucket> bucket) {
-  if (bucket.use_count() == 1 && spares_.size() < kSpares) spares_.push_back(std::move(bucket));
 }
 
 }  // namespace lamina

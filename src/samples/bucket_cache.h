@@ -1,5 +1,5 @@
-// Buckets in memory: read in the background before they are needed, kept within a budget, their memory used again;
-// their samples in order by blocks of cells, so that neighbours in space are neighbours in memory.
+// Buckets in memory: read in the background before they are needed, kept within a budget; their samples in order by
+// blocks of cells, so that neighbours in space are neighbours in memory.
 #pragma once
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/task_group.h>
@@ -61,10 +61,8 @@ class BucketCache {
     std::shared_ptr<ActiveBucket> loaded;
     std::exception_ptr error;
   };
-  std::shared_ptr<ActiveBucket> spare();
   void load(std::size_t bucket, ActiveBucket& out);
   void keep_within_budget(std::size_t wanted);
-  void recycle(std::shared_ptr<ActiveBucket> bucket);
 
   const SlabStore& store_;
   Lattice lattice_;
@@ -73,7 +71,6 @@ class BucketCache {
   std::uint64_t reads_ = 0;
   std::map<std::size_t, std::shared_ptr<ActiveBucket>> here_;
   std::map<std::size_t, Incoming> incoming_;
-  std::vector<std::shared_ptr<ActiveBucket>> spares_;
   tbb::enumerable_thread_specific<BlockOrderScratch> scratch_;
   tbb::task_group tasks_;
 };

@@ -123,6 +123,8 @@ class SampleFeed {
   /// alone. `margin` enlarges every influence (steps).
   [[nodiscard]] std::vector<std::vector<std::size_t>> batches(std::int64_t lo, std::int64_t hi, float margin) const;
   [[nodiscard]] Batch load(const std::vector<std::size_t>& batch);
+  /// Forgets the samples of a bucket, of which the caller keeps what it needs; load() would read them again.
+  void set_aside(std::size_t bucket) { cache_.drop(bucket); }
   /// Forgets buckets that end below z.
   void release(std::int64_t z);
   [[nodiscard]] std::uint64_t released() const { return released_; }              ///< samples forgotten so far

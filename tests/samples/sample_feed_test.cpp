@@ -298,6 +298,22 @@ TEST(SampleFeed, CacheHoldsWhatItsBudgetAllows) {
   EXPECT_EQ(reads_of(1), 3 * n);  // only the last one stays, and it is never the next one asked for
 }
 
+TEST(SampleFeed, BucketsSetAsideAreReadAgainWhenTheyAreAskedFor) {
+  const LocalSamples cloud = random_cloud({Shape::sphere, 2000, {0, 0, 0}, 1000}, 3);
+  Stored stored(cloud, {64, 4}, 200);
+  SampleFeed feed(stored.store, {64, 4}, {}, {}, true);
+  feed.prepare(kEverything, [](const ActiveBucket&) {});
+  const std::vector<std::size_t> one{feed.batches(-5000, 5000, 0).at(0).at(1)};
+  const Batch before = feed.load(one);
+  const std::uint64_t reads = feed.counts().bucket_reads;
+  feed.set_aside(one[0]);
+  EXPECT_EQ(feed.counts().bucket_reads, reads);
+  const Batch again = feed.load(one);
+  EXPECT_EQ(feed.counts().bucket_reads, reads + 1);
+  EXPECT_EQ(again[0]->samples.x, before[0]->samples.x);
+  EXPECT_EQ(again[0]->support, before[0]->support);
+}
+
 TEST(SampleFeed, LoadedSamplesOutliveTheCache) {
   const LocalSamples cloud = random_cloud({Shape::sphere, 500, {0, 0, 0}, 1000}, 4);
   Stored stored(cloud, {64, 4}, 150);
