@@ -117,6 +117,18 @@ void add_simplification(const ReconstructionPlan& plan, const SlabStore& store, 
   cost.cpu_seconds += (plan.simplify.error > 0 ? kWithin : plan.simplify.deviation > 0 ? kFlat : kPlain) * triangles;
 }
 
+/// Of the samples that wait for their radii, which depend on two layers of coarsest counting cells, or for the slabs to
+/// come, no more than the cache keeps; and of those in clusters, which act on a slab.
+double samples_memory(const ReconstructionPlan& plan, const SlabStore& store) {
+  constexpr double kSample = 37, kAttribute = 4, kLayers = 2.5;
+  const double bytes = kSample + kAttribute * static_cast<double>(plan.attributes.size());
+  const double coarsest = std::ldexp(plan.radii.finest_cell, plan.radii.levels - 1);
+  const double waiting = bytes * densest_layer(store, kLayers * coarsest);
+  const double reach = 2 * plan.feed.blend * static_cast<double>(plan.radius.median) + plan.lattice.slab_height();
+  const double clustered = std::min(densest_layer(store, reach), static_cast<double>(plan.feed.batch_samples));
+  return std::min(static_cast<double>(plan.feed.cache_bytes), waiting) + bytes * clustered;
+}
+
 double mesh_memory(const ReconstructionPlan& plan, const SlabStore& store, double per_slab) {
   // Around each cell of surface lie some four and a half corners, and one and a half cells cross it.
   const auto attributes = static_cast<double>(plan.attributes.size());
@@ -125,9 +137,7 @@ double mesh_memory(const ReconstructionPlan& plan, const SlabStore& store, doubl
   const double corner_bytes = 4.5 * cells * (4.0 * channels + 12);
   const double surface_bytes = 1.5 * cells * (56 + 4.0 * attributes + 2 * 12 + 1.5 * 16);
   const double per_sample = slabs_with_values(plan) * corner_bytes + slabs_with_surface(plan) * surface_bytes;
-  const double cached = std::min(static_cast<double>(plan.feed.cache_bytes),
-                                 static_cast<double>(store.total()) * (37 + 4.0 * attributes));
-  constexpr double kProgram = 35e6;
+  constexpr double kProgram = 50e6;
   // What the window's count leaves out - counting cells, clustering, bins, and the allocator's gaps - grows with it,
   // and with the samples within reach, however low slabs are. Where thin sheets are looked for cells' normals come to
   // it, and more leaves.
@@ -135,7 +145,7 @@ double mesh_memory(const ReconstructionPlan& plan, const SlabStore& store, doubl
   const double in_reach = densest_layer(store, kReachRadii * double{plan.radius.median});
   const double sheets = plan.feed.refines_sheets() ? kSheets : 1;
   const double rest = sheets * per_sample * (kWindow * per_slab + kReach * in_reach);
-  return kProgram + cached + rest + refit_memory(plan, per_slab / plan.lattice.slab_height());
+  return kProgram + samples_memory(plan, store) + rest + refit_memory(plan, per_slab / plan.lattice.slab_height());
 }
 
 /// Of --tiles: the cells and the leaves' buffers, and what a thread works on.

@@ -14,6 +14,7 @@
 #include <system_error>
 #include <utility>
 
+#include "base/free_memory.h"
 #include "lamina/error.h"
 #include "meshes/formats.h"
 #include "mls/refit_normals.h"
@@ -225,6 +226,7 @@ ReconstructionPlan plan_surface(const SurfaceSettings& settings, const StoredClo
 
 void sweep(const ReconstructionPlan& plan, StoredCloud& cloud, const SlabSpan& span, const SweepOutput& output,
            Job& job) {
+  return_free_memory();
   SampleFeed feed(cloud.ingested.store, plan.lattice, plan.feed, plan.radii, plan.given_radii);
   std::optional<RefitNormals> refit;
   if (plan.refit.support > 0) {

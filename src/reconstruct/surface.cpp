@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "base/free_memory.h"
 #include "base/output_file.h"
 #include "lamina/error.h"
 #include "levelset/surface_volume.h"
@@ -63,6 +64,7 @@ std::optional<Error> write_tiles_beside(const ReconstructionPlan& plan, MeshSink
 /// The mesh as the sweep has left it becomes one of fewer triangles, which goes where that was to go.
 std::unique_ptr<WholeMesh> simplified(const ReconstructionPlan& plan, MeshSink& full, const MeshSinkSettings& layout,
                                       MeshReceiver* receiver, Job& job) {
+  return_free_memory();
   std::unique_ptr<WholeMesh> fewer = open_whole_mesh(layout, receiver);
   MeshSlab slab;
   const auto take = [&](TriangleMesh piece) {

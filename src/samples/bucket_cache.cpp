@@ -50,7 +50,7 @@ std::array<Axis, 3> box_of(const LocalSamples& s, const FloorDivider& cell, int&
 template <class T>
 void permute(std::vector<T>& values, const std::vector<BlockEntry>& order, std::vector<T>& scratch) {
   if (values.empty()) return;
-  scratch.resize(values.size());
+  resize_anew(scratch, values.size());
   for (std::size_t i = 0; i < order.size(); ++i) scratch[i] = values[static_cast<std::uint32_t>(order[i])];
   values.swap(scratch);
 }
@@ -63,7 +63,7 @@ void sort_by_block(LocalSamples& s, const Lattice& lattice, BlockOrderScratch& s
   int shift = kBlockShift;
   const auto [x, y, z] = box_of(s, cell, shift);
   std::vector<BlockEntry>& order = scratch.order;
-  order.resize(s.size());
+  resize_anew(order, s.size());
   bool sorted = true;
   for (std::size_t i = 0; i < order.size(); ++i) {
     const auto place = [shift = shift](std::int32_t c, const Axis& axis) {
