@@ -164,7 +164,7 @@ void BoundaryFinder::put_vertices(const Slab& slab, BoundaryBatch& out) const {
     BoundaryVertex boundary;
     boundary.number = static_cast<Number>(slab.first + i) - static_cast<Number>(origin_);
     boundary.position = {v.x[i], v.y[i], v.z[i]};
-    boundary.normal = {v.nx[i], v.ny[i], v.nz[i]};
+    boundary.normal = v.fitted_normal(i);
     boundary.radius = v.radius.empty() ? 0 : v.radius[i];
     out.vertices.push_back(boundary);
     for (const auto& values : v.attributes) out.attributes.push_back(values[i]);

@@ -8,6 +8,7 @@
 #include <Eigen/Geometry>
 
 #include "boundary/gap_surface.h"
+#include "meshes/settled_normal.h"
 
 namespace lamina::boundary {
 namespace {
@@ -99,6 +100,21 @@ Eigen::MatrixXd attributes_of(const std::vector<const Loop*>& loops, const Rim& 
   return out;
 }
 
+/// Where the rim lies badly to what its normals say, so does the surface that spans it, and its triangles know.
+void settle_normals(const std::vector<Vec3>& points, const Triangles& triangles, GapSurface& gap) {
+  std::vector<Vec3> around(points.size(), Vec3::Zero());
+  for (const auto& t : triangles) {
+    const Vec3 normal = (points[t[1]] - points[t[0]]).cross(points[t[2]] - points[t[0]]);
+    for (const std::uint32_t v : t) around[v] += normal;
+  }
+  const auto as_triple = [](const Vec3& v) { return meshes::Vec3{v.x(), v.y(), v.z()}; };
+  const std::size_t rim = points.size() - gap.normals.size();
+  for (std::size_t i = 0; i < gap.normals.size(); ++i) {
+    const auto settled = meshes::settled_normal(as_triple(gap.normals[i]), meshes::unit(as_triple(around[rim + i])));
+    gap.normals[i] = Vec3(settled.data());
+  }
+}
+
 void append(const GapSurface& gap, const Base& base, Filling& out) {
   for (std::size_t i = 0; i < gap.positions.size(); ++i) {
     const Vec3 position = base.world(gap.positions[i]);
@@ -129,10 +145,11 @@ Filling fill_smooth(const std::vector<const Loop*>& loops) {
   std::vector<Vec2> plane = *outline;
   std::vector<double> scale = scale_of(rim);
   refine_triangles(plane, scale, filling.triangles, [&](std::uint32_t i, std::uint32_t j) { return rim.allows(i, j); });
-  const GapSurface gap = span_gap({rim, fits, quadric, attributes_of(loops, rim)}, plane, filling.triangles);
+  GapSurface gap = span_gap({rim, fits, quadric, attributes_of(loops, rim)}, plane, filling.triangles);
   std::vector<Vec3> points = rim.points;
   points.insert(points.end(), gap.positions.begin(), gap.positions.end());
   if (share_folded(rim, points, rim.normals, kMostFold, filling.triangles) > kMostUnfit) return refused(Verdict::bent);
+  settle_normals(points, filling.triangles, gap);
   append(gap, rim.base, filling);
   filling.verdict = Verdict::filled;
   return filling;

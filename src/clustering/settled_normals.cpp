@@ -1,7 +1,8 @@
 #include "clustering/settled_normals.h"
 
-#include <algorithm>
 #include <utility>
+
+#include "meshes/settled_normal.h"
 
 namespace lamina {
 
@@ -11,11 +12,8 @@ void NormalSettler::push(MeshSlab slab) {
   Held& last = held_.emplace_back();
   last.first = pushed_;
   last.triangles.resize(slab.vertices.size());
-  last.fans.resize(slab.vertices.size());
   pushed_ += static_cast<std::uint32_t>(slab.vertices.size());
   last.mesh = std::move(slab);
-  FanHashes none;
-  add_fans(last.mesh, last.first, last.fans, held_.size() > 1 ? held_.front().fans : none);
   add_triangles_of_last();
   if (held_.size() > kSettleReach) settle(held_.front());
 }
@@ -52,13 +50,10 @@ void NormalSettler::add_triangles_of_last() {
 
 void NormalSettler::settle(Held& slab) {
   VertexBatch& vertices = slab.mesh.vertices;
+  vertices.fitted.resize(vertices.size());
   for (std::size_t i = 0; i < vertices.size(); ++i) {
-    if (slab.fans[i] != 0) continue;
-    const Vec3 by_fit{vertices.nx[i], vertices.ny[i], vertices.nz[i]};
-    const Vec3 by_triangles = unit(slab.triangles[i]);
-    const Vec3 apart = by_fit - by_triangles;
-    const double doubt = dot(apart, apart) / (kDoubtfulAngle * kDoubtfulAngle);
-    const auto settled = to_float(unit(by_fit + std::min(doubt, kMostByTriangles) * by_triangles));
+    vertices.fitted[i] = {vertices.nx[i], vertices.ny[i], vertices.nz[i]};
+    const auto settled = to_float(settled_normal(to_double(vertices.fitted[i]), unit(slab.triangles[i])));
     vertices.nx[i] = settled[0];
     vertices.ny[i] = settled[1];
     vertices.nz[i] = settled[2];

@@ -7,7 +7,6 @@
 #include <deque>
 #include <vector>
 
-#include "meshes/fan_hashes.h"
 #include "meshes/mesh_slab.h"
 #include "meshes/vec3.h"
 
@@ -16,15 +15,8 @@ namespace lamina {
 /// Slabs below and above one on which its normals depend.
 inline constexpr int kSettleReach = 1;
 
-/// The normal of the triangles around a vertex, by area, counts as much as the fit's where the two are this far apart
-/// (radians, 7 degrees; their chord), less by the square of how much nearer they are: small differences are those of
-/// flat triangles on a round surface.
-inline constexpr double kDoubtfulAngle = 0.12;
-/// And no more than so many times as much: triangles are uneven, too.
-inline constexpr double kMostByTriangles = 3;
-
 /// Takes a streamed mesh slab by slab and gives it back, kSettleReach slabs later, its normals settled between the
-/// fit's and the triangles'. Where one of the two says nothing the other stands.
+/// fit's and the triangles' (meshes/settled_normal.h). Where one of the two says nothing the other stands.
 class NormalSettler {
  public:
   void push(MeshSlab slab);
@@ -37,7 +29,6 @@ class NormalSettler {
     MeshSlab mesh;
     std::uint32_t first = 0;              ///< number of its first vertex
     std::vector<meshes::Vec3> triangles;  ///< by vertex, the sum of the normals around, each as long as twice the area
-    FanHashes fans;
   };
 
   void add_triangles_of_last();

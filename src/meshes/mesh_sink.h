@@ -30,7 +30,13 @@ struct VertexBatch {
   std::vector<float> radius;    ///< local influence radius R; empty where it is of no interest; never written
   std::vector<float> density;   ///< samples, 1 / input unit^2, 0 where unknown; empty likewise; never written
   std::vector<float> overhang;  ///< by how much of R they reach beyond the samples; empty likewise; never written
+  /// The fit's normals, which say how the surface goes on beyond a rim, where nx, ny, nz are others; empty where these
+  /// are the fit's; never written.
+  std::vector<std::array<float, 3>> fitted;
   [[nodiscard]] std::size_t size() const { return x.size(); }
+  [[nodiscard]] std::array<float, 3> fitted_normal(std::size_t i) const {
+    return fitted.empty() ? std::array<float, 3>{nx[i], ny[i], nz[i]} : fitted[i];
+  }
 };
 
 struct MeshSinkSettings {

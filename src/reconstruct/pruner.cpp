@@ -21,7 +21,7 @@ void for_arrays(Vertices& v, Triangles& t, const Visit& visit) {
   all(v.x), all(v.y), all(v.z);
   all(v.nx), all(v.ny), all(v.nz);
   for (auto& values : v.attributes) all(values);
-  all(v.radius);
+  all(v.radius), all(v.fitted);
   all(t);
 }
 
@@ -30,6 +30,7 @@ void resize(VertexBatch& v, std::size_t n) {
   for (auto* values : {&v.nx, &v.ny, &v.nz}) values->resize(n);
   for (auto& values : v.attributes) values.resize(n);
   if (!v.radius.empty()) v.radius.resize(n);
+  if (!v.fitted.empty()) v.fitted.resize(n);
 }
 
 }  // namespace
@@ -224,6 +225,7 @@ void Pruner::spill(Slab& slab) {
   const std::size_t triangles = slab.triangles.size();
   const std::size_t attributes = slab.vertices.attributes.size();
   slab.radii = !slab.vertices.radius.empty();
+  slab.fitted = !slab.vertices.fitted.empty();
   slab.vertices = {};
   slab.vertices.attributes.resize(attributes);
   slab.triangles = Triangles();  // empty braces would keep the array
@@ -233,6 +235,7 @@ void Pruner::spill(Slab& slab) {
 void Pruner::fetch(Slab& slab) {
   resize(slab.vertices, slab.part.size());
   if (slab.radii) slab.vertices.radius.resize(slab.part.size());
+  if (slab.fitted) slab.vertices.fitted.resize(slab.part.size());
   slab.triangles.resize(slab.spilled_triangles);
   std::uint64_t at = file_->begin();
   for_arrays(slab.vertices, slab.triangles, [&](void* data, std::size_t bytes) {
@@ -276,6 +279,7 @@ void Pruner::pass_on(Slab& slab) {
     for (auto* values : {&v.nx, &v.ny, &v.nz}) (*values)[kept] = (*values)[i];
     for (auto& values : v.attributes) values[kept] = values[i];
     if (!v.radius.empty()) v.radius[kept] = v.radius[i];
+    if (!v.fitted.empty()) v.fitted[kept] = v.fitted[i];
     ++kept;
   }
   resize(v, kept);

@@ -68,7 +68,7 @@ class Pruner {
     std::uint64_t bytes = 0;  ///< of the arrays
     bool spilled = false;
     std::size_t spilled_triangles = 0;
-    bool radii = false;  ///< vertices have them
+    bool radii = false, fitted = false;  ///< vertices have them
   };
 
   [[nodiscard]] Part& part(std::uint64_t id) { return parts_[id - first_id_]; }

@@ -245,6 +245,21 @@ TEST(Fill, OfARimThatLeavesTheSurfaceHereAndThere) {
   EXPECT_EQ(fill_loop(loop, 100).verdict, Verdict::bent) << "two surfaces, a step apart";
 }
 
+TEST(Fill, NormalsFollowTheTrianglesWhereThoseOfTheRimAreWrong) {
+  constexpr double kTilt = 0.3;
+  Loop loop = sphere_loop(24, 0.3, 0.2);
+  for (BoundaryVertex& v : loop.vertices) {
+    v.position[2] = 1;
+    v.normal = {static_cast<float>(std::sin(kTilt)), 0, static_cast<float>(std::cos(kTilt))};
+  }
+  const Filling filling = fill_loop(loop, 100);
+  expect_disc(loop, filling);
+  ASSERT_GT(filling.positions.size(), 4U);
+  double mean = 0;
+  for (const auto& n : filling.normals) mean += static_cast<double>(n[2]) / static_cast<double>(filling.normals.size());
+  EXPECT_GT(mean, 0.99) << "the rim is flat, the cosine of its normals " << std::cos(kTilt);
+}
+
 TEST(Fill, HoleBesideARimIsToldFromOneInTheGap) {
   const Loop rim = sphere_loop(200, 0.5, 0.1);
   EXPECT_TRUE(lies_beside(sphere_loop(12, 0.45, 0.1), rim)) << "a ring along it";

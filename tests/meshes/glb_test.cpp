@@ -140,7 +140,8 @@ TEST(Glb, OneOutputThatFailsLeavesTheOthers) {
                         .attributes = {},
                         .radius = {},
                         .density = {},
-                        .overhang = {}});
+                        .overhang = {},
+                        .fitted = {}});
   sink.append_triangles({{0, 1, 2}});
   std::filesystem::remove(gone);
   expect_error(ExitCode::budget, [&] { sink.commit(); }, {"m.glb"});
