@@ -27,20 +27,37 @@ void LocalSamples::reserve(std::size_t n) {
 
 namespace {
 
-template <class T>
-void compact(std::vector<T>& values, const std::vector<bool>& keep) {
-  if (values.empty()) return;
-  std::size_t n = 0;
-  for (std::size_t i = 0; i < keep.size(); ++i) {
-    if (keep[i]) values[n++] = values[i];
+/// Of samples, [begin, end).
+struct KeptRun {
+  std::ptrdiff_t begin, end;
+};
+
+/// Few samples are left out: the others are moved run by run, and not asked about one by one for each array.
+std::vector<KeptRun> runs_of(const std::vector<bool>& keep) {
+  std::vector<KeptRun> runs;
+  auto at = keep.begin();
+  while ((at = std::find(at, keep.end(), true)) != keep.end()) {
+    const auto end = std::find(at, keep.end(), false);
+    runs.push_back({at - keep.begin(), end - keep.begin()});
+    at = end;
   }
-  values.resize(n);
+  return runs;
 }
 
 void compact(LocalSamples& s, const std::vector<bool>& keep) {
-  for (auto* v : {&s.x, &s.y, &s.z}) compact(*v, keep);
-  for (auto* v : {&s.nx, &s.ny, &s.nz, &s.radius, &s.quality}) compact(*v, keep);
-  for (auto& v : s.attributes) compact(v, keep);
+  const std::vector<KeptRun> runs = runs_of(keep);
+  const auto move_up = [&](auto& values) {
+    if (values.empty()) return;
+    auto out = values.begin();
+    for (const KeptRun& run : runs) {
+      const auto first = values.begin() + run.begin, last = values.begin() + run.end;
+      out = out == first ? last : std::copy(first, last, out);
+    }
+    values.erase(out, values.end());
+  };
+  for (auto* v : {&s.x, &s.y, &s.z}) move_up(*v);
+  for (auto* v : {&s.nx, &s.ny, &s.nz, &s.radius, &s.quality}) move_up(*v);
+  for (auto& v : s.attributes) move_up(v);
 }
 
 }  // namespace
