@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numeric>
 #include <utility>
 
 #include "lamina/error.h"
@@ -67,33 +68,34 @@ void Pruner::join(std::uint64_t a, std::uint64_t b) {
 /// Every vertex begins as a part of its own among the slab's; these are then counted through.
 void Pruner::find_parts(Slab& slab) {
   const auto n = static_cast<std::uint32_t>(slab.vertices.size());
-  const auto require = [](bool ok) {
-    if (!ok) throw Error(ExitCode::internal, "a triangle names a vertex of none of the last two slabs");
-  };
   // Parts of the slab's own triangles first, then what the slab before joins.
   std::vector<std::uint32_t> parent(n);
-  for (std::uint32_t i = 0; i < n; ++i) parent[i] = i;
+  std::iota(parent.begin(), parent.end(), 0U);
   const auto find = [&](std::uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
+    i = parent[parent[i]];  // nearly always there
+    while (parent[i] != i) i = parent[i];
     return i;
   };
   for (const auto& t : slab.triangles) {
-    std::uint32_t own = kGone;
-    for (const std::uint32_t v : t) {
-      require(v >= live_first_ && v < vertices_);
-      if (v < slab.first) continue;
-      const std::uint32_t here = find(static_cast<std::uint32_t>(v - slab.first));
-      if (own == kGone || own == here) {
-        own = here;
-        continue;
-      }
-      parent[std::max(own, here)] = std::min(own, here);
-      own = std::min(own, here);
+    const auto [least, most] = std::minmax({t[0], t[1], t[2]});
+    if (least < live_first_ || most >= vertices_)
+      throw Error(ExitCode::internal, "a triangle names a vertex of none of the last two slabs");
+    if (most < slab.first) continue;
+    // One of the slab before counts as one of the slab's own here. All of them are led to one root, whether or not they
+    // were before: chance decides.
+    std::array<std::uint32_t, 3> own{}, root{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      own[k] = static_cast<std::uint32_t>((t[k] < slab.first ? most : t[k]) - slab.first);
+      root[k] = find(own[k]);
     }
+    const std::uint32_t first = std::min({root[0], root[1], root[2]});
+    for (std::size_t k = 0; k < 3; ++k) parent[root[k]] = parent[own[k]] = first;
   }
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   slab.first_part = first_id_ + parts_.size();
   slab.part.assign(n, 0);
+  Part* part_here = nullptr;
+  std::uint32_t root_here = kGone;
   for (std::uint32_t i = 0; i < n; ++i) {
     const std::uint32_t r = find(i);
     if (r == i) {
@@ -103,25 +105,42 @@ void Pruner::find_parts(Slab& slab) {
     } else {
       slab.part[i] = slab.part[r];  // the least vertex of a part is its root
     }
-    Part& p = part(slab.first_part + slab.part[i]);
+    if (r != root_here) {
+      root_here = r;
+      part_here = &part(slab.first_part + slab.part[i]);
+    }
     const std::array<double, 3> at{slab.vertices.x[i], slab.vertices.y[i], slab.vertices.z[i]};
     for (std::size_t k = 0; k < 3; ++k) {
-      p.low[k] = std::min(p.low[k], at[k]);
-      p.high[k] = std::max(p.high[k], at[k]);
+      part_here->low[k] = std::min(part_here->low[k], at[k]);
+      part_here->high[k] = std::max(part_here->high[k], at[k]);
     }
   }
   slab.end_part = first_id_ + parts_.size();
+  count_triangles(slab);
+}
+
+/// Each of them joins the parts of its vertices.
+void Pruner::count_triangles(const Slab& slab) {
+  // Of the vertices of the slab before and of this one, counted from live_first_part_.
+  std::vector<std::uint32_t> part_of = live_part_;
+  part_of.reserve(live_part_.size() + slab.part.size());
+  const auto own = static_cast<std::uint32_t>(slab.first_part - live_first_part_);
+  for (const std::uint32_t p : slab.part) part_of.push_back(own + p);
+  Part* root_here = nullptr;  // of this part, until parts are joined
+  std::uint32_t part_here = kGone;
   for (const auto& t : slab.triangles) {
-    const auto of = [&](std::uint32_t v) {
-      return v >= slab.first ? slab.first_part + slab.part[v - slab.first]
-                             : live_first_part_ + live_part_[v - live_first_];
-    };
-    for (std::size_t k = 1; k < 3; ++k) {
-      if (of(t[k]) != of(t[0])) join(of(t[k]), of(t[0]));
+    std::array<std::uint32_t, 3> of{};
+    for (std::size_t k = 0; k < 3; ++k) of[k] = part_of[t[k] - live_first_];
+    if (of[1] != of[0] || of[2] != of[0]) {
+      for (const std::size_t k : {1, 2}) join(live_first_part_ + of[k], live_first_part_ + of[0]);
+      part_here = kGone;
     }
-    Part& p = part(root(of(t[0])));
-    ++p.triangles;
-    if (rule_.samples > 0) p.samples += samples_under(slab, t);
+    if (of[0] != part_here) {
+      part_here = of[0];
+      root_here = &part(root(live_first_part_ + part_here));
+    }
+    ++root_here->triangles;
+    if (rule_.samples > 0) root_here->samples += samples_under(slab, t);
   }
 }
 

@@ -76,6 +76,7 @@ class Pruner {
   void join(std::uint64_t a, std::uint64_t b);
   [[nodiscard]] double samples_under(const Slab& slab, const std::array<std::uint32_t, 3>& triangle) const;
   void find_parts(Slab& slab);
+  void count_triangles(const Slab& slab);
   void end_part(std::uint64_t id);
   void end_parts(const Slab& live, std::uint64_t from);
   void judge(Part& part) const;
