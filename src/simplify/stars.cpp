@@ -1,6 +1,7 @@
 #include "simplify/stars.h"
 
 #include <algorithm>
+#include <cstring>
 #include <utility>
 
 namespace lamina::simplify {
@@ -10,8 +11,9 @@ using namespace meshes;
 
 constexpr float kLeastCosine = 0.2F;  ///< a triangle turns no farther at one contraction
 
-using Lanes = Moves::Lanes;
-using Triple = Moves::Triple;
+constexpr std::size_t kLanes = 4;
+using Lanes = float __attribute__((vector_size(4 * kLanes)));
+using Triple = std::array<Lanes, 3>;
 
 Triple less(const Triple& a, const Triple& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
@@ -21,6 +23,23 @@ Lanes times(const Triple& a, const Triple& b) {
 }
 Triple across(const Triple& a, const Triple& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+/// Four triangles p, q and one corner more, that moves from `from` to the origin. A triangle's quality goes by four
+/// times its squared area over the square of the sum of its squared sides: 1/12 where it is equilateral, 0 where it has
+/// no area.
+bool keep(const Triple& from, const Triple& p, const Triple& q, float sliver2) {
+  const Triple from_p = less(p, from), from_q = less(q, from), base = less(q, p);
+  const Triple before = across(from_p, from_q), after = across(p, q);
+  const Lanes along = times(before, after), was = times(before, before), is = times(after, after);
+  const Lanes side = times(base, base);
+  const Lanes was_sides = times(from_p, from_p) + times(from_q, from_q) + side;
+  const Lanes is_sides = times(p, p) + times(q, q) + side;
+  const auto same_side = (along > 0) & (along * along > kLeastCosine * kLeastCosine * was * is);
+  const auto good = 12 * is >= sliver2 * is_sides * is_sides;
+  const auto no_worse = is * was_sides * was_sides >= was * is_sides * is_sides;
+  const auto kept = same_side & (good | no_worse);
+  return (kept[0] & kept[1] & kept[2] & kept[3]) != 0;
 }
 
 }  // namespace
@@ -133,37 +152,47 @@ bool Stars::contractible(std::uint32_t u, std::uint32_t v) {
 
 void Stars::drop(std::uint32_t vertex, std::uint32_t triangle) {
   Run& run = star_[vertex];
-  std::uint32_t* const begin = runs_.data() + run.begin;
-  std::uint32_t* const end = begin + run.size--;
-  std::uint32_t* const place = std::find(begin, end, triangle);
-  std::copy(place + 1, end, place);
+  std::uint32_t* out = runs_.data() + run.begin;
+  for (const std::uint32_t here : around(vertex)) {
+    *out = here;
+    out += static_cast<std::ptrdiff_t>(here != triangle);
+  }
+  --run.size;
 }
 
+/// A contractible edge has two triangles at most. Which of those around it they are is not asked by branches.
 int Stars::contract(std::uint32_t u, std::uint32_t v) {
-  int gone = 0;
-  const auto begin = static_cast<std::uint32_t>(runs_.size());
-  for (const std::uint32_t vertex : {u, v}) {
-    const Run run = star_[vertex];
-    for (std::uint32_t i = run.begin; i < run.begin + run.size; ++i) {
-      const std::uint32_t triangle = runs_[i];
-      Triangle& t = triangles_[triangle];
-      if (t[0] == kNone) continue;
-      if (names(t, u) && names(t, v)) {
-        for (const std::uint32_t w : t) {
-          if (w != u && w != v) drop(w, triangle);
-        }
-        t[0] = kNone;
-        ++gone;
-        continue;
-      }
-      t[corner_of(t, vertex)] = u;
-      runs_.push_back(triangle);
-    }
+  std::array<std::uint32_t, 3> going{};  // and room for one that does not
+  std::size_t gone = 0;
+  const Run of_u = star_[u], of_v = star_[v];
+  const std::size_t begin = runs_.size();
+  runs_.resize(begin + of_u.size + of_v.size);
+  std::uint32_t* out = runs_.data() + begin;
+  for (const std::uint32_t triangle : around(u)) {
+    const auto goes = static_cast<std::size_t>(names(triangles_[triangle], v));
+    *out = going[gone] = triangle;
+    out += 1 - goes;
+    gone += goes;
   }
-  star_[u] = {begin, static_cast<std::uint32_t>(runs_.size()) - begin};
+  for (const std::uint32_t triangle : around(v)) {
+    Triangle& t = triangles_[triangle];
+    const auto goes = static_cast<std::ptrdiff_t>(names(t, u));
+    t[corner_of(t, v)] = goes != 0 ? v : u;
+    *out = triangle;
+    out += 1 - goes;
+  }
+  for (std::size_t i = 0; i < gone; ++i) {
+    Triangle& t = triangles_[going[i]];
+    for (const std::uint32_t w : t) {
+      if (w != u && w != v) drop(w, going[i]);
+    }
+    t[0] = kNone;
+  }
+  runs_.resize(static_cast<std::size_t>(out - runs_.data()));
+  star_[u] = {static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(runs_.size() - begin)};
   star_[v] = {};
   boundary_[u] = boundary_[u] | boundary_[v];
-  return gone;
+  return static_cast<int>(gone);
 }
 
 Stars::Before Stars::before(std::uint32_t u, std::uint32_t v) const {
@@ -201,22 +230,23 @@ Moves::Moves(const Vec3& to, const Vec3& a, const Vec3& b, double sliver)
   if (length > 0) scale_ = 1 / length;
 }
 
-/// A triangle's quality goes by four times its squared area over the square of the sum of its squared sides: 1/12 where
-/// it is equilateral, 0 where it has no area.
-bool Moves::keep() {
+bool Moves::allowed() {
+  const std::size_t whole = (size_ + kLanes - 1) / kLanes * kLanes;
+  for (std::size_t lane = size_; lane < whole; ++lane) {
+    for (auto& corner : corners_) {
+      for (Axis& axis : corner) axis[lane] = axis[0];
+    }
+  }
   size_ = 0;
-  const auto& [from, p, q] = corners_;
-  const Triple from_p = less(p, from), from_q = less(q, from), base = less(q, p);
-  const Triple before = across(from_p, from_q), after = across(p, q);
-  const Lanes along = times(before, after), was = times(before, before), is = times(after, after);
-  const Lanes side = times(base, base);
-  const Lanes was_sides = times(from_p, from_p) + times(from_q, from_q) + side;
-  const Lanes is_sides = times(p, p) + times(q, q) + side;
-  const auto same_side = (along > 0) & (along * along > kLeastCosine * kLeastCosine * was * is);
-  const auto good = 12 * is >= sliver2_ * is_sides * is_sides;
-  const auto no_worse = is * was_sides * was_sides >= was * is_sides * is_sides;
-  const auto kept = same_side & (good | no_worse);
-  return (kept[0] & kept[1] & kept[2] & kept[3]) != 0;
+  for (std::size_t lane = 0; lane < whole; lane += kLanes) {
+    const auto corner = [&](std::size_t which) {
+      Triple at;
+      for (std::size_t k = 0; k < 3; ++k) std::memcpy(&at[k], &corners_[which][k][lane], sizeof(Lanes));
+      return at;
+    };
+    if (!keep(corner(0), corner(1), corner(2), sliver2_)) return false;
+  }
+  return true;
 }
 
 }  // namespace lamina::simplify

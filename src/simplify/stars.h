@@ -15,12 +15,15 @@ using Triangle = std::array<std::uint32_t, 3>;
 
 constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
+// Without branches: which corner it is is chance.
+
 /// The corner that names `vertex`, which is one of them.
 inline std::size_t corner_of(const Triangle& t, std::uint32_t vertex) {
-  return t[0] == vertex ? 0 : t[1] == vertex ? 1 : 2;
+  return static_cast<std::size_t>(t[1] == vertex) + 2 * static_cast<std::size_t>(t[2] == vertex);
 }
 inline bool names(const Triangle& t, std::uint32_t vertex) {
-  return t[0] == vertex || t[1] == vertex || t[2] == vertex;
+  return (static_cast<unsigned>(t[0] == vertex) | static_cast<unsigned>(t[1] == vertex) |
+          static_cast<unsigned>(t[2] == vertex)) != 0;
 }
 
 /// A triangle's side from corner k to the next is the (3 number + k)th. The same side of another one of `around`, the
@@ -116,41 +119,33 @@ constexpr double kSliver = 0.05;  ///< no contraction makes triangles worse than
 /// Four at a time, in floats, in lengths of the edge from a to b.
 class Moves {
  public:
-  static constexpr std::size_t kLanes = 4;
-  using Lanes = float __attribute__((vector_size(4 * kLanes)));
-  using Triple = std::array<Lanes, 3>;
-
   Moves(const meshes::Vec3& to, const meshes::Vec3& a, const meshes::Vec3& b, double sliver);
 
-  /// One with corners p and q, whose third moves from `from` to the place of all. False: no other need be added.
-  bool add(const meshes::Vec3& from, const meshes::Vec3& p, const meshes::Vec3& q) {
+  /// One with corners p and q, whose third moves from `from` to the place of all; `counts`: or none, told without a
+  /// branch. False: no other need be added.
+  bool add(const meshes::Vec3& from, const meshes::Vec3& p, const meshes::Vec3& q, bool counts) {
     put(from, 0);
     put(p, 1);
     put(q, 2);
-    return ++size_ < kLanes || keep();
+    size_ += static_cast<std::size_t>(counts);
+    return size_ < kRoom || allowed();
   }
-  /// All are there.
-  [[nodiscard]] bool allowed() {
-    if (size_ == 0) return true;
-    for (std::size_t lane = size_; lane < kLanes; ++lane) {
-      for (auto& corner : corners_) {
-        for (Lanes& axis : corner) axis[lane] = axis[0];
-      }
-    }
-    return keep();
-  }
+  /// Those that were added since this was asked.
+  [[nodiscard]] bool allowed();
 
  private:
+  static constexpr std::size_t kRoom = 16;  ///< of most edges all that stay
+  using Axis = std::array<float, kRoom>;
+
   void put(const meshes::Vec3& at, std::size_t corner) {
     for (std::size_t k = 0; k < 3; ++k) corners_[corner][k][size_] = static_cast<float>(scale_ * (at[k] - to_[k]));
   }
-  bool keep();
 
   meshes::Vec3 to_;
   double scale_;
   float sliver2_;
   std::size_t size_ = 0;
-  std::array<Triple, 3> corners_{};  ///< where the third was, and the others
+  std::array<std::array<Axis, 3>, 3> corners_;  ///< where the third was, and the others
 };
 
 /// Do the triangles that stay allow that u and v become one vertex at `to`? `place(vertex)`: where it is.
@@ -162,9 +157,8 @@ bool keeps_shape(const Stars& stars, const Place& place, std::uint32_t u, std::u
     const meshes::Vec3& from = place(vertex);
     for (const std::uint32_t triangle : stars.around(vertex)) {
       const Triangle& t = stars.triangles()[triangle];
-      if (names(t, other)) continue;
       const std::size_t k = corner_of(t, vertex);
-      if (!moves.add(from, place(t[(k + 1) % 3]), place(t[(k + 2) % 3]))) return false;
+      if (!moves.add(from, place(t[(k + 1) % 3]), place(t[(k + 2) % 3]), !names(t, other))) return false;
     }
   }
   return moves.allowed();
