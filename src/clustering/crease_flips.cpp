@@ -26,31 +26,32 @@ Edge sorted(std::uint32_t a, std::uint32_t b) {
 /// nothing.
 class EndsOf {
  public:
-  explicit EndsOf(const std::vector<Edge>& edges) {
-    if (edges.empty()) return;
+  /// One edge or more.
+  explicit EndsOf(const std::vector<Edge>& edges) : first_(edges.front()[0]) {
     std::uint32_t last = 0;
-    first_ = edges.front()[0];
     for (const Edge& e : edges) {
       first_ = std::min(first_, e[0]);
       last = std::max(last, e[1]);
     }
-    count_ = last - first_ + 1;
-    bits_.assign(count_ / 64 + 1, 0);
+    words_ = (last - first_) / 64 + 1;
+    bits_.assign(words_ + 1, 0);
     for (const Edge& e : edges) {
       for (const std::uint32_t v : e) bits_[(v - first_) / 64] |= std::uint64_t{1} << ((v - first_) % 64);
     }
   }
-  /// How many of a triangle's vertices are.
-  [[nodiscard]] unsigned among(const std::array<std::uint32_t, 3>& t) const { return is(t[0]) + is(t[1]) + is(t[2]); }
+  /// Which of a triangle's vertices are, a bit each.
+  [[nodiscard]] unsigned among(const std::array<std::uint32_t, 3>& t) const {
+    return is(t[0]) | is(t[1]) << 1U | is(t[2]) << 2U;
+  }
 
  private:
   [[nodiscard]] unsigned is(std::uint32_t vertex) const {
     const std::uint32_t at = vertex - first_;  // of one before the first: a large number
-    return at < count_ ? static_cast<unsigned>(bits_[at / 64] >> (at % 64) & 1U) : 0U;
+    return static_cast<unsigned>(bits_[std::min(at / 64, words_)] >> (at % 64) & 1U);
   }
 
-  std::uint32_t first_ = 0, count_ = 0;
-  std::vector<std::uint64_t> bits_;
+  std::uint32_t first_, words_ = 0;
+  std::vector<std::uint64_t> bits_;  ///< and a word of none, for vertices that are far off
 };
 
 }  // namespace
@@ -101,20 +102,15 @@ bool CreaseFlips::pop(MeshSlab& out) {
 }
 
 std::size_t CreaseFlips::slab_of(std::uint32_t vertex) const {
-  const auto after =
-      std::partition_point(held_.begin(), held_.end(), [vertex](const Held& h) { return h.first <= vertex; });
-  return static_cast<std::size_t>(after - held_.begin()) - 1;
+  std::size_t slab = 0;
+  for (std::size_t i = 1; i < held_.size(); ++i) slab += static_cast<std::size_t>(held_[i].first <= vertex);
+  return slab;
 }
 
-Vec3 CreaseFlips::position(std::uint32_t vertex) const {
-  const Held& held = held_[slab_of(vertex)];
+Vec3 CreaseFlips::position_in(const Held& held, std::uint32_t vertex) {
   const VertexBatch& of = held.mesh.vertices;
   const std::uint32_t i = vertex - held.first;
   return {of.x[i], of.y[i], of.z[i]};
-}
-
-Vec3 CreaseFlips::normal(std::uint32_t vertex) const {
-  return normal_in(held_[slab_of(vertex)], vertex);
 }
 
 Vec3 CreaseFlips::normal_in(const Held& held, std::uint32_t vertex) {
@@ -174,14 +170,16 @@ void CreaseFlips::want(const BentSide& one, const BentSide& other, const std::ar
             0};
   if (!one.ascending) std::swap(flip.from, flip.to);
   // A slab's triangles name its vertices and those of the one before.
-  const auto fits = [&](std::uint32_t end) {
-    const auto [low, high] = std::minmax({slab_of(end), slab_of(flip.left), slab_of(flip.right)});
+  const std::size_t from_slab = slab_of(flip.from), to_slab = slab_of(flip.to);
+  const std::size_t left_slab = slab_of(flip.left), right_slab = slab_of(flip.right);
+  const auto fits = [&](std::size_t end) {
+    const auto [low, high] = std::minmax({end, left_slab, right_slab});
     return high - low <= 1;
   };
-  if (!fits(flip.from) || !fits(flip.to)) return;
-  const Vec3 from = position(flip.from), to = position(flip.to);
-  const Vec3 left = position(flip.left), right = position(flip.right);
-  const Vec3 from_normal = normal(flip.from), to_normal = normal(flip.to);
+  if (!fits(from_slab) || !fits(to_slab)) return;
+  const Vec3 from = position_in(held_[from_slab], flip.from), to = position_in(held_[to_slab], flip.to);
+  const Vec3 left = position_in(held_[left_slab], flip.left), right = position_in(held_[right_slab], flip.right);
+  const Vec3 from_normal = normal_in(held_[from_slab], flip.from), to_normal = normal_in(held_[to_slab], flip.to);
   const double after = std::min(dot(unit(area_normal(from, right, left)), from_normal),
                                 dot(unit(area_normal(right, to, left)), to_normal));
   if (after < kInSheet) return;
@@ -223,6 +221,7 @@ std::vector<const CreaseFlips::Flip*> CreaseFlips::first_of_their_triangles(std:
 
 /// An edge of more than two triangles would be left by those that make one which is there.
 void CreaseFlips::drop_known_edges(std::size_t slab, std::vector<const Flip*>& flips) const {
+  if (flips.empty()) return;
   std::vector<Edge> made;
   made.reserve(flips.size());
   for (const Flip* f : flips) made.push_back(f->made());
@@ -232,9 +231,12 @@ void CreaseFlips::drop_known_edges(std::size_t slab, std::vector<const Flip*>& f
   const std::size_t place = slab - gone_;
   for (std::size_t i = place > 0 ? place - 1 : 0; i < std::min(place + 2, held_.size()); ++i) {
     for (const Triangle& t : held_[i].mesh.triangles) {
-      if (ends.among(t) < 2) continue;
+      const unsigned among = ends.among(t);
+      if ((among & (among - 1)) == 0) continue;  // one or none
       for (std::size_t k = 0; k < 3; ++k) {
-        const Edge edge = sorted(t[k], t[(k + 1) % 3]);
+        const std::size_t next = (k + 1) % 3;
+        if ((among >> k & among >> next & 1U) == 0) continue;
+        const Edge edge = sorted(t[k], t[next]);
         if (std::binary_search(made.begin(), made.end(), edge)) known.push_back(edge);
       }
     }

@@ -66,8 +66,7 @@ class CreaseFlips {
 
   [[nodiscard]] Held& at(std::size_t slab) { return held_[slab - gone_]; }
   [[nodiscard]] std::size_t slab_of(std::uint32_t vertex) const;  ///< its place in held_
-  [[nodiscard]] meshes::Vec3 position(std::uint32_t vertex) const;
-  [[nodiscard]] meshes::Vec3 normal(std::uint32_t vertex) const;
+  [[nodiscard]] static meshes::Vec3 position_in(const Held& held, std::uint32_t vertex);
   [[nodiscard]] static meshes::Vec3 normal_in(const Held& held, std::uint32_t vertex);
   void find_bent(Held& here) const;
   void find_wanted(std::size_t slab);
