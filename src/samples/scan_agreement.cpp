@@ -94,11 +94,15 @@ void ScanAgreement::fill_cells() {
 
 void ScanAgreement::add(const OrientedPoint& sample, std::size_t scan) {
   const Eigen::Vector3d c = (sample.at * inverse_cell_).array().floor();
-  const auto cell = cells_.find(
-      {static_cast<std::int64_t>(c.x()), static_cast<std::int64_t>(c.y()), static_cast<std::int64_t>(c.z())});
-  if (cell == cells_.end()) return;
+  const Cell cell{static_cast<std::int64_t>(c.x()), static_cast<std::int64_t>(c.y()), static_cast<std::int64_t>(c.z())};
+  if (cell != last_cell_) {  // seldom: a scan's samples come in rows
+    const auto found = cells_.find(cell);
+    reaching_ = found == cells_.end() ? nullptr : &found->second;
+    last_cell_ = cell;
+  }
+  if (reaching_ == nullptr) return;
   constexpr double kFacing = 0.5;
-  for (const std::uint32_t i : cell->second) {
+  for (const std::uint32_t i : *reaching_) {
     Place& place = places_[i];
     const Eigen::Vector3d from = sample.at - place.at;
     const double near = 1 - from.squaredNorm() / (place.radius * place.radius);

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -96,6 +97,9 @@ class ScanAgreement {
   double radius_ = 0;
   double inverse_cell_ = 1;
   std::unordered_map<Cell, std::vector<std::uint32_t>, CellHash> cells_;  ///< places that reach into each
+  static constexpr std::int64_t kNowhere = std::numeric_limits<std::int64_t>::min();
+  Cell last_cell_{kNowhere, kNowhere, kNowhere};          ///< of the last sample
+  const std::vector<std::uint32_t>* reaching_ = nullptr;  ///< the places of that, if any
 };
 
 }  // namespace lamina
