@@ -1,6 +1,7 @@
 #include "boundary/fill.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -61,9 +62,8 @@ class Evening {
   void run() {
     for (int pass = 0; pass < kEveningPasses; ++pass) {
       find_wanted();
-      split_long();
-      contract_short();
-      flip();
+      const bool split = split_long(), contracted = contract_short(), flipped = flip();
+      if (!split && !contracted && !flipped) return;
     }
   }
 
@@ -117,7 +117,9 @@ class Evening {
     return 0.5 * (wanted(mesh_.from_vertex_handle(h)) + wanted(mesh_.to_vertex_handle(h)));
   }
 
-  void split_long() {
+  // Each tells whether it has changed anything.
+
+  bool split_long() {
     const std::size_t edges = mesh_.n_edges();
     const std::size_t most = kMostPerRimVertex * (rim_ + 16);
     for (std::size_t e = 0; e < edges && mesh_.n_vertices() < most; ++e) {
@@ -128,6 +130,7 @@ class Evening {
       wanted_.push_back(wanted_at(h));
       mesh_.split(edge, mesh_.add_vertex(mesh_.calc_edge_midpoint(edge)));
     }
+    return mesh_.n_edges() > edges;
   }
 
   /// Whether the edges that `gone` leaves to `stays` would be no longer than wanted.
@@ -138,7 +141,8 @@ class Evening {
     return true;
   }
 
-  void contract_short() {
+  bool contract_short() {
+    bool any = false;
     const std::size_t edges = mesh_.n_edges();
     for (std::size_t e = 0; e < edges; ++e) {
       const EdgeHandle edge(static_cast<int>(e));
@@ -146,11 +150,22 @@ class Evening {
       const HalfedgeHandle h = mesh_.halfedge_handle(edge, 0);
       const VertexHandle gone = mesh_.from_vertex_handle(h), stays = mesh_.to_vertex_handle(h);
       if (is_rim(gone) || is_rim(stays) || mesh_.calc_edge_length(edge) >= kShortestEdge * wanted_at(h)) continue;
-      if (mesh_.is_collapse_ok(h) && keeps_lengths(gone, stays)) mesh_.collapse(h);
+      if (!mesh_.is_collapse_ok(h) || !keeps_lengths(gone, stays)) continue;
+      mesh_.collapse(h);
+      any = true;
     }
-    // The rim's vertices come first and none of them goes: they keep their numbers.
-    mesh_.garbage_collection();
-    find_wanted();
+    if (any) forget_collapsed();
+    return any;
+  }
+
+  /// The rim's vertices come first and none of them goes: they keep their numbers.
+  void forget_collapsed() {
+    // With handles to be kept up to date, none here, this is compiled with the program; what OpenMesh's library holds
+    // may make a string for every element, to check its type.
+    std::array<VertexHandle*, 0> vertices{};
+    std::array<HalfedgeHandle*, 0> halfedges{};
+    std::array<OpenMesh::FaceHandle*, 0> faces{};
+    mesh_.garbage_collection(vertices, halfedges, faces);
   }
 
   [[nodiscard]] double cotangent_at(VertexHandle a, VertexHandle b, VertexHandle c) const {
@@ -158,7 +173,8 @@ class Evening {
     return (u | v) / std::max((u % v).norm(), 1e-12 * u.norm() * v.norm() + std::numeric_limits<double>::min());
   }
 
-  void flip() {
+  bool flip() {
+    bool ever = false;
     for (int pass = 0; pass < kFlippingPasses; ++pass) {
       bool any = false;
       for (const auto edge : mesh_.edges()) {
@@ -172,8 +188,10 @@ class Evening {
         mesh_.flip(edge);
         any = true;
       }
-      if (!any) return;
+      if (!any) break;
+      ever = true;
     }
+    return ever;
   }
 
   std::size_t rim_;
