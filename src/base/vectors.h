@@ -4,8 +4,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
+
+#include "base/nth_value.h"
 
 namespace lamina {
 
@@ -37,10 +40,8 @@ std::pair<T, T> least_and_greatest(const std::vector<T>& values) {
 template <typename T>
 T quantile_of(std::vector<T>& values, double share) {
   if (values.empty()) return T{};
-  const auto place = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size()));
-  const auto value = values.begin() + std::min(place, static_cast<std::ptrdiff_t>(values.size()) - 1);
-  std::nth_element(values.begin(), value, values.end());
-  return *value;
+  const auto place = static_cast<std::size_t>(share * static_cast<double>(values.size()));
+  return nth_value(std::span<T>(values), std::min(place, values.size() - 1));
 }
 
 template <typename T>

@@ -12,9 +12,11 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
+#include "base/nth_value.h"
 #include "base/vectors.h"
 #include "samples/all_round.h"
 #include "samples/bucket_runs.h"
@@ -186,10 +188,9 @@ std::optional<Trial> try_disks(const SeedNeighbourhoods& of, std::size_t seed, d
   if (found.size() < kCounted) return std::nullopt;
   // Two spacings, of samples spread evenly over the disk that just holds so many.
   sorted = squared;
-  const auto last = sorted.begin() + (kCounted - 1);
-  std::nth_element(sorted.begin(), last, sorted.end());
+  const float last = nth_value(std::span(sorted), kCounted - 1);
   const float radius =
-      given > 0 ? static_cast<float>(given) : 2 * std::sqrt(std::numbers::pi_v<float> / kCounted * *last);
+      given > 0 ? static_cast<float>(given) : 2 * std::sqrt(std::numbers::pi_v<float> / kCounted * last);
   if (!(radius > 0)) return std::nullopt;
   constexpr float kAxisReach = 2.5F;
   constexpr float kFarthest = 2 * kMostAround * kMostAround;  // squared: a disk is no thicker than it is wide
