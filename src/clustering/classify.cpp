@@ -209,7 +209,7 @@ void classify(Window& window, std::int64_t slab) {
 
 void decide(Window& window, std::int64_t slab) {
   SlabRecord& here = window.at(slab);
-  for (std::size_t c = 0; c < here.corners.size(); ++c) {
+  for (std::size_t c = 0; c < here.verdicts.size(); ++c) {
     if (here.vetoes[c] != 0 && here.verdicts[c] == Verdict::corner) here.verdicts[c] = Verdict::kept;
   }
   for_unresolved(here, [&](UnresolvedCluster& cluster, ResolveScratch& scratch) {

@@ -24,10 +24,10 @@ struct Clusterer::Impl {
   bool begun = false, ended = false;
 
   void advance(std::shared_ptr<const IsoSlab> iso);
-  void decide(std::int64_t slab);
+  void classify(std::int64_t slab);
 };
 
-void Clusterer::Impl::decide(std::int64_t slab) {
+void Clusterer::Impl::classify(std::int64_t slab) {
   switch (settings.mode) {
     case ClusterMode::none:
       return;
@@ -39,7 +39,7 @@ void Clusterer::Impl::decide(std::int64_t slab) {
       return;
     }
     case ClusterMode::preserving:
-      return clustering::decide(window, slab);
+      return clustering::classify(window, slab);
   }
 }
 
@@ -47,12 +47,14 @@ void Clusterer::Impl::advance(std::shared_ptr<const IsoSlab> iso) {
   const std::int64_t slab = iso->slab;
   // Five records are read: the one before them gives the new one its storage.
   if (slab - 5 >= first) std::swap(window.at(slab), window.at(slab - 5));
+  // Corners' notes are read in two.
+  if (slab - 2 >= first) std::swap(window.at(slab).corners, window.at(slab - 2).corners);
   clustering::lay_out(window.at(slab), std::move(iso));
   if (slab - 1 < first) return;
   clustering::count_triangles(window, slab - 1, settings.mode);
-  if (settings.mode == ClusterMode::preserving) clustering::classify(window, slab - 1);
+  classify(slab - 1);
   if (slab - 2 < first) return;
-  decide(slab - 2);
+  if (settings.mode == ClusterMode::preserving) clustering::decide(window, slab - 2);
   if (slab - 3 < first) return;
   FinalSlab out = std::move(spare);
   clustering::number(window, slab - 3, next_number, out, counts);

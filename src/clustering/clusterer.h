@@ -20,18 +20,19 @@ struct FinalVertex {
   enum class Kind : std::uint8_t {
     isovertex,  ///< an isovertex that stayed: on its edge, interpolated between `corner` (low) and `other` (high) at t
     corner,     ///< a collapsed component: at the projected point of `corner`
-    patch,  ///< one of several collapsed components of a corner: quadric placement `position`; attributes of `corner`
+    patch,      ///< one of several collapsed components of a corner: quadric placement; attributes of `corner`
   };
   Kind kind = Kind::isovertex;
-  SlabIndex corner, other;  ///< relative to FinalSlab::slab
+  SlabIndex corner;  ///< relative to FinalSlab::slab
+  SlabIndex other;   ///< relative to FinalSlab::slab; of a patch its place in FinalSlab::patches
   float t = 0;
-  std::array<float, 3> position{};  ///< patch: offset from `corner`'s position, in steps
 };
 
 /// A finished slab: vertices are numbered globally in order of slabs; triangles index globally.
 struct FinalSlab {
   std::int64_t slab = 0;
   std::vector<FinalVertex> vertices;
+  std::vector<std::array<float, 3>> patches;  ///< where they lie: offsets from the positions of their corners, in steps
   std::vector<std::array<std::uint32_t, 3>>
       triangles;  ///< global vertex numbers; their vertices are out already or are here
 };

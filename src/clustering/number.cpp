@@ -26,7 +26,11 @@ class Numberer {
   }
   /// Of vertices nobody counted before; not before the last add().
   std::uint32_t append(const FinalVertex& vertex) {
-    if (size_ == out_.vertices.size()) out_.vertices.resize(size_ + size_ / 8 + 256);
+    if (size_ == out_.vertices.size()) {
+      const std::size_t room = size_ + size_ / 8 + 256;
+      out_.vertices.reserve(room);  // resize() alone would double it
+      out_.vertices.resize(room);
+    }
     return add(vertex);
   }
   /// Returns the next free number.
@@ -54,10 +58,10 @@ FinalVertex at_corner(std::uint32_t corner) {
   return vertex;
 }
 
-void number_corners(SlabRecord& here, Numberer& numberer, ClusterCounts& counts) {
-  std::uint64_t patches = 0;
+void number_corners(SlabRecord& here, Numberer& numberer, std::vector<std::array<float, 3>>& patches,
+                    ClusterCounts& counts) {
   const std::size_t first = numberer.size();
-  for (std::uint32_t c = 0; c < here.corners.size(); ++c) {
+  for (std::uint32_t c = 0; c < here.verdicts.size(); ++c) {
     const Verdict verdict = here.verdicts[c];
     if (verdict != Verdict::split) [[likely]] {  // written whether or not it counts: half the corners do, at random
       const bool collapses = verdict == Verdict::corner;
@@ -68,13 +72,13 @@ void number_corners(SlabRecord& here, Numberer& numberer, ClusterCounts& counts)
       if (!component.collapses) continue;
       FinalVertex vertex = at_corner(c);
       vertex.kind = FinalVertex::Kind::patch;
-      vertex.position = component.position;
+      vertex.other = {static_cast<std::uint32_t>(patches.size())};
+      patches.push_back(component.position);
       component.number = numberer.add(vertex);
-      ++patches;
     }
   }
-  counts.patches += patches;
-  counts.collapsed += numberer.size() - first - patches;
+  counts.patches += patches.size();
+  counts.collapsed += numberer.size() - first - patches.size();
 }
 
 /// The number of the vertex its cluster collapsed to.
@@ -123,8 +127,8 @@ void number_isovertices(Window& window, std::int64_t slab, Numberer& numberer, C
       vertex.t = iso.t;
       note.number = numberer.append(vertex);
       ++counts.kept_isovertices;
-    } else if (!note.crossing()) {
-      note.number = collapsed_number(here, corner, note.component);
+    } else {  // of a crossing one the slab above knows
+      note.number = note.crossing() ? kNone : collapsed_number(here, corner, note.component);
     }
   }
 }
@@ -185,10 +189,11 @@ void number(Window& window, std::int64_t slab, std::uint64_t& next_number, Final
   SlabRecord& here = window.at(slab);
   out.slab = slab;
   out.triangles.clear();
-  std::size_t components = 0;
-  for (const UnresolvedCluster& cluster : here.unresolved) components += cluster.components.size();
-  Numberer numberer(next_number, here.corners.size() + components + 1, out);
-  number_corners(here, numberer, counts);
+  out.patches.clear();
+  auto room = static_cast<std::size_t>(std::count(here.verdicts.begin(), here.verdicts.end(), Verdict::corner));
+  for (const UnresolvedCluster& cluster : here.unresolved) room += cluster.components.size();
+  Numberer numberer(next_number, room + 1, out);  // the last one is written though it may not count
+  number_corners(here, numberer, out.patches, counts);
   number_isovertices(window, slab, numberer, counts);
   next_number = numberer.close();
   emit_border(window, slab - 1, out);

@@ -36,11 +36,13 @@ struct VertexNote {
   static constexpr std::uint8_t kThree = 2;       ///< one of its triangles lies in three clusters
   static constexpr std::uint8_t kUnresolved = 4;  ///< its cluster is not resolved yet
   std::uint32_t corner = 0;  ///< the cluster's corner, SlabIndex bits relative to the vertex's slab
-  Ref balance = 0;           ///< every neighbour once as successor, once as predecessor, by XOR: 0 unless on a boundary
+  union {                    // clusters are classified long before their vertices are numbered
+    Ref balance = 0;         ///< every neighbour once as successor, once as predecessor, by XOR: 0 unless on a boundary
+    std::uint32_t number;    ///< of a used vertex in the final mesh
+  };
   std::uint8_t marks = 0;
-  std::uint8_t direction = 0;    ///< from the corner to the vertex: 2 * axis + (0 up, 1 down)
-  std::uint16_t component = 0;   ///< which connected component of an unresolved cluster
-  std::uint32_t number = kNone;  ///< in the final mesh
+  std::uint8_t direction = 0;   ///< from the corner to the vertex: 2 * axis + (0 up, 1 down)
+  std::uint16_t component = 0;  ///< which connected component of an unresolved cluster
 
   [[nodiscard]] bool used() const { return (marks & kUsed) != 0; }
   [[nodiscard]] bool crossing() const { return (corner & SlabIndex::kNextSlab) != 0; }
@@ -89,7 +91,7 @@ struct SlabRecord {
   std::int64_t slab = 0;
   std::shared_ptr<const IsoSlab> iso;
   std::vector<VertexNote> vertices;  ///< parallel to iso->vertices
-  std::vector<CornerNote> corners;   ///< parallel to iso->corners
+  std::vector<CornerNote> corners;   ///< parallel to iso->corners, until these are classified
   std::vector<Verdict> verdicts;     ///< parallel to iso->corners
   std::vector<std::uint8_t> vetoes;  ///< parallel to iso->corners: condition Q fails beside an unresolved cluster
   std::vector<std::uint32_t>

@@ -26,12 +26,16 @@ struct SurfaceCorner {
   float distance = 0;                      ///< signed distance of the corner, in steps
   float curvature = 0;                     ///< signed mean curvature of the fit, 1/steps; 0 for the plane fit
   float cell = 0;                          ///< edge length of the finest incident cell, in steps
-  /// |projected point - weighted average of the samples| / local support radius; negative where that is not trusted and
-  /// the value is extended from neighbours, or uncertain. A corner without any value has a zero normal.
-  float offset_from_mean = -1;
+  /// The projected point is that of the corner's own samples, and not extended from neighbours, or uncertain. A corner
+  /// without any value has a zero normal.
+  bool trusted = false;
   bool crease = false;   ///< the projected point lies on a sharp edge, and the normal is the mean of the sides'
-  bool leaning = false;  ///< while edges are numbered: `overhang` has not been averaged yet
-  float density = 0;     ///< samples along the surface around, 1/steps^2; 0 where none are seen
+  bool leaning = false;  ///< while edges are numbered: its overhang has not been averaged yet
+};
+
+/// What few runs ask of such a corner: those whose values have the rare channels.
+struct RareCorner {
+  float density = 0;  ///< samples along the surface around, 1/steps^2; 0 where none are seen
   /// How far the surface reaches beyond its samples here, support radii (mls/overhang.h). Of a corner that no isovertex
   /// is nearest to it is not averaged over its neighbours, unless CornerRule asks for that.
   float overhang = 0;
@@ -59,6 +63,7 @@ using IsoTriangle = std::array<SlabIndex, 3>;  ///< counter-clockwise seen from 
 struct IsoSlab {
   std::int64_t slab = 0;
   std::vector<SurfaceCorner> corners;                 ///< in canonical order (level, tile, layer)
+  std::vector<RareCorner> rare;                       ///< parallel to corners, or empty
   std::vector<std::vector<float>> corner_attributes;  ///< one array per attribute, parallel to corners
   /// In canonical order; behind the edges' come centre vertices (by cell), then copies that separate fans.
   std::vector<IsoVertex> vertices;

@@ -68,6 +68,7 @@ void assign_numbers(const Window& window, const std::vector<TileView>& views, Is
   }
   resize_anew(out.vertices, vertices);
   resize_anew(out.corners, corners);
+  resize_anew(out.rare, window.has_rare() ? corners : 0);
   out.corner_attributes.resize(static_cast<std::size_t>(window.attributes()));
   for (std::vector<float>& a : out.corner_attributes) resize_anew(a, corners);
 }
@@ -112,14 +113,14 @@ void put_on_crease(const float* record, float cell, SurfaceCorner& c) {
 /// How far the surface reaches beyond its samples at a corner; what its own lean tells, where Numbering is to ask its
 /// neighbours only if the corner is wanted. `record`: null where it has no samples of its own.
 void put_overhang(const CornerPlace& at, const float* record, int slab_layers, const CornerRule& rule,
-                  const std::array<float, 3>& normal, SurfaceCorner& c) {
+                  const std::array<float, 3>& normal, SurfaceCorner& c, RareCorner& rare) {
   if (record != nullptr) {
-    c.overhang = own_overhang(record, normal);
-    if (c.overhang < kUpright * rule.trim && at.block->trusted.test(at.offset)) return;
+    rare.overhang = own_overhang(record, normal);
+    if (rare.overhang < kUpright * rule.trim && at.block->trusted.test(at.offset)) return;
     c.leaning = !rule.all_overhangs && !c.crease;
     if (c.leaning) return;
   }
-  c.overhang = overhang(*at.block, at.offset, slab_layers, normal);
+  rare.overhang = overhang(*at.block, at.offset, slab_layers, normal);
 }
 
 /// Fills in the tile's surface corners. Trusted corners are read here, which is what corner_value() answers for them in
@@ -153,7 +154,7 @@ void fill_corners(const Window& window, const TileView& tile, const CornerRule& 
         const float* const v = record();
         value = {v[kDistance], {v[kNormalX], v[kNormalY], v[kNormalZ]}, v[kCurvature], v[kOffsetFromMean]};
         for (int a = 0; a < attributes; ++a) extra[a] = v[first + a];
-        c.offset_from_mean = value.offset_from_mean;
+        c.trusted = value.offset_from_mean >= 0;
       } else {
         corner_value(window, tile.level, cell, value, extra.data());  // there is one: both ends of the edge are defined
       }
@@ -167,8 +168,13 @@ void fill_corners(const Window& window, const TileView& tile, const CornerRule& 
           takes_crease(window, tile.level, cell, static_cast<std::int32_t>(out.slab), record()))
         put_on_crease(record(), cell_of_value(window, tile.level, cell), c);
       const float* const own = (leaf.seen.words[z] & active & one) != 0 ? record() : nullptr;
-      if (own != nullptr && window.has_rare()) c.density = own[kDensity];
-      if (rule.trim > 0) put_overhang({&leaf, z * 64 + bit, tile.level}, own, slab_layers, rule, value.normal, c);
+      if (window.has_rare()) {
+        RareCorner& rare = out.rare[id];
+        rare = {};
+        if (own != nullptr) rare.density = own[kDensity];
+        if (rule.trim > 0)
+          put_overhang({&leaf, z * 64 + bit, tile.level}, own, slab_layers, rule, value.normal, c, rare);
+      }
       for (int a = 0; a < attributes; ++a) out.corner_attributes[a][id] = extra[a];
       out.corners[id++] = c;
     });
@@ -234,7 +240,7 @@ class Numbering {
     SurfaceCorner& c = slab_.corners[number];
     const std::atomic_ref<bool> leaning(c.leaning);
     if (!leaning.load(std::memory_order_relaxed) || !leaning.exchange(false, std::memory_order_relaxed)) return;
-    c.overhang = overhang(*at.block, at.offset, cache_.window().slab_layers(at.level), c.normal);
+    slab_.rare[number].overhang = overhang(*at.block, at.offset, cache_.window().slab_layers(at.level), c.normal);
   }
 
   /// Vertices of a layer's edges along an axis, the first of which is `id`; returns the number behind the last.

@@ -261,7 +261,7 @@ bool allocate_values(const Window& window, int level, Projected& points, LeafLay
   if (active == 0) return false;
   CornerValues& values = points.values[window.slab_in_leaf(level, layers.begin)];
   values.allocate(active, window.channels());
-  std::fill(values.data.begin(), values.data.end(), 0.0F);
+  std::ranges::fill(values.all(), 0.0F);
   return true;
 }
 

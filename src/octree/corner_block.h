@@ -1,14 +1,14 @@
 // An 8^3 block of cells and of the corners at their lower ends: what a leaf of the window's trees holds. Masks tell
 // what exists, one array per slab holds the values of the corners that have any.
 #pragma once
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <new>
+#include <span>
 #include <utility>
-#include <vector>
 
 #include "lattice/block_mask.h"
 
@@ -36,29 +36,30 @@ enum Channel : int {
   kFirstAttribute
 };
 
-/// Leaves what it allocates as it is, for values that are written next.
-template <typename T>
-struct RawAllocator : std::allocator<T> {
-  template <typename U>
-  struct rebind {
-    using other = RawAllocator<U>;
-  };
-  template <typename U>
-  void construct(U* at) noexcept {
-    ::new (static_cast<void*>(at)) U;
-  }
-  template <typename U, typename... Args>
-  void construct(U* at, Args&&... args) {
-    ::new (static_cast<void*>(at)) U(std::forward<Args>(args)...);
-  }
-};
-
 /// Values of the `active` corners of one slab's layers inside a leaf: a record of channels per corner, in mask order.
 /// Stages ask for all of a corner, so that records touch fewer lines of the cache than an array per channel would.
+/// A block holds eight of them, most of them empty: no larger than need be.
 struct CornerValues {
-  std::vector<float, RawAllocator<float>> data;
+  std::unique_ptr<float[]> data;
   std::uint32_t count = 0;  ///< corners
   std::uint32_t channels = 0;
+
+  CornerValues() = default;
+  CornerValues(const CornerValues& other) {
+    allocate(other.count, static_cast<int>(other.channels));
+    std::copy_n(other.data.get(), size(), data.get());
+  }
+  CornerValues(CornerValues&& other) noexcept { swap(other); }
+  CornerValues& operator=(CornerValues other) noexcept {
+    swap(other);
+    return *this;
+  }
+  ~CornerValues() = default;
+  void swap(CornerValues& other) noexcept {
+    std::swap(data, other.data);
+    std::swap(count, other.count);
+    std::swap(channels, other.channels);
+  }
 
   /// One channel of all corners.
   template <typename T>
@@ -72,13 +73,16 @@ struct CornerValues {
   void allocate(std::uint32_t corners, int channel_count) {
     count = corners;
     channels = static_cast<std::uint32_t>(channel_count);
-    data.clear();
-    data.resize(std::size_t{count} * channels);
+    data = size() == 0 ? nullptr : std::make_unique_for_overwrite<float[]>(size());
   }
-  [[nodiscard]] float* of(std::uint32_t corner) { return data.data() + std::size_t{corner} * channels; }
-  [[nodiscard]] const float* of(std::uint32_t corner) const { return data.data() + std::size_t{corner} * channels; }
-  [[nodiscard]] Strided<float> channel(int c) { return {data.data() + c, channels}; }
-  [[nodiscard]] Strided<const float> channel(int c) const { return {data.data() + c, channels}; }
+  /// Of all corners together.
+  [[nodiscard]] std::size_t size() const { return std::size_t{count} * channels; }
+  [[nodiscard]] std::span<float> all() { return {data.get(), size()}; }
+  [[nodiscard]] std::span<const float> all() const { return {data.get(), size()}; }
+  [[nodiscard]] float* of(std::uint32_t corner) { return data.get() + std::size_t{corner} * channels; }
+  [[nodiscard]] const float* of(std::uint32_t corner) const { return data.get() + std::size_t{corner} * channels; }
+  [[nodiscard]] Strided<float> channel(int c) { return {data.get() + c, channels}; }
+  [[nodiscard]] Strided<const float> channel(int c) const { return {data.get() + c, channels}; }
 };
 
 /// Numbers of the isovertices and surface corners of one layer, written by extraction. Tables are per slab

@@ -24,7 +24,7 @@ openvdb::Coord leaf_origin(const Block& b) {
 
 std::size_t value_bytes(const Projected& points) {
   std::size_t bytes = 0;
-  for (const CornerValues& v : points.values) bytes += sizeof(float) * v.data.capacity();
+  for (const CornerValues& v : points.values) bytes += sizeof(float) * v.size();
   return bytes;
 }
 

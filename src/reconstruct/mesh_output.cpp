@@ -72,7 +72,7 @@ void place_points(const ClusteredSlab& from, const Frame& frame, float chord, Ve
         const double t = v.t;
         p = (1 - t) * position(*a.corner) + t * position(*b.corner);
         // Where a corner is not trusted its point keeps to the samples, which the edge may not.
-        if (a.corner->offset_from_mean < 0 || b.corner->offset_from_mean < 0)
+        if (!a.corner->trusted || !b.corner->trusted)
           p = (1 - t) * clustered(*a.corner, chord) + t * clustered(*b.corner, chord);
         const Vec3 blended = (1 - t) * normal + t * to_vec(b.corner->normal);
         if (blended.squaredNorm() > 1e-12) normal = blended.normalized();
@@ -81,7 +81,7 @@ void place_points(const ClusteredSlab& from, const Frame& frame, float chord, Ve
         }
       } else {
         p = v.kind == FinalVertex::Kind::corner ? clustered(*a.corner, chord)
-                                                : Vec3(position(*a.corner) + to_vec(v.position));
+                                                : Vec3(position(*a.corner) + to_vec(slab.patches[v.other.index()]));
         for (std::size_t c = 0; c < attributes; ++c) out.attributes[c][i] = (*a.attributes)[c][a.index];
       }
       const Vec3 world = frame.to_world(p);
@@ -119,7 +119,7 @@ void place_curvatures(const ClusteredSlab& from, double step, VertexBatch& out) 
 void place_overhangs(const ClusteredSlab& from, VertexBatch& out) {
   out.overhang.clear();
   out.overhang.reserve(from.slab.vertices.size());
-  const auto of = [&](SlabIndex i) { return (i.next() ? *from.next : from.here).corners[i.index()].overhang; };
+  const auto of = [&](SlabIndex i) { return (i.next() ? *from.next : from.here).rare[i.index()].overhang; };
   for (const FinalVertex& v : from.slab.vertices) {
     float overhang = of(v.corner);
     if (v.kind == FinalVertex::Kind::isovertex) overhang = (1 - v.t) * overhang + v.t * of(v.other);
@@ -130,7 +130,7 @@ void place_overhangs(const ClusteredSlab& from, VertexBatch& out) {
 void place_densities(const ClusteredSlab& from, double step, VertexBatch& out) {
   out.density.clear();
   out.density.reserve(from.slab.vertices.size());
-  const auto of = [&](SlabIndex i) { return (i.next() ? *from.next : from.here).corners[i.index()].density; };
+  const auto of = [&](SlabIndex i) { return (i.next() ? *from.next : from.here).rare[i.index()].density; };
   for (const FinalVertex& v : from.slab.vertices) {
     float density = of(v.corner);
     if (v.kind == FinalVertex::Kind::isovertex) density = std::max(density, of(v.other));
@@ -209,6 +209,14 @@ std::shared_ptr<IsoSlab> MeshOutput::spare() {
   return slab;
 }
 
+std::vector<IsoTriangle> MeshOutput::spare_triangles() {
+  const std::lock_guard lock(mutex_);
+  if (triangle_spares_.empty()) return {};
+  std::vector<IsoTriangle> triangles = std::move(triangle_spares_.back());
+  triangle_spares_.pop_back();
+  return triangles;
+}
+
 void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
   for (std::shared_ptr<IsoSlab>& slab : slabs) {
     clusterer_.push(slab);
@@ -225,8 +233,10 @@ void MeshOutput::work(std::vector<std::shared_ptr<IsoSlab>> slabs, bool last) {
     } else {
       hand_to_rims(mesh_);
     }
+    std::swap(mesh_.triangles, done_.triangles);  // their storage goes back where it came from
     if (clustered_.front().use_count() == 1) {
       const std::lock_guard lock(mutex_);
+      triangle_spares_.push_back(std::move(clustered_.front()->triangles));
       spares_.push_back(std::move(clustered_.front()));
     }
     clustered_.pop_front();

@@ -85,8 +85,10 @@ class MeshOutput {
   void wait();
   /// Everything is in the sink when this returns: no more slabs come.
   void finish();
-  /// An empty slab, with the storage of one that was written where there is any.
+  /// An empty slab, with the storage of one that was written where there is any, but for its triangles.
   std::shared_ptr<IsoSlab> spare();
+  /// The storage of a written slab's triangles where there is any: a slab gets its own two slabs later than the rest.
+  std::vector<IsoTriangle> spare_triangles();
   /// Written so far; at any time.
   [[nodiscard]] std::uint64_t vertices() const { return written_; }
   [[nodiscard]] std::uint64_t triangles() const { return triangles_; }
@@ -118,8 +120,9 @@ class MeshOutput {
   std::optional<NormalSettler> settler_;  ///< where normals are settled
   MeshSlab trimmed_, faired_;
   DistinctPositions distinct_;
-  std::mutex mutex_;  ///< of spares_
+  std::mutex mutex_;  ///< of the spares
   std::vector<std::shared_ptr<IsoSlab>> spares_;
+  std::vector<std::vector<IsoTriangle>> triangle_spares_;
   std::atomic<std::uint64_t> written_ = 0, triangles_ = 0;
   tbb::task_group tasks_;
 };

@@ -105,6 +105,7 @@ void Pipeline::triangulate_to(std::int32_t slab) {
     const auto at = static_cast<std::size_t>(triangulated_ - held_);
     IsoSlab& here = *iso_[at];
     IsoSlab& above = at + 1 < iso_.size() ? *iso_[at + 1] : nothing;
+    here.triangles = output_.spare_triangles();
     triangulate(window_, triangulated_, here, above, extracted_);
     separate_fans(at > 0 ? iso_[at - 1].get() : nullptr, here, &above, extracted_);
     isotriangles_ += here.triangles.size();

@@ -41,7 +41,10 @@ Clustered run(const CutMesh& mesh, ClusterMode mode) {
         return mesh.corner_ids[popped + (index.next() ? 1 : 0)][index.index()];
       };
       for (const FinalVertex& v : slab.vertices) {
-        out.vertices.emplace_back(static_cast<int>(v.kind), global(v.corner), global(v.other), v.t, v.position);
+        const bool patch = v.kind == FinalVertex::Kind::patch;
+        const auto position = patch ? slab.patches[v.other.index()] : std::array<float, 3>{};
+        out.vertices.emplace_back(static_cast<int>(v.kind), global(v.corner), global(patch ? v.corner : v.other), v.t,
+                                  position);
       }
       for (const Triangle& t : slab.triangles) {
         for (const std::uint32_t index : t) ASSERT_LT(index, out.vertices.size()) << "not numbered yet";

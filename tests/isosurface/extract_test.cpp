@@ -247,7 +247,7 @@ TEST(Extract, NothingStaysOfWhatASlabHeldBefore) {
   const WholeMesh fresh = c.mesh();
   const WholeMesh used = c.mesh([](IsoSlab& slab) {
     slab.slab = 99;
-    slab.corners.assign(3000, {{1, 2, 3}, {1, 1, 1}, {1, 1, 1}, 1, 1, 1, 1});
+    slab.corners.assign(3000, {{1, 2, 3}, {1, 1, 1}, {1, 1, 1}, 1, 1, 1, true});
     slab.corner_attributes.assign(2, std::vector<float>(7000, 5.0F));
     slab.vertices.assign(3000, {{77}, {88}, 0.9F, 2, 7, true, 15});
     slab.triangles.assign(5000, {SlabIndex{1}, SlabIndex{2}, SlabIndex{3}});
@@ -262,9 +262,9 @@ TEST(Extract, NothingStaysOfWhatASlabHeldBefore) {
     ASSERT_EQ(a.corners.size(), b.corners.size());
     for (std::size_t k = 0; k < a.corners.size(); ++k) {
       EXPECT_EQ(std::tie(a.corners[k].position, a.corners[k].offset, a.corners[k].normal, a.corners[k].distance,
-                         a.corners[k].curvature, a.corners[k].cell, a.corners[k].offset_from_mean),
+                         a.corners[k].curvature, a.corners[k].cell, a.corners[k].trusted),
                 std::tie(b.corners[k].position, b.corners[k].offset, b.corners[k].normal, b.corners[k].distance,
-                         b.corners[k].curvature, b.corners[k].cell, b.corners[k].offset_from_mean));
+                         b.corners[k].curvature, b.corners[k].cell, b.corners[k].trusted));
     }
   }
 }

@@ -157,7 +157,7 @@ TEST(Window, LeavesUsedAgainAreEmpty) {
       CornerBlock& block = window.touch(0, {x, 0, z});
       EXPECT_FALSE(block.home.any() || block.surface.any() || block.active.any());
       EXPECT_EQ(block.busy_layers | block.doubtful_layers | block.surface_layers, 0);
-      EXPECT_TRUE(block.values[0].data.empty());
+      EXPECT_TRUE(block.values[0].all().empty());
       EXPECT_EQ(block.values[0].count, 0U);
       EXPECT_EQ(block.centres, nullptr);
       for (BlockMask* m : {&block.home, &block.surface, &block.active}) m->set(x);

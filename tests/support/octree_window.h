@@ -135,7 +135,7 @@ class Octree {
     if (place < 0) return;
     CornerValues& values = t.leaf->values[place];
     values.allocate(static_cast<std::uint32_t>(samples.size()), window.channels());
-    std::fill(values.data.begin(), values.data.end(), 0.0F);  // curvature and offset stay so
+    std::ranges::fill(values.all(), 0.0F);  // curvature and offset stay so
     for (std::size_t i = 0; i < samples.size(); ++i) {
       values.channel(kDistance)[i] = samples[i].distance;
       for (int a = 0; a < 3; ++a) values.channel(kNormalX + a)[i] = samples[i].normal[a];

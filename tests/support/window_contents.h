@@ -53,7 +53,7 @@ inline void append_bits(const Window& window, int level, const Block& b, const P
   for (int layer = 0; layer < 8; layer += window.slab_layers(level)) {
     const CornerValues& v = points.values[window.slab_in_leaf(level, layer)];
     out.push_back(v.count);
-    for (const float f : v.data) out.push_back(std::bit_cast<std::uint32_t>(f));
+    for (const float f : v.all()) out.push_back(std::bit_cast<std::uint32_t>(f));
   }
   out.push_back(static_cast<std::uint32_t>(b.x));
 }
