@@ -117,16 +117,19 @@ void add_simplification(const ReconstructionPlan& plan, const SlabStore& store, 
   cost.cpu_seconds += (plan.simplify.error > 0 ? kWithin : plan.simplify.deviation > 0 ? kFlat : kPlain) * triangles;
 }
 
-/// Of the samples that wait for their radii, which depend on two layers of coarsest counting cells, or for the slabs to
-/// come, no more than the cache keeps; and of those in clusters, which act on a slab.
+/// Of the samples that wait for their radii, which depend on two layers of coarsest counting cells, no more than the
+/// cache keeps; of those marked in slabs that are not projected yet, with what reading and sorting them takes; and of
+/// those in clusters, which act on a slab.
 double samples_memory(const ReconstructionPlan& plan, const SlabStore& store) {
-  constexpr double kSample = 37, kAttribute = 4, kLayers = 2.5;
+  constexpr double kSample = 37, kRead = 38, kAttribute = 4, kLayers = 2.5;
   const double bytes = kSample + kAttribute * static_cast<double>(plan.attributes.size());
   const double coarsest = std::ldexp(plan.radii.finest_cell, plan.radii.levels - 1);
   const double waiting = bytes * densest_layer(store, kLayers * coarsest);
   const double reach = 2 * plan.feed.blend * static_cast<double>(plan.radius.median) + plan.lattice.slab_height();
   const double clustered = std::min(densest_layer(store, reach), static_cast<double>(plan.feed.batch_samples));
-  return std::min(static_cast<double>(plan.feed.cache_bytes), waiting) + bytes * clustered;
+  const double slabs = reach_of(Stage::mark).ahead - reach_of(Stage::project).ahead + static_cast<double>(plan.window);
+  const double marked = (bytes + kRead) * densest_layer(store, slabs * plan.lattice.slab_height());
+  return std::min(static_cast<double>(plan.feed.cache_bytes), waiting) + marked + bytes * clustered;
 }
 
 double mesh_memory(const ReconstructionPlan& plan, const SlabStore& store, double per_slab) {
@@ -141,7 +144,7 @@ double mesh_memory(const ReconstructionPlan& plan, const SlabStore& store, doubl
   // What the window's count leaves out - counting cells, clustering, bins, and the allocator's gaps - grows with it,
   // and with the samples within reach, however low slabs are. Where thin sheets are looked for cells' normals come to
   // it, and more leaves.
-  constexpr double kWindow = 0.9, kReach = 0.42, kReachRadii = 4.5, kSheets = 1.5;
+  constexpr double kWindow = 0.77, kReach = 0.36, kReachRadii = 4.5, kSheets = 1.75;
   const double in_reach = densest_layer(store, kReachRadii * double{plan.radius.median});
   const double sheets = plan.feed.refines_sheets() ? kSheets : 1;
   const double rest = sheets * per_sample * (kWindow * per_slab + kReach * in_reach);
