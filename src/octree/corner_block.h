@@ -77,11 +77,13 @@ struct CornerValues {
   }
   /// Of all corners together.
   [[nodiscard]] std::size_t size() const { return std::size_t{count} * channels; }
+  // NOLINTBEGIN(readability-make-member-function-const): a constant one's values do not change
   [[nodiscard]] std::span<float> all() { return {data.get(), size()}; }
-  [[nodiscard]] std::span<const float> all() const { return {data.get(), size()}; }
   [[nodiscard]] float* of(std::uint32_t corner) { return data.get() + std::size_t{corner} * channels; }
-  [[nodiscard]] const float* of(std::uint32_t corner) const { return data.get() + std::size_t{corner} * channels; }
   [[nodiscard]] Strided<float> channel(int c) { return {data.get() + c, channels}; }
+  // NOLINTEND(readability-make-member-function-const)
+  [[nodiscard]] std::span<const float> all() const { return {data.get(), size()}; }
+  [[nodiscard]] const float* of(std::uint32_t corner) const { return data.get() + std::size_t{corner} * channels; }
   [[nodiscard]] Strided<const float> channel(int c) const { return {data.get() + c, channels}; }
 };
 
