@@ -225,12 +225,7 @@ Filling filling_of(const Disc& disc, const Vec3& origin, double unit, const Eige
   Filling out;
   out.verdict = Verdict::invented;
   out.triangles = disc.triangles;
-  std::vector<Vec3> normals(disc.points.size(), Vec3::Zero());
-  for (const auto& t : disc.triangles) {
-    const Vec3& a = disc.points[t[0]];
-    const Vec3 normal = (disc.points[t[1]] - a).cross(disc.points[t[2]] - a);
-    for (const std::uint32_t v : t) normals[v] += normal;
-  }
+  const Points normals = normals_around(disc.points, disc.triangles);
   for (std::size_t i = disc.rim; i < disc.points.size(); ++i) {
     const Vec3 p = disc.points[i] * unit + origin;
     const Vec3 n = normals[i].squaredNorm() > 0 ? Vec3(normals[i].normalized()) : Vec3(Vec3::UnitZ());

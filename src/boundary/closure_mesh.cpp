@@ -11,6 +11,8 @@
 // OpenMesh's headers are not free of warnings.
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 
+#include <Eigen/Geometry>
+
 namespace lamina::boundary {
 namespace {
 
@@ -218,6 +220,16 @@ Disc nested_rings(const Points& polygon) {
   for (std::uint32_t i = 0; i < count; ++i)
     disc.triangles.push_back({first + i, first + (i + 1) % static_cast<std::uint32_t>(count), middle});
   return disc;
+}
+
+Points normals_around(const Points& points, const Triangles& triangles) {
+  Points normals(points.size(), Eigen::Vector3d::Zero());
+  for (const auto& t : triangles) {
+    const Eigen::Vector3d& a = points[t[0]];
+    const Eigen::Vector3d normal = (points[t[1]] - a).cross(points[t[2]] - a);
+    for (const std::uint32_t v : t) normals[v] += normal;
+  }
+  return normals;
 }
 
 void make_even(Disc& disc) {

@@ -101,12 +101,8 @@ Eigen::MatrixXd attributes_of(const std::vector<const Loop*>& loops, const Rim& 
 }
 
 /// Where the rim lies badly to what its normals say, so does the surface that spans it, and its triangles know.
-void settle_normals(const std::vector<Vec3>& points, const Triangles& triangles, GapSurface& gap) {
-  std::vector<Vec3> around(points.size(), Vec3::Zero());
-  for (const auto& t : triangles) {
-    const Vec3 normal = (points[t[1]] - points[t[0]]).cross(points[t[2]] - points[t[0]]);
-    for (const std::uint32_t v : t) around[v] += normal;
-  }
+void settle_normals(const Points& points, const Triangles& triangles, GapSurface& gap) {
+  const Points around = normals_around(points, triangles);
   const auto as_triple = [](const Vec3& v) { return meshes::Vec3{v.x(), v.y(), v.z()}; };
   const std::size_t rim = points.size() - gap.normals.size();
   for (std::size_t i = 0; i < gap.normals.size(); ++i) {

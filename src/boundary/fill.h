@@ -97,6 +97,9 @@ inline constexpr double kShortestEdge = 0.6;
 using Points = std::vector<Eigen::Vector3d>;
 using Triangles = std::vector<std::array<std::uint32_t, 3>>;
 
+/// By point, the sum of the normals of the triangles around it, each as long as twice the area.
+Points normals_around(const Points& points, const Triangles& triangles);
+
 /// Of `points` the first `rim` are the polygon's, in its order; every other one is new.
 struct Disc {
   std::size_t rim = 0;

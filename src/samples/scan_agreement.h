@@ -56,6 +56,8 @@ class ScanAgreement {
  public:
   /// `places` are samples spread over a cloud of `samples` in all, which give the places their radii.
   ScanAgreement(std::span<const OrientedPoint> places, double samples, std::size_t scans);
+  ScanAgreement(const ScanAgreement&) = delete;
+  ScanAgreement& operator=(const ScanAgreement&) = delete;
 
   /// About the middle of the places all rotations are.
   [[nodiscard]] const Eigen::Vector3d& middle() const { return middle_; }
