@@ -46,8 +46,10 @@ int BackgroundWriter::write(int fd, Buffer buffer, std::size_t bytes, std::optio
   changed_.wait(lock, [&] { return jobs_.size() < most_; });
   if (!thread_.joinable()) thread_ = std::thread([this] { work(); });
   jobs_.push_back({fd, std::move(buffer), bytes, offset});
+  const int error = error_;
+  lock.unlock();  // else who is woken would wait for it
   changed_.notify_all();
-  return error_;
+  return error;
 }
 
 int BackgroundWriter::drain() {

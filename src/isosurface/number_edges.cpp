@@ -16,18 +16,23 @@
 namespace lamina {
 namespace {
 
+constexpr std::size_t kViewsAtOnce = 12;  ///< fewer would not be worth a cache
+constexpr std::size_t kCheapViewsAtOnce = 32;
+
 /// Runs body(tile, cache) over all tiles, several threads at once; every tile writes its own places. `Parts`: what the
 /// body looks at of each tile's block.
 template <typename Parts, typename Body>
 void for_views(const Window& window, const std::vector<TileView>& views, const Body& body) {
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, views.size(), 16),
-                    [&](const tbb::blocked_range<std::size_t>& range) {
-                      BlockCache cache(window);
-                      for (std::size_t i = range.begin(); i < range.end(); ++i) {
-                        ask_ahead<Parts>(views, i);
-                        body(views[i], cache);
-                      }
-                    });
+  tbb::parallel_for(
+      tbb::blocked_range<std::size_t>(0, views.size(), kViewsAtOnce),
+      [&](const tbb::blocked_range<std::size_t>& range) {
+        BlockCache cache(window);
+        for (std::size_t i = range.begin(); i < range.end(); ++i) {
+          ask_ahead<Parts>(views, i);
+          body(views[i], cache);
+        }
+      },
+      window.affinity());
 }
 
 /// The same level by level, finest first.
@@ -35,7 +40,7 @@ template <typename Body>
 void for_levels(const std::vector<TileView>& views, const Body& body) {
   for (std::size_t first = 0, end = 0; first < views.size(); first = end) {
     while (end < views.size() && views[end].level == views[first].level) ++end;
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(first, end, 16),
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(first, end, kCheapViewsAtOnce),
                       [&](const tbb::blocked_range<std::size_t>& range) {
                         for (std::size_t i = range.begin(); i < range.end(); ++i) body(views[i]);
                       });

@@ -306,15 +306,18 @@ void triangulate(const Window& window, std::int32_t slab, IsoSlab& out, IsoSlab&
                            &CornerBlock::accepted, &CornerBlock::numbers>;
   const std::array<PlainCase, 256>& cases = plain_cases();
   std::vector<TriangleRun> runs((views.size() + kRunTiles - 1) / kRunTiles);
-  tbb::parallel_for(std::size_t{0}, runs.size(), [&](std::size_t r) {
-    BlockCache cache(window);
-    TilePass pass(cache, slab, out, next, cases);
-    const std::size_t end = std::min(views.size(), (r + 1) * kRunTiles);
-    for (std::size_t i = r * kRunTiles; i < end; ++i) {
-      ask_ahead<Parts>(views, i);
-      pass.run(views[i], runs[r]);
-    }
-  });
+  tbb::parallel_for(
+      std::size_t{0}, runs.size(),
+      [&](std::size_t r) {
+        BlockCache cache(window);
+        TilePass pass(cache, slab, out, next, cases);
+        const std::size_t end = std::min(views.size(), (r + 1) * kRunTiles);
+        for (std::size_t i = r * kRunTiles; i < end; ++i) {
+          ask_ahead<Parts>(views, i);
+          pass.run(views[i], runs[r]);
+        }
+      },
+      window.affinity());
   join(runs, out, counts);
 }
 

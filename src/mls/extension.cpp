@@ -268,11 +268,14 @@ void extend_slab(Window& window, std::int32_t slab, const Kernel& kernel, float 
   tbb::enumerable_thread_specific<CornerField> fields;
   for (int level = 0; level < window.levels(); ++level) {
     const Tiles tiles = window.tiles(level, slab);
-    tbb::parallel_for(std::size_t{0}, tiles.size(), [&](std::size_t i) {
-      ask_ahead<Parts>(tiles, i);
-      TileExtender extender(window, kernel, boundary, fields.local());
-      extender.extend(level, tiles[i], leaf_layers(window, level, slab, tiles[i].block));
-    });
+    tbb::parallel_for(
+        std::size_t{0}, tiles.size(),
+        [&](std::size_t i) {
+          ask_ahead<Parts>(tiles, i);
+          TileExtender extender(window, kernel, boundary, fields.local());
+          extender.extend(level, tiles[i], leaf_layers(window, level, slab, tiles[i].block));
+        },
+        window.affinity());
   }
 }
 

@@ -1,5 +1,6 @@
 #include "mls/project.h"
 
+#include <tbb/blocked_range.h>
 #include <tbb/enumerable_thread_specific.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_group.h>
@@ -182,8 +183,12 @@ class Projector::Level {
       }
       return;
     }
-    tbb::parallel_for(std::size_t{0}, taken_over_.size(),
-                      [&](std::size_t t) { store_values(rule_, window_, taken_over_[t], {}, {}, {}); });
+    constexpr std::size_t kAtOnce = 16;  // there is little to do for each
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, taken_over_.size(), kAtOnce), [&](const auto& range) {
+      for (std::size_t t = range.begin(); t < range.end(); ++t) {
+        store_values(rule_, window_, taken_over_[t], {}, {}, {});
+      }
+    });
     if (work_.empty()) return;
     if (batches.size() == 1) {
       project_at_once(batches.front());
@@ -195,25 +200,27 @@ class Projector::Level {
  private:
   /// All samples are at hand: a tile does all of its steps before the next one.
   void project_at_once(const NumberedBuckets& numbers) {
-    const std::vector<Block> blocks = blocks_of(work_);
     const ClusteredBatch batch = scratch_.load(numbers, feed_, lattice_);
     layers_.margin = margin();
-    const TileRuns bins = bin_clusters(lattice_, layers_, batch, blocks);
-    tbb::parallel_for(std::size_t{0}, work_.size(), [&](std::size_t t) {
-      Scratch::Local& local = scratch_.local.local();
-      list_queries(work_[t], local.queries);
-      TileSteps steps(rule_, local.queries, local.state);
-      steps.start();
-      local.rows.gather(lattice_, layers_, blocks[t], bins.of(t));
-      steps.accumulate(local.rows);
-      for (int pass = 1; pass < rule_.passes() && steps.advance(pass); ++pass) steps.accumulate(local.rows);
-      steps.settle();
-      if (rule_.settings.creases) {
-        CreaseFinder finder(rule_, local.queries, local.state, local.creases);
-        for (bool on = finder.start(); on; on = finder.advance()) finder.accumulate(local.rows);
-      }
-      finish(work_[t], local, local.state, local.creases);
-    });
+    const TileRuns bins = bin_clusters(lattice_, layers_, batch, blocks_of(work_));
+    tbb::parallel_for(
+        std::size_t{0}, work_.size(), [&](std::size_t t) { project_tile(work_[t], bins.of(t)); }, window_.affinity());
+  }
+
+  void project_tile(const Work& work, std::span<const Run> runs) {
+    Scratch::Local& local = scratch_.local.local();
+    list_queries(work, local.queries);
+    TileSteps steps(rule_, local.queries, local.state);
+    steps.start();
+    local.rows.gather(lattice_, layers_, work.tile.block, runs);
+    steps.accumulate(local.rows);
+    for (int pass = 1; pass < rule_.passes() && steps.advance(pass); ++pass) steps.accumulate(local.rows);
+    steps.settle();
+    if (rule_.settings.creases) {
+      CreaseFinder finder(rule_, local.queries, local.state, local.creases);
+      for (bool on = finder.start(); on; on = finder.advance()) finder.accumulate(local.rows);
+    }
+    finish(work, local, local.state, local.creases);
   }
 
   /// Sums survive from batch to batch and query points from pass to pass. Later passes are for few tiles.

@@ -1,5 +1,9 @@
 #include "mls/sample_clusters.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -70,18 +74,29 @@ std::vector<Cubes> cubes_of(const LocalSamples& s, const Lattice& lattice) {
   return cubes;
 }
 
+constexpr std::uint64_t kNowhere = std::numeric_limits<std::uint64_t>::max();  ///< the cube of samples left out
+
+/// Calls body(k) for all of n samples, by all threads that have nothing to do.
+template <typename Body>
+void for_samples(std::size_t n, const Body& body) {
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, n, kSampleGrain), [&](const auto& range) {
+    for (std::size_t k = range.begin(); k < range.end(); ++k) body(k);
+  });
+}
+
 /// The samples that count, by cube.
 const std::vector<Keyed>& in_order(const ActiveBucket& bucket, const Lattice& lattice, ClusterScratch& scratch) {
   const LocalSamples& s = bucket.samples;
   std::vector<Keyed>& keyed = scratch.keyed;
-  keyed.clear();
+  resize_anew(keyed, s.size());
   if (s.size() == 0) return keyed;
-  keyed.reserve(s.size());
   const std::vector<Cubes> cubes = cubes_of(s, lattice);
-  for (std::size_t i = 0; i < s.size(); ++i) {
-    if (bucket.support[i] <= 0) continue;
-    keyed.push_back({cubes[bucket.level[i]].number(s.x[i], s.y[i], s.z[i]), static_cast<std::uint32_t>(i)});
-  }
+  for_samples(s.size(), [&](std::size_t i) {
+    const bool counts = bucket.support[i] > 0;
+    keyed[i] = {counts ? cubes[bucket.level[i]].number(s.x[i], s.y[i], s.z[i]) : kNowhere,
+                static_cast<std::uint32_t>(i)};
+  });
+  std::erase_if(keyed, [](const Keyed& k) { return k.key == kNowhere; });
   const Cubes& last = cubes.back();
   digit_sort(keyed, scratch.other, last.first + last.count[0] * last.count[1] * last.count[2],
              [](const Keyed& k) { return k.key; });
@@ -90,7 +105,7 @@ const std::vector<Keyed>& in_order(const ActiveBucket& bucket, const Lattice& la
 
 void pick(const std::vector<float>& from, const std::vector<Keyed>& order, std::vector<float>& out) {
   resize_anew(out, order.size());
-  for (std::size_t k = 0; k < order.size(); ++k) out[k] = from[order[k].sample];
+  for_samples(order.size(), [&](std::size_t k) { out[k] = from[order[k].sample]; });
 }
 
 /// The box that the supports of a cluster's samples reach. 64 bits hold what passes the range of steps.
@@ -117,33 +132,47 @@ class ReachedBox {
   std::array<std::int64_t, 3> low_{kMost, kMost, kMost}, high_{kLeast, kLeast, kLeast};
 };
 
-void find_clusters(const std::vector<Keyed>& order, ClusteredBucket& out) {
-  out.clusters.clear();
-  for (std::size_t begin = 0, end = 0; begin < order.size(); begin = end) {
+/// Those that begin in [begin, end) of the order.
+std::vector<SampleCluster> clusters_within(const std::vector<Keyed>& order, const ClusteredBucket& in,
+                                           std::size_t begin, std::size_t end) {
+  std::vector<SampleCluster> out;
+  while (begin > 0 && begin < end && order[begin].key == order[begin - 1].key) ++begin;
+  for (std::size_t next = begin; begin < end; begin = next) {
     ReachedBox reach;
-    for (; end < order.size() && order[end].key == order[begin].key; ++end)
-      reach.include({out.x[end], out.y[end], out.z[end]}, out.support[end]);
-    out.clusters.push_back(reach.cluster(begin, end));
+    for (; next < order.size() && order[next].key == order[begin].key; ++next)
+      reach.include({in.x[next], in.y[next], in.z[next]}, in.support[next]);
+    out.push_back(reach.cluster(begin, next));
   }
+  return out;
+}
+
+void find_clusters(const std::vector<Keyed>& order, ClusteredBucket& out) {
+  std::vector<std::vector<SampleCluster>> pieces((order.size() + kSampleGrain - 1) / kSampleGrain);
+  tbb::parallel_for(std::size_t{0}, pieces.size(), [&](std::size_t p) {
+    const std::size_t begin = p * kSampleGrain;
+    pieces[p] = clusters_within(order, out, begin, std::min(begin + kSampleGrain, order.size()));
+  });
+  out.clusters.clear();
+  for (const auto& piece : pieces) out.clusters.insert(out.clusters.end(), piece.begin(), piece.end());
 }
 
 }  // namespace
 
-void cluster_samples(const ActiveBucket& bucket, const Lattice& lattice, ClusterScratch& scratch,
-                     ClusteredBucket& out) {
-  const std::vector<Keyed>& order = in_order(bucket, lattice, scratch);
+namespace {
+
+void fill(const ActiveBucket& bucket, const std::vector<Keyed>& order, ClusteredBucket& out) {
   const LocalSamples& s = bucket.samples;
   for (auto* values : {&out.x, &out.y, &out.z}) resize_anew(*values, order.size() + ClusteredBucket::kBehind);
   resize_anew(out.support, order.size() + ClusteredBucket::kBehind);
   resize_anew(out.samples, order.size());
-  for (std::size_t k = 0; k < order.size(); ++k) {
+  for_samples(order.size(), [&](std::size_t k) {
     const std::uint32_t i = order[k].sample;
     out.x[k] = s.x[i];
     out.y[k] = s.y[i];
     out.z[k] = s.z[i];
     out.support[k] = bucket.support[i];
     out.samples[k] = {s.nx[i], s.ny[i], s.nz[i], bucket.weight[i], bucket.band[i]};
-  }
+  });
   out.attributes.resize(s.attributes.size() + (bucket.residual.empty() ? 0 : kResidualSums));
   for (std::size_t a = 0; a < s.attributes.size(); ++a) pick(s.attributes[a], order, out.attributes[a]);
   if (!bucket.residual.empty()) {
@@ -153,6 +182,14 @@ void cluster_samples(const ActiveBucket& bucket, const Lattice& lattice, Cluster
                    [](float r) { return r * r; });
   }
   find_clusters(order, out);
+}
+
+}  // namespace
+
+void cluster_samples(const ActiveBucket& bucket, const Lattice& lattice, ClusterScratch& scratch,
+                     ClusteredBucket& out) {
+  // A thread that waits for others here must not begin with another bucket: the scratch is in use.
+  tbb::this_task_arena::isolate([&] { fill(bucket, in_order(bucket, lattice, scratch), out); });
 }
 
 }  // namespace lamina

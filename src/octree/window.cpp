@@ -2,12 +2,12 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/spin_mutex.h>
 
 #include <algorithm>
 #include <atomic>
 #include <deque>
 #include <limits>
-#include <mutex>
 #include <set>
 #include <tuple>
 
@@ -27,6 +27,8 @@ std::size_t value_bytes(const Projected& points) {
   for (const CornerValues& v : points.values) bytes += sizeof(float) * v.size();
   return bytes;
 }
+
+constexpr std::size_t kAtOnce = 64;  ///< leaves that a thread looks at with little to do for each
 
 using Upper = CornerTree::RootNodeType::ChildNodeType;
 using Lower = Upper::ChildNodeType;
@@ -69,7 +71,7 @@ struct Window::Trees {
   std::vector<Level> levels;
   std::vector<std::unique_ptr<CornerLeaf>> spare;  ///< retired leaves, used again: leaves come and go all the time
   SparePages spare_pages;
-  std::mutex creation;
+  tbb::spin_mutex creation;  ///< held for less than a thread takes to be woken
   /// A leaf that does not know its neighbours, nor they it.
   struct Stranger {
     int level;
@@ -237,13 +239,12 @@ CornerBlock& Window::touch_shared(int level, const Block& b) {
   if (const LayerTable* table = Trees::table(trees_->levels[level], b)) {
     if (CornerBlock* block = table->find(b.x, b.y)) return *block;
   }
-  const std::lock_guard lock(trees_->creation);
+  const tbb::spin_mutex::scoped_lock lock(trees_->creation);
   CornerBlock* const there = trees_->find(level, b);
   return there != nullptr ? *there : trees_->create(level, b);
 }
 
 void Window::introduce() {
-  constexpr std::size_t kAtOnce = 64;
   const auto& strangers = trees_->strangers;
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, strangers.size(), kAtOnce), [&](const auto& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) trees_->introduce(strangers[i]);
@@ -270,10 +271,14 @@ Tiles Window::tiles(int level, std::int32_t slab) const {
 void Window::retire_values(std::int32_t slab) {
   for (int level = 0; level < levels(); ++level) {
     const int place = slab_in_leaf(level, lattice_.first_layer(level, slab) & 7);
-    for (const Tile& t : tiles(level, slab)) {
-      t.leaf->values[place] = {};
-      if (t.leaf->centres != nullptr) t.leaf->centres->values[place] = {};
-    }
+    const Tiles of_slab = tiles(level, slab);
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, of_slab.size(), kAtOnce), [&](const auto& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) {
+        CornerBlock& leaf = *of_slab[i].leaf;
+        leaf.values[place] = {};
+        if (leaf.centres != nullptr) leaf.centres->values[place] = {};
+      }
+    });
   }
 }
 

@@ -1,6 +1,8 @@
 // The sliding window: one OpenVDB tree per level, filled and retired slab by slab; corners that several levels hold,
 // and random access for the few places that leave their tile.
 #pragma once
+#include <tbb/partitioner.h>
+
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -97,6 +99,9 @@ class Window {
   void retire_values(std::int32_t slab);
   /// Frees every leaf whose last layer lies below the slab.
   void retire_below(std::int32_t slab);
+  /// Loops with much to do for each of a slab's tiles go by it: those at one place go to the same thread while all have
+  /// work, as what it wrote of them is in its core's cache. Not for two loops at once.
+  [[nodiscard]] tbb::affinity_partitioner& affinity() const { return affinity_; }
   [[nodiscard]] std::size_t leaf_count() const;
   [[nodiscard]] std::size_t memory() const;  ///< bytes held by nodes, values and retired leaves kept for reuse
 
@@ -106,6 +111,7 @@ class Window {
   Lattice lattice_;
   int attributes_;
   bool rare_;
+  mutable tbb::affinity_partitioner affinity_;
   std::unique_ptr<Trees> trees_;
 };
 
@@ -135,8 +141,7 @@ inline FinerCorner finer_corner(const Window& window, int level, const Tile& til
                       {tile.block.x * 8 + (bit & 7), tile.block.y * 8 + (bit >> 3), tile.block.z * 8 + z});
 }
 
-/// Remembers the blocks met last. One thread's; the window must not gain or lose leaves while it is in use. The window
-/// must not gain or lose leaves while it is in use.
+/// Remembers the blocks met last. One thread's; the window must not gain or lose leaves while it is in use.
 class BlockCache {
  public:
   explicit BlockCache(const Window& window) : window_(&window) {}

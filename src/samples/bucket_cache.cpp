@@ -1,5 +1,9 @@
 #include "samples/bucket_cache.h"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <array>
 #include <cstdint>
@@ -51,7 +55,9 @@ template <class T>
 void permute(std::vector<T>& values, const std::vector<BlockEntry>& order, std::vector<T>& scratch) {
   if (values.empty()) return;
   resize_anew(scratch, values.size());
-  for (std::size_t i = 0; i < order.size(); ++i) scratch[i] = values[static_cast<std::uint32_t>(order[i])];
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), kSampleGrain), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) scratch[i] = values[static_cast<std::uint32_t>(order[i])];
+  });
   values.swap(scratch);
 }
 
@@ -100,7 +106,8 @@ BucketCache::~BucketCache() {
 
 void BucketCache::load(std::size_t bucket, ActiveBucket& out) {
   store_.read(bucket, out.samples);
-  sort_by_block(out.samples, lattice_, scratch_.local());
+  // A thread that waits for others here must not begin with another bucket: the scratch is in use.
+  tbb::this_task_arena::isolate([&] { sort_by_block(out.samples, lattice_, scratch_.local()); });
 }
 
 void BucketCache::prefetch(std::size_t bucket) {

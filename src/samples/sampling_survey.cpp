@@ -1,5 +1,7 @@
 #include "samples/sampling_survey.h"
 
+#include <tbb/parallel_for.h>
+
 #include <Eigen/Dense>
 #include <algorithm>
 #include <array>
@@ -31,20 +33,21 @@ std::size_t bucket_of_rank(const SlabStore& store, std::uint64_t rank) {
 /// end, far more than single cells that the surface clips.
 constexpr double kLow = 0.01, kMiddle = 0.5, kHigh = 0.99;
 
-std::vector<WeightedRadius> run_radii(const SlabStore& store, const ReadBucket& read, BucketSpan run,
-                                      std::uint32_t min_samples) {
-  const CutEnds cut{run.begin > 0, run.end < store.buckets()};
-  return density_radii(read_oriented(store, read, run), cut, min_samples);
+CutEnds ends_of(const SlabStore& store, BucketSpan run) {
+  return {run.begin > 0, run.end < store.buckets()};
 }
 
-std::vector<WeightedRadius> given_radii(const ReadBucket& read, BucketSpan run) {
-  std::vector<WeightedRadius> radii;
+std::vector<WeightedRadius> run_radii(const SlabStore& store, const ReadBucket& read, BucketSpan run,
+                                      std::uint32_t min_samples) {
+  return density_radii(read_oriented(store, read, run), ends_of(store, run), min_samples);
+}
+
+void add_given_radii(const ReadBucket& read, BucketSpan run, std::vector<WeightedRadius>& radii) {
   LocalSamples bucket;
   for (std::size_t b = run.begin; b < run.end; ++b) {
     read(b, bucket);
     for (const float r : bucket.radius) radii.push_back({r, 1});
   }
-  return radii;
 }
 
 /// How many buckets make a run tall enough.
@@ -237,52 +240,76 @@ std::array<float, 3> middle_of(const LocalSamples& samples, const std::vector<st
 
 }  // namespace
 
-Noise survey_noise(const SlabStore& store, const ReadBucket& read, float radius) {
-  if (store.total() == 0 || !(radius > 0)) return {};
-  std::vector<float> distances;
-  std::vector<float> angles;
+namespace {
+
+/// What a run's seeds tell.
+struct RunNoise {
+  std::vector<float> distances, angles;
+  std::size_t looked_at = 0, blurred = 0, lopsided = 0, lined = 0;
+  std::array<float, 3> middle{};
+};
+
+/// `reach`: how far neighbours are looked for, steps.
+RunNoise noise_of(const LocalSamples& samples, double reach) {
+  const SeedNeighbourhoods around(samples, reach, choose_seeds(samples, reach));
+  RunNoise out;
   std::vector<Eigen::Vector3d> neighbours;
   ConsensusPlane plane;
-  std::size_t looked_at = 0;
-  std::size_t blurred = 0;
-  std::size_t lopsided = 0;
-  std::size_t lined = 0;
-  Noise noise;
+  for (const std::size_t seed : around.seeds()) {
+    gather(around, seed, neighbours);
+    if (neighbours.size() < kLeast) continue;
+    ++out.looked_at;
+    out.lined += is_lined(neighbours) ? 1 : 0;
+    out.lopsided += is_lopsided(neighbours, around.normal(seed)) ? 1 : 0;
+    out.blurred += is_blurred(neighbours, around.normal(seed), plane) ? 1 : 0;
+    const Deviation d = deviation(neighbours, around.normal(seed));
+    if (d.distance >= 0) out.distances.push_back(static_cast<float>(d.distance * kNeighbourhood));
+    if (d.angle >= 0) out.angles.push_back(static_cast<float>(d.angle));
+  }
+  out.middle = middle_of(samples, around.seeds());
+  return out;
+}
+
+}  // namespace
+
+Noise survey_noise(const SlabStore& store, const ReadBucket& read, float radius) {
+  if (store.total() == 0 || !(radius > 0)) return {};
   const bool small = store.total() <= kRuns * kRunSamples;
+  const double height = small ? std::numeric_limits<double>::infinity() : kRunHeight * static_cast<double>(radius);
+  std::vector<LocalSamples> samples;  // ranks read together, one bucket after the other
   for (int run = 0; run < (small ? 1 : kRuns); ++run) {
     const std::uint64_t rank =
         small ? store.total() / 2
               : store.total() / kRuns * static_cast<std::uint64_t>(run) + store.total() / (2 * kRuns);
-    const double height = small ? std::numeric_limits<double>::infinity() : kRunHeight * static_cast<double>(radius);
-    const LocalSamples samples = read_oriented(store, read, noise_run(store, rank, height));
-    const double reach = kNeighbourhood * static_cast<double>(radius);
-    const SeedNeighbourhoods around(samples, reach, choose_seeds(samples, reach));
-    std::vector<float> here;
-    for (const std::size_t seed : around.seeds()) {
-      gather(around, seed, neighbours);
-      if (neighbours.size() < kLeast) continue;
-      ++looked_at;
-      lined += is_lined(neighbours) ? 1 : 0;
-      lopsided += is_lopsided(neighbours, around.normal(seed)) ? 1 : 0;
-      blurred += is_blurred(neighbours, around.normal(seed), plane) ? 1 : 0;
-      const Deviation d = deviation(neighbours, around.normal(seed));
-      if (d.distance >= 0) here.push_back(static_cast<float>(d.distance * kNeighbourhood));
-      if (d.angle >= 0) angles.push_back(static_cast<float>(d.angle));
-    }
-    distances.insert(distances.end(), here.begin(), here.end());
-    if (const float median = quantile_of_enough(here, 0.5); median > noise.worst) {
+    samples.push_back(read_oriented(store, read, noise_run(store, rank, height)));
+  }
+  std::vector<RunNoise> found(samples.size());
+  tbb::parallel_for(std::size_t{0}, found.size(), [&](std::size_t run) {
+    found[run] = noise_of(samples[run], kNeighbourhood * static_cast<double>(radius));
+  });
+  RunNoise all;
+  Noise noise;
+  for (RunNoise& run : found) {
+    all.distances.insert(all.distances.end(), run.distances.begin(), run.distances.end());
+    all.angles.insert(all.angles.end(), run.angles.begin(), run.angles.end());
+    all.looked_at += run.looked_at;
+    all.blurred += run.blurred;
+    all.lopsided += run.lopsided;
+    all.lined += run.lined;
+    if (const float median = quantile_of_enough(run.distances, 0.5); median > noise.worst) {
       noise.worst = median;
-      noise.worst_at = middle_of(samples, around.seeds());
+      noise.worst_at = run.middle;
     }
   }
   constexpr double kAllButATenth = 0.9;
-  noise.distance = quantile_of_enough(distances, 0.5);
-  noise.high = quantile_of_enough(distances, kAllButATenth);
-  noise.angle = quantile_of_enough(angles, 0.5);
-  if (looked_at < kEnough) return noise;
-  noise.blurred = static_cast<float>(blurred) / static_cast<float>(looked_at);
-  noise.lined = static_cast<float>(lined) / static_cast<float>(looked_at);
-  noise.lopsided = static_cast<float>(lopsided) / static_cast<float>(looked_at);
+  noise.distance = quantile_of_enough(all.distances, 0.5);
+  noise.high = quantile_of_enough(all.distances, kAllButATenth);
+  noise.angle = quantile_of_enough(all.angles, 0.5);
+  if (all.looked_at < kEnough) return noise;
+  const auto share = [&](std::size_t of) { return static_cast<float>(of) / static_cast<float>(all.looked_at); };
+  noise.blurred = share(all.blurred);
+  noise.lined = share(all.lined);
+  noise.lopsided = share(all.lopsided);
   return noise;
 }
 
@@ -295,12 +322,22 @@ RadiusSurvey survey_density(const SlabStore& store, const ReadBucket& read, std:
   const bool given = store.layout().has_radius;
   const bool whole = store.total() <= sample_limit;
   const std::size_t size = given || whole ? 1 : buckets_in_run(store, read, sample_limit, min_samples);
+  std::vector<LocalSamples> samples;
+  std::vector<CutEnds> cut;
   std::vector<WeightedRadius> radii;
   for (const BucketSpan& run : choose_runs(store, sample_limit, size)) {
-    const auto found = given ? given_radii(read, run) : run_radii(store, read, run, min_samples);
-    radii.insert(radii.end(), found.begin(), found.end());
     survey.samples += samples_in(store, run);
+    if (given) {
+      add_given_radii(read, run, radii);
+    } else {
+      samples.push_back(read_oriented(store, read, run));
+      cut.push_back(ends_of(store, run));
+    }
   }
+  std::vector<std::vector<WeightedRadius>> found(samples.size());
+  tbb::parallel_for(std::size_t{0}, found.size(),
+                    [&](std::size_t run) { found[run] = density_radii(samples[run], cut[run], min_samples); });
+  for (const auto& of_run : found) radii.insert(radii.end(), of_run.begin(), of_run.end());
   if (radii.empty()) return survey;
   std::sort(radii.begin(), radii.end(), [](auto& a, auto& b) { return a.radius < b.radius; });
   const std::uint64_t total = samples_of(radii);
