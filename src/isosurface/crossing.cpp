@@ -37,6 +37,11 @@ void reach_ends(const TileView& tile, int z, const std::array<std::uint64_t, 3>&
   if (accepted[2] != 0) reach_layer(tile.neighbour(0, 0, (z + 1) >> 3), (z + 1) & 7);
 }
 
+/// Several tiles, of several levels, may mark in one block.
+void add_surface(CornerBlock& block, int z, std::uint64_t corners) {
+  std::atomic_ref(block.surface.words[z]).fetch_or(corners, std::memory_order_relaxed);
+}
+
 /// In the finest level that holds the corner of `level`.
 void mark_finest(Window& window, int level, Cell corner) {
   for (FinerCorner finer = finer_corner(window, level, corner); finer.block != nullptr;
@@ -47,9 +52,7 @@ void mark_finest(Window& window, int level, Cell corner) {
   CornerBlock* holder = window.probe(level, block_of(corner));
   const int offset = offset_in_block(corner);
   reach_layer(holder, offset >> 6);
-  // Several tiles of the level may mark in one block.
-  const std::atomic_ref<std::uint64_t> word(holder->surface.words[offset >> 6]);
-  word.fetch_or(std::uint64_t{1} << (offset & 63), std::memory_order_relaxed);
+  add_surface(*holder, offset >> 6, std::uint64_t{1} << (offset & 63));
 }
 
 }  // namespace
@@ -157,7 +160,7 @@ void mark_surface(const TileView& tile, Window& window) {
     if (tile.level > 0) {
       shared = ends & beside_split(Slice(tile, &CornerBlock::split, z - 1), Slice(tile, &CornerBlock::split, z));
     }
-    leaf.surface.words[z] |= ends & ~shared;
+    add_surface(leaf, z, ends & ~shared);
     for_bits(shared, [&](int bit) { mark_finest(window, tile.level, tile.cell(z * 64 + bit)); });
   }
 }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <span>
 
 #include "base/vectors.h"
 #include "isosurface/tile_view.h"
@@ -17,7 +18,6 @@ namespace lamina {
 namespace {
 
 constexpr std::size_t kViewsAtOnce = 12;  ///< fewer would not be worth a cache
-constexpr std::size_t kCheapViewsAtOnce = 32;
 
 /// Runs body(tile, cache) over all tiles, several threads at once; every tile writes its own places. `Parts`: what the
 /// body looks at of each tile's block.
@@ -35,15 +35,22 @@ void for_views(const Window& window, const std::vector<TileView>& views, const B
       window.affinity());
 }
 
-/// The same level by level, finest first.
+/// Runs body(tile) over them, where there is little to do for each.
 template <typename Body>
-void for_levels(const std::vector<TileView>& views, const Body& body) {
+void for_cheap_views(std::span<const TileView> views, const Body& body) {
+  constexpr std::size_t kAtOnce = 32;
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, views.size(), kAtOnce), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) body(views[i]);
+  });
+}
+
+/// Tiles that have edges below them are busy, too, level by level.
+void find_finer_busy(const std::vector<TileView>& views, const Window& window) {
   for (std::size_t first = 0, end = 0; first < views.size(); first = end) {
     while (end < views.size() && views[end].level == views[first].level) ++end;
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(first, end, kCheapViewsAtOnce),
-                      [&](const tbb::blocked_range<std::size_t>& range) {
-                        for (std::size_t i = range.begin(); i < range.end(); ++i) body(views[i]);
-                      });
+    if (views[first].level == 0) continue;
+    for_cheap_views(std::span(views).subspan(first, end - first),
+                    [&](const TileView& tile) { add_finer_busy(tile, window); });
   }
 }
 
@@ -295,10 +302,8 @@ void number_edges(Window& window, std::int32_t slab, const CornerRule& rule, Iso
   const std::vector<TileView> views = slab_tiles(window, slab);
   for_views<BlockParts<&CornerBlock::around, &CornerBlock::corners, &CornerBlock::outside, &CornerBlock::busy_layers>>(
       window, views, [](const TileView& tile, BlockCache&) { find_crossing(tile); });
-  for_levels(views, [&](const TileView& tile) {
-    if (tile.level > 0) add_finer_busy(tile, window);
-  });
-  for_levels(at_surface(views), [&](const TileView& tile) { mark_surface(tile, window); });
+  find_finer_busy(views, window);
+  for_cheap_views(at_surface(views), [&](const TileView& tile) { mark_surface(tile, window); });
   // Again: a corner that a finer level holds may have been marked in a tile without edges.
   const std::vector<TileView> surface = at_surface(views);
   assign_numbers(window, surface, out);
