@@ -56,10 +56,23 @@ double away(std::int32_t at, std::int32_t first, std::int32_t last, double shift
   return at < low ? low - at : at - high;
 }
 
-TEST(Clumps, HoldEverySampleOnceInsideTheirBox) {
+/// Cubes of four cells of the samples' levels that hold any.
+std::size_t cubes_with_samples(const ActiveBucket& bucket, const Lattice& lattice) {
+  std::set<std::array<std::int32_t, 4>> cubes;
+  const LocalSamples& s = bucket.samples;
+  for (std::size_t i = 0; i < s.size(); ++i) {
+    if (bucket.support[i] <= 0) continue;
+    const std::int32_t edge = 4 * lattice.cell_size(bucket.level[i]);
+    cubes.insert({bucket.level[i], floor_div(s.x[i], edge), floor_div(s.y[i], edge), floor_div(s.z[i], edge)});
+  }
+  return cubes.size();
+}
+
+TEST(SampleClusters, HoldEverySampleOnceInsideTheirBox) {
   const Lattice lattice{48, 3};
   for (std::uint64_t seed = 0; seed < 8; ++seed) {
-    const Batch batch = random_batch(seed, lattice, 1, 300);
+    // Enough, at times, for several pieces that threads work on.
+    const Batch batch = random_batch(seed, lattice, 1, seed % 4 == 0 ? 5 * kSampleGrain + 7 : 300);
     const ActiveBucket& bucket = *batch.front();
     const ClusteredBucket c = cluster_samples(bucket, lattice);
     std::map<Name, std::size_t> left;
@@ -67,6 +80,7 @@ TEST(Clumps, HoldEverySampleOnceInsideTheirBox) {
       if (bucket.support[i] > 0) left[name_of(bucket.samples.attributes, i)] = i;
     }
     ASSERT_EQ(c.samples.size(), left.size());
+    EXPECT_EQ(c.clusters.size(), cubes_with_samples(bucket, lattice));
     std::uint32_t end = 0;
     for (const SampleCluster& k : c.clusters) {
       ASSERT_EQ(k.begin, end);
@@ -97,7 +111,20 @@ TEST(Clumps, HoldEverySampleOnceInsideTheirBox) {
   }
 }
 
-TEST(Clumps, OfAbsurdExtentsAndCells) {
+TEST(SampleClusters, OneOfAsManySamplesAsSeveralPiecesHoldIsOne) {
+  const Lattice lattice{1 << 20, 1};
+  const Batch batch = random_batch(3, lattice, 1, 4 * kSampleGrain);
+  ActiveBucket bucket = *batch.front();
+  for (auto* axis : {&bucket.samples.x, &bucket.samples.y, &bucket.samples.z}) {
+    for (std::int32_t& v : *axis) v = (v & 0xFFFF) + 1;
+  }
+  bucket.support.assign(bucket.samples.size(), 1.0F);
+  const ClusteredBucket c = cluster_samples(bucket, lattice);
+  ASSERT_EQ(c.clusters.size(), 1U);
+  EXPECT_EQ(c.clusters.front().end, bucket.samples.size());
+}
+
+TEST(SampleClusters, OfAbsurdExtentsAndCells) {
   // Corners of the whole fixed-point range, with the smallest and the largest cells.
   for (const Lattice lattice : {Lattice{1, 3}, Lattice{1 << 20, 9}}) {
     ActiveBucket bucket;
