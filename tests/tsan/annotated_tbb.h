@@ -85,11 +85,12 @@ requires(!std::is_integral_v<Range>) void parallel_for(const Range& range, const
   Order order;
   ordered(order, [&] { ::tbb::parallel_for(range, job(body, order), std::forward<Partitioner>(partitioner)); });
 }
-template <class Index, class Body>
+template <class Index, class Body, class... Partitioner>
 requires std::is_integral_v<Index>
-void parallel_for(Index first, Index last, const Body& body) {
+void parallel_for(Index first, Index last, const Body& body, Partitioner&&... partitioner) {
   Order order;
-  ordered(order, [&] { ::tbb::parallel_for(first, last, job(body, order)); });
+  ordered(order,
+          [&] { ::tbb::parallel_for(first, last, job(body, order), std::forward<Partitioner>(partitioner)...); });
 }
 
 template <class... Bodies>
@@ -214,9 +215,15 @@ class task_arena {
     Order order;
     return ordered(order, [&] { return arena_.execute(job(body, order)); });
   }
+  [[nodiscard]] ::tbb::task_arena& without_order() { return arena_; }
 
  private:
   ::tbb::task_arena arena_;
+};
+
+class task_scheduler_observer : public ::tbb::task_scheduler_observer {
+ public:
+  explicit task_scheduler_observer(task_arena& arena) : ::tbb::task_scheduler_observer(arena.without_order()) {}
 };
 
 inline Order& pipeline_order() {
