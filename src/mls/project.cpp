@@ -31,9 +31,8 @@ struct Projector::Scratch {
   tbb::enumerable_thread_specific<Local> local;
   using Clustered = std::map<std::size_t, std::shared_ptr<ClusteredBucket>>;  ///< by number of the bucket
   Clustered clustered;
-  std::vector<std::shared_ptr<ClusteredBucket>> spare;  ///< storage of forgotten ones
-  Clustered begun;                                      ///< by tasks
-  Batch loaded;                                         ///< what these are made of, until the tasks are done
+  Clustered begun;  ///< by tasks
+  Batch loaded;     ///< what these are made of, until the tasks are done
   tbb::enumerable_thread_specific<ClusterScratch> clustering;
   tbb::task_group tasks;
 
@@ -56,16 +55,7 @@ struct Projector::Scratch {
   void forget_below(const std::vector<NumberedBuckets>& batches) {
     std::size_t lowest = std::numeric_limits<std::size_t>::max();
     for (const auto& batch : batches) lowest = std::min(lowest, batch.front());
-    constexpr std::size_t kMostSpare = 1;
-    const auto end = clustered.lower_bound(lowest);
-    for (auto at = clustered.begin(); at != end && spare.size() < kMostSpare; ++at) spare.push_back(at->second);
-    clustered.erase(clustered.begin(), end);
-  }
-  std::shared_ptr<ClusteredBucket> empty_bucket() {
-    if (spare.empty()) return std::make_shared<ClusteredBucket>();
-    std::shared_ptr<ClusteredBucket> bucket = std::move(spare.back());
-    spare.pop_back();
-    return bucket;
+    clustered.erase(clustered.begin(), clustered.lower_bound(lowest));
   }
 };
 
@@ -75,7 +65,7 @@ void Projector::Scratch::begin(const NumberedBuckets& batch, SampleFeed& feed, c
     if (!clustered.contains(number) && !begun.contains(number)) missing.push_back(number);
   }
   for (std::size_t m = 0; const std::shared_ptr<const ActiveBucket>& bucket : feed.load(missing)) {
-    const std::shared_ptr<ClusteredBucket> out = empty_bucket();
+    const auto out = std::make_shared<ClusteredBucket>();
     begun.emplace(missing[m++], out);
     loaded.push_back(bucket);
     tasks.run([this, lattice, &from = *bucket, &to = *out] { cluster_samples(from, lattice, clustering.local(), to); });

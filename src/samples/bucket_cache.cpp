@@ -51,8 +51,8 @@ std::array<Axis, 3> box_of(const LocalSamples& s, const FloorDivider& cell, int&
   }
 }
 
-template <class T>
-void permute(std::vector<T>& values, const std::vector<BlockEntry>& order, std::vector<T>& scratch) {
+template <class T, class Order>
+void permute(std::vector<T>& values, const Order& order, std::vector<T>& scratch) {
   if (values.empty()) return;
   resize_anew(scratch, values.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, order.size(), kSampleGrain), [&](const auto& range) {
@@ -61,10 +61,16 @@ void permute(std::vector<T>& values, const std::vector<BlockEntry>& order, std::
   values.swap(scratch);
 }
 
-}  // namespace
+template <class Order>
+void permute_all(LocalSamples& s, const Order& order, BlockOrderScratch& scratch) {
+  for (auto* values : {&s.x, &s.y, &s.z}) permute(*values, order, scratch.integers);
+  for (auto* values : {&s.nx, &s.ny, &s.nz, &s.radius, &s.quality}) permute(*values, order, scratch.floats);
+  for (auto& values : s.attributes) permute(values, order, scratch.floats);
+}
 
-void sort_by_block(LocalSamples& s, const Lattice& lattice, BlockOrderScratch& scratch) {
-  if (s.size() < 2 || s.size() > std::numeric_limits<std::uint32_t>::max()) return;
+/// The order of sort_by_block(), in scratch.order; false: the samples are in it.
+bool find_order(const LocalSamples& s, const Lattice& lattice, BlockOrderScratch& scratch) {
+  if (s.size() < 2 || s.size() > std::numeric_limits<std::uint32_t>::max()) return false;
   const FloorDivider cell(lattice.cell);
   int shift = kBlockShift;
   const auto [x, y, z] = box_of(s, cell, shift);
@@ -80,11 +86,15 @@ void sort_by_block(LocalSamples& s, const Lattice& lattice, BlockOrderScratch& s
     order[i] = key << 32 | i;
     sorted = sorted && (i == 0 || order[i - 1] <= order[i]);
   }
-  if (sorted) return;
+  if (sorted) return false;
   digit_sort(order, scratch.other, x.blocks * y.blocks * z.blocks - 1, [](BlockEntry e) { return e >> 32; });
-  for (auto* values : {&s.x, &s.y, &s.z}) permute(*values, order, scratch.integers);
-  for (auto* values : {&s.nx, &s.ny, &s.nz, &s.radius, &s.quality}) permute(*values, order, scratch.floats);
-  for (auto& values : s.attributes) permute(values, order, scratch.floats);
+  return true;
+}
+
+}  // namespace
+
+void sort_by_block(LocalSamples& s, const Lattice& lattice, BlockOrderScratch& scratch) {
+  if (find_order(s, lattice, scratch)) permute_all(s, scratch.order, scratch);
 }
 
 namespace {
@@ -104,40 +114,74 @@ BucketCache::~BucketCache() {
   tasks_.wait();
 }
 
-void BucketCache::load(std::size_t bucket, ActiveBucket& out) {
-  store_.read(bucket, out.samples);
-  // A thread that waits for others here must not begin with another bucket: the scratch is in use.
-  tbb::this_task_arena::isolate([&] { sort_by_block(out.samples, lattice_, scratch_.local()); });
+void BucketCache::load(std::size_t bucket, Columns wanted, Incoming& incoming) {
+  LocalSamples& samples = incoming.loaded->samples;
+  store_.read(bucket, samples, wanted);
+  BlockOrderScratch scratch;
+  // A thread that waits for others here must not begin with another bucket: that would be twice the scratch.
+  tbb::this_task_arena::isolate([&] {
+    if (wanted == Columns::all && incoming.order) {
+      if (!incoming.order->empty()) permute_all(samples, *incoming.order, scratch);
+      return;
+    }
+    incoming.order.emplace();
+    if (!find_order(samples, lattice_, scratch)) return;
+    permute_all(samples, scratch.order, scratch);
+    if (wanted == Columns::positions) incoming.order->assign(scratch.order.begin(), scratch.order.end());
+  });
 }
 
-void BucketCache::prefetch(std::size_t bucket) {
-  if (store_.count(bucket) == 0 || here_.contains(bucket) || incoming_.contains(bucket)) return;
+void BucketCache::start(std::size_t bucket, Columns wanted, Arriving& among) {
   ++reads_;
-  Incoming& incoming = incoming_[bucket];
-  incoming.loaded = std::make_shared<ActiveBucket>();
-  tasks_.run([this, bucket, &incoming] {
+  Incoming& incoming = among[bucket];
+  if (const auto known = orders_.find(bucket); known != orders_.end()) {
+    incoming.order = std::move(known->second);
+    orders_.erase(known);
+  }
+  tasks_.run([this, bucket, wanted, &incoming] {
     try {
-      load(bucket, *incoming.loaded);
+      load(bucket, wanted, incoming);
     } catch (...) {
       incoming.error = std::current_exception();
     }
   });
 }
 
+BucketCache::Incoming BucketCache::take(Arriving& from, std::size_t bucket) {
+  const auto coming = from.find(bucket);
+  if (coming == from.end()) {  // an empty bucket is never on its way
+    Incoming empty;
+    store_.read(bucket, empty.loaded->samples);
+    return empty;
+  }
+  tasks_.wait();
+  Incoming arrived = std::move(coming->second);
+  from.erase(coming);
+  if (arrived.error) std::rethrow_exception(arrived.error);
+  return arrived;
+}
+
+void BucketCache::prefetch(std::size_t bucket) {
+  if (store_.count(bucket) == 0 || here_.contains(bucket) || incoming_.contains(bucket)) return;
+  start(bucket, Columns::all, incoming_);
+}
+
+void BucketCache::prefetch_positions(std::size_t bucket) {
+  if (store_.count(bucket) == 0 || positions_.contains(bucket)) return;
+  start(bucket, Columns::positions, positions_);
+}
+
+LocalSamples BucketCache::get_positions(std::size_t bucket) {
+  prefetch_positions(bucket);
+  Incoming arrived = take(positions_, bucket);
+  if (arrived.order) orders_.insert_or_assign(bucket, std::move(*arrived.order));
+  return std::move(arrived.loaded->samples);
+}
+
 std::shared_ptr<ActiveBucket> BucketCache::get(std::size_t bucket) {
   if (const auto hit = here_.find(bucket); hit != here_.end()) return hit->second;
   prefetch(bucket);
-  std::shared_ptr<ActiveBucket> loaded;
-  if (const auto coming = incoming_.find(bucket); coming != incoming_.end()) {
-    tasks_.wait();
-    const Incoming arrived = std::move(coming->second);
-    incoming_.erase(coming);
-    if (arrived.error) std::rethrow_exception(arrived.error);
-    loaded = arrived.loaded;
-  } else {
-    loaded = std::make_shared<ActiveBucket>();  // an empty bucket is never read
-    load(bucket, *loaded);
-  }
+  std::shared_ptr<ActiveBucket> loaded = take(incoming_, bucket).loaded;
   bytes_ += bytes_of(loaded->samples);
   here_.emplace(bucket, loaded);
   keep_within_budget(bucket);
@@ -154,6 +198,7 @@ void BucketCache::keep_within_budget(std::size_t wanted) {
 }
 
 void BucketCache::drop(std::size_t bucket) {
+  orders_.erase(bucket);
   if (const auto coming = incoming_.find(bucket); coming != incoming_.end()) {
     tasks_.wait();
     incoming_.erase(coming);

@@ -1,13 +1,13 @@
 // Buckets in memory: read in the background before they are needed, kept within a budget; their samples in order by
 // blocks of cells, so that neighbours in space are neighbours in memory.
 #pragma once
-#include <tbb/enumerable_thread_specific.h>
 #include <tbb/task_group.h>
 
 #include <cstdint>
 #include <exception>
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "lattice/lattice.h"
@@ -15,7 +15,7 @@
 
 namespace lamina {
 
-/// Memory of sort_by_block(), kept from bucket to bucket.
+/// Memory of sort_by_block().
 struct BlockOrderScratch {
   std::vector<std::uint64_t> order, other;
   std::vector<std::int32_t> integers;
@@ -26,6 +26,9 @@ struct BlockOrderScratch {
 /// inside a block in the order they had. A bucket that spans more than 2^32 such blocks is sorted by larger ones (twice
 /// the side, four times, ...). The result is a function of the samples and the lattice alone.
 void sort_by_block(LocalSamples& samples, const Lattice& lattice, BlockOrderScratch& scratch);
+
+/// Numbers of a bucket's samples before they were sorted, in the order they were put in; empty: they had it already.
+using BlockOrder = std::vector<std::uint32_t>;
 
 /// A bucket's samples with what refinement and projection need of each.
 struct ActiveBucket {
@@ -52,16 +55,26 @@ class BucketCache {
   std::shared_ptr<ActiveBucket> get(std::size_t bucket);
   /// Starts reading a bucket in the background unless it is here or on its way. It stays until get() or drop().
   void prefetch(std::size_t bucket);
+  // Where the samples of a bucket lie is wanted long before the rest. They are not kept so long, but read again; in
+  // their order, which is kept, so that they are sorted once.
+  /// Starts reading positions as prefetch() does; they stay until get_positions().
+  void prefetch_positions(std::size_t bucket);
+  /// The positions alone, sorted as all of the bucket will be. Nothing of them stays here.
+  LocalSamples get_positions(std::size_t bucket);
   /// Forgets a bucket.
   void drop(std::size_t bucket);
-  [[nodiscard]] std::uint64_t reads() const { return reads_; }  ///< times a bucket was read from the store
+  [[nodiscard]] std::uint64_t reads() const { return reads_; }  ///< times a bucket or its positions were read
 
  private:
   struct Incoming {
-    std::shared_ptr<ActiveBucket> loaded;
+    std::shared_ptr<ActiveBucket> loaded = std::make_shared<ActiveBucket>();
+    std::optional<BlockOrder> order;  ///< of the samples: known before, or found with the positions
     std::exception_ptr error;
   };
-  void load(std::size_t bucket, ActiveBucket& out);
+  using Arriving = std::map<std::size_t, Incoming>;
+  void load(std::size_t bucket, Columns wanted, Incoming& incoming);
+  void start(std::size_t bucket, Columns wanted, Arriving& among);
+  Incoming take(Arriving& from, std::size_t bucket);
   void keep_within_budget(std::size_t wanted);
 
   const SlabStore& store_;
@@ -70,8 +83,8 @@ class BucketCache {
   std::size_t bytes_ = 0;
   std::uint64_t reads_ = 0;
   std::map<std::size_t, std::shared_ptr<ActiveBucket>> here_;
-  std::map<std::size_t, Incoming> incoming_;
-  tbb::enumerable_thread_specific<BlockOrderScratch> scratch_;
+  Arriving incoming_, positions_;
+  std::map<std::size_t, BlockOrder> orders_;  ///< of buckets whose positions have been asked for, and nothing else
   tbb::task_group tasks_;
 };
 

@@ -137,8 +137,15 @@ void SampleFeed::prepare(std::int64_t z_limit, const OnReady& on_ready) {
 
 void SampleFeed::read_ahead() {
   std::size_t next = estimator_ == nullptr ? measured_ : pushed_;  // to be read for the first time
-  for (int i = 0; i < kReadAhead && (next = next_filled(next)) < store_.buckets(); ++i) cache_.prefetch(next++);
+  for (int i = 0; i < kReadAhead && (next = next_filled(next)) < store_.buckets(); ++i) {
+    if (estimator_ == nullptr) {
+      cache_.prefetch(next++);
+    } else {
+      cache_.prefetch_positions(next++);
+    }
+  }
   announced_ = std::max(announced_, next);
+  if (estimator_ != nullptr && next_filled(measured_) < pushed_) cache_.prefetch(next_filled(measured_));
   for (int i = 0; i < kAnnounceAhead && (next = next_filled(next)) < store_.buckets(); ++i, ++next) {
     if (next < announced_) continue;
     store_.will_read(next);
@@ -157,7 +164,7 @@ void SampleFeed::measure_next() {
   } else {
     read_ahead();
     if (store_.count(pushed_) > 0) {
-      estimator_->push(cache_.get(pushed_)->samples);
+      estimator_->push(cache_.get_positions(pushed_));
     } else {
       estimator_->push({});
     }

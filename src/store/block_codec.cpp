@@ -161,12 +161,12 @@ void SampleColumns::check(const LocalSamples& samples) const {
   }
 }
 
-void SampleColumns::resize(LocalSamples& samples, std::size_t n) const {
+void SampleColumns::resize(LocalSamples& samples, std::size_t n, Columns wanted) const {
   if (!has_radius_) samples.radius.clear();
   if (!has_quality_) samples.quality.clear();
   samples.attributes.resize(size() - first_attribute_);
   for (const auto position : kPositions) resize_anew(samples.*position, n);
-  for (std::size_t c = 3; c < size(); ++c) resize_anew(floats(samples, c), n);
+  for (std::size_t c = 3; c < size(); ++c) resize_anew(floats(samples, c), wanted == Columns::all ? n : 0);
 }
 
 void SampleColumns::scatter(const LocalSamples& samples, const PackedNormals& normals, std::size_t column,
@@ -300,12 +300,13 @@ std::size_t encode_block(const SampleColumns& columns, std::span<const std::byte
 }
 
 bool decode_block(const SampleColumns& columns, std::span<const std::byte> block, std::size_t count, LocalSamples& out,
-                  std::size_t first) {
+                  std::size_t first, Columns wanted) {
   std::size_t begin = columns.size() * sizeof(ColumnHeader);
   if (block.size() < begin) return false;
   std::vector<std::byte> scratch;
   std::vector<std::uint16_t> normals;  // the three columns after each other
   for (std::size_t c = 0; c < columns.size(); ++c) {
+    if (wanted == Columns::positions && !SampleColumns::is_position(c)) return true;
     ColumnHeader header;
     std::memcpy(&header, block.data() + c * sizeof(ColumnHeader), sizeof(header));
     const std::size_t bytes = count * columns.bytes(c);

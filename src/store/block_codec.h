@@ -61,8 +61,8 @@ class SampleColumns {
 
   /// Throws Error(internal) when an array the layout promises is missing or of another length.
   void check(const LocalSamples& samples) const;
-  /// Sizes all arrays of the layout to n, and empties the optional ones it lacks.
-  void resize(LocalSamples& samples, std::size_t n) const;
+  /// Sizes all arrays of the layout to n, those that are not wanted to none, and empties the optional ones it lacks.
+  void resize(LocalSamples& samples, std::size_t n, Columns wanted = Columns::all) const;
   /// Value rows[i] goes to slots[i], converted to the column's type: rounded and clamped for integers, NaN as zero.
   /// Slot s is row s % kChunkRows of chunk s / kChunkRows; a chunk holds kChunkRows values of each column in turn.
   /// Normals come packed.
@@ -105,7 +105,7 @@ std::size_t encode_block(const SampleColumns& columns, std::span<const std::byte
 /// Decompresses a block of `count` rows into rows [first, first + count) of `out`, which has been sized for them.
 /// Distinct rows may be decoded from several threads. False when the bytes are not such a block.
 [[nodiscard]] bool decode_block(const SampleColumns& columns, std::span<const std::byte> block, std::size_t count,
-                                LocalSamples& out, std::size_t first);
+                                LocalSamples& out, std::size_t first, Columns wanted = Columns::all);
 
 // What a finished store consists of, for the writer that makes it and the store that reads it; and its blocks as they
 // rest on disk, for moving them between stores without unpacking them.

@@ -95,7 +95,7 @@ std::size_t SlabStore::files() const {
   return impl_->files.size();
 }
 
-void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
+void SlabStore::read(std::size_t bucket, LocalSamples& out, Columns wanted) const {
   const auto& blocks = impl_->buckets[bucket].blocks;
   const auto& checksums = impl_->buckets[bucket].checksums;
   const auto& keep = impl_->buckets[bucket].keep;
@@ -109,14 +109,14 @@ void SlabStore::read(std::size_t bucket, LocalSamples& out) const {
   }
   if (here != (keep.empty() ? count(bucket) : keep.size()))
     throw Error(ExitCode::internal, fmt::format("slab store: bucket {} lies in other stores", bucket));
-  columns.resize(out, here);
+  columns.resize(out, here, wanted);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, blocks.size()), [&](const auto& range) {
     std::vector<std::byte> bytes;
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       bytes.resize(blocks[i].bytes);
       file.read(blocks[i].offset, bytes);
       const bool whole = checksums.empty() || block_checksum(bytes) == checksums[i];
-      if (!whole || !decode_block(columns, bytes, blocks[i].count, out, first[i]))
+      if (!whole || !decode_block(columns, bytes, blocks[i].count, out, first[i], wanted))
         file.report_damage(blocks[i].offset, fmt::format("samples of bucket {}", bucket));
     }
   });

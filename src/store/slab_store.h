@@ -25,6 +25,9 @@ struct LocalSamples {
 /// Samples of a bucket that a thread takes at a time: few enough that a dozen threads have work.
 inline constexpr std::size_t kSampleGrain = 2048;
 
+/// What is read of a bucket's samples.
+enum class Columns : std::uint8_t { all, positions };
+
 struct StoreLayout {
   bool has_radius = false;
   bool has_quality = false;
@@ -68,9 +71,10 @@ class SlabStore {
   [[nodiscard]] std::uint64_t total() const;
   [[nodiscard]] std::uint64_t disk_bytes() const;  ///< not given back
   [[nodiscard]] std::size_t files() const;         ///< that the buckets are in, each a run of them
-  /// Decompresses one bucket into `out` (resized to it); safe from several threads. Throws Error(budget) naming the
-  /// directory when the file cannot be read or is damaged; of a kept store Error(unreadable) naming the file.
-  void read(std::size_t bucket, LocalSamples& out) const;
+  /// Decompresses one bucket into `out` (resized to it; what is not wanted is left empty); safe from several threads.
+  /// Throws Error(budget) naming the directory when the file cannot be read or is damaged; of a kept store
+  /// Error(unreadable) naming the file.
+  void read(std::size_t bucket, LocalSamples& out, Columns wanted = Columns::all) const;
   /// Leaves samples out for good: keep[b][i] says whether sample i of bucket b stays, as read() has given it so far.
   /// Counts and bounds become those of the samples that stay. Their disk space is not given back. Reads every bucket
   /// that loses samples, and throws what read() does.

@@ -81,5 +81,42 @@ TEST(BlockOrder, TakesLargerBlocksWhereABucketSpansTooMany) {
   EXPECT_TRUE(rc::check("sorted", [&] { expect_sorted(s, {8, 4}, std::int64_t{64} << 12); }));
 }
 
+/// Three buckets, the last one empty.
+SlabStore three_buckets(const LocalSamples& samples) {
+  StoreSettings settings;
+  settings.directory = testing::TempDir();
+  settings.z_min = -200;
+  settings.bucket_height = 200;
+  settings.buckets = 3;
+  StoreLayout layout;
+  layout.has_quality = true;
+  for (const char* name : {"a", "b"}) layout.attributes.push_back({name, ScalarType::float32});
+  SlabStoreWriter writer(layout, settings);
+  writer.append(samples);
+  return writer.finish();
+}
+
+TEST(BucketCache, PositionsComeFirstInTheOrderOfTheRest) {
+  std::mt19937 random(7);
+  const SlabStore store = three_buckets(numbered_samples(3000, -3000, 3000, random));
+  const Lattice lattice{20, 4};
+  BucketCache cache(store, lattice, 0), other(store, lattice, 0);
+  for (std::size_t b = 0; b < 3; ++b) cache.prefetch_positions(b);
+  for (std::size_t b = 0; b < 3; ++b) {
+    const LocalSamples at = cache.get_positions(b);
+    const LocalSamples all = cache.get(b)->samples;
+    const LocalSamples expected = other.get(b)->samples;
+    EXPECT_EQ(at.size(), store.count(b));
+    EXPECT_TRUE(at.nx.empty() && at.quality.empty());
+    for (const LocalSamples* const same : {&at, &all})
+      EXPECT_TRUE(same->x == expected.x && same->y == expected.y && same->z == expected.z);
+    EXPECT_TRUE(all.nx == expected.nx && all.ny == expected.ny && all.nz == expected.nz);
+    EXPECT_EQ(all.quality, expected.quality);
+    EXPECT_EQ(all.attributes, expected.attributes);
+    cache.drop(b);
+    EXPECT_EQ(cache.get(b)->samples.x, expected.x);  // read once more
+  }
+}
+
 }  // namespace
 }  // namespace lamina
