@@ -172,7 +172,7 @@ requires std::is_invocable_v<Join, const Value&, const Value&> Value parallel_re
                                                                                      const Work& work, const Join& join,
                                                                                      Partitioner&&... partitioner) {
   FunctionBody<Value, Work, Join> body(identity, work, join);
-  parallel_reduce(range, body, std::forward<Partitioner>(partitioner)...);
+  annotated_tbb::parallel_reduce(range, body, std::forward<Partitioner>(partitioner)...);  // not the library's
   return body.value;
 }
 
