@@ -117,14 +117,16 @@ void add_simplification(const ReconstructionPlan& plan, const SlabStore& store, 
   cost.cpu_seconds += (plan.simplify.error > 0 ? kWithin : plan.simplify.deviation > 0 ? kFlat : kPlain) * triangles;
 }
 
-/// Of the samples that wait for their radii, which depend on two layers of coarsest counting cells, no more than the
-/// cache keeps; of those marked in slabs that are not projected yet, with what reading and sorting them takes; and of
-/// those in clusters, which act on a slab.
+/// Of the samples that wait for their radii, which depend on two layers of coarsest counting cells: their order, cells
+/// and radii, or all of them, no more than the cache keeps, where thin sheets are looked for or normals fitted again;
+/// of those marked in slabs that are not projected yet, with what reading and sorting them takes; and of those in
+/// clusters, which act on a slab.
 double samples_memory(const ReconstructionPlan& plan, const SlabStore& store) {
-  constexpr double kSample = 37, kRead = 38, kAttribute = 4, kLayers = 2.5;
+  constexpr double kSample = 37, kWaiting = 12, kRead = 38, kAttribute = 4, kLayers = 2.5;
   const double bytes = kSample + kAttribute * static_cast<double>(plan.attributes.size());
   const double coarsest = std::ldexp(plan.radii.finest_cell, plan.radii.levels - 1);
-  const double waiting = bytes * densest_layer(store, kLayers * coarsest);
+  const bool whole = plan.given_radii || plan.feed.refines_sheets() || plan.refit.support > 0;
+  const double waiting = (whole ? bytes : kWaiting) * densest_layer(store, kLayers * coarsest);
   const double reach = 2 * plan.feed.blend * static_cast<double>(plan.radius.median) + plan.lattice.slab_height();
   const double clustered = std::min(densest_layer(store, reach), static_cast<double>(plan.feed.batch_samples));
   const double slabs = reach_of(Stage::mark).ahead - reach_of(Stage::project).ahead + static_cast<double>(plan.window);
