@@ -67,6 +67,8 @@ class SignedUnionFind {
   /// Joins the sets of a and b, whose signs then differ where `relative` is -1. The smaller root stays. False when they
   /// were in one set already: then nothing changes.
   bool unite(std::uint32_t a, std::uint32_t b, std::int8_t relative) {
+    // So it is mostly, and on the way to a root no branch could be guessed.
+    if (parent_[a] == parent_[b]) return false;
     std::uint32_t root_a = find(a);
     std::uint32_t root_b = find(b);
     if (root_a == root_b) return false;

@@ -258,6 +258,7 @@ class PatchGrower {
 
   /// What the links of the cell's samples say, within their patches and to others. Later slabs look back themselves.
   void connect(Cell& cell) {
+    std::size_t last = 0;
     for (std::size_t s = cell.begin; s < cell.end; ++s) {
       const std::uint32_t i = order_[s];
       const std::uint32_t place = links_.core[i];
@@ -272,8 +273,10 @@ class PatchGrower {
         const auto l = static_cast<std::size_t>(std::countr_zero(left));
         const std::uint32_t other = samples_.node[links_.neighbours[i][l]];
         const float w = (ends.turned >> l & 1) != 0 ? -judged_[i].agreement[l] : judged_[i].agreement[l];
-        add(cell.edges, {std::min(node, other), std::max(node, other), w * std::min(std::abs(w), 1.0F),
-                         (along & same) >> l & 1, (along & ~same) >> l & 1});
+        add(cell.edges,
+            {std::min(node, other), std::max(node, other), w * std::min(std::abs(w), 1.0F), (along & same) >> l & 1,
+             (along & ~same) >> l & 1},
+            last);
       }
     }
     add_up(cell.edges);
@@ -303,15 +306,22 @@ class PatchGrower {
 
   /// A cell has few neighbours, and mostly few patches: the first edges are summed up as they come, in the order in
   /// which add_up() would; the others are left to it.
-  static void add(std::vector<PatchEdge>& edges, const PatchEdge& e) {
+  /// `last`: where the one before went, the next one mostly belongs.
+  static void add(std::vector<PatchEdge>& edges, const PatchEdge& e, std::size_t& last) {
     constexpr std::size_t kSummedAtOnce = 16;
+    if (last < edges.size() && edges[last].a == e.a && edges[last].b == e.b) {
+      include(e, edges[last]);
+      return;
+    }
     const auto end = edges.begin() + static_cast<std::ptrdiff_t>(std::min(edges.size(), kSummedAtOnce));
     const auto known = std::find_if(edges.begin(), end, [&](const PatchEdge& k) { return k.a == e.a && k.b == e.b; });
+    const auto place = static_cast<std::size_t>(known - edges.begin());
     if (known == end) {
       edges.push_back(e);
     } else {
       include(e, *known);
     }
+    if (place < kSummedAtOnce) last = place;
   }
   static void include(const PatchEdge& e, PatchEdge& sum) {
     sum.agreement += e.agreement;
