@@ -1,11 +1,6 @@
 #include "mls/kernel.h"
 
-#include <algorithm>
-#include <cstdlib>
-#include <string>
-#include <string_view>
-
-#include "lamina/error.h"
+#include "base/processor.h"
 
 namespace lamina {
 
@@ -17,30 +12,23 @@ void TileSamples::resize(std::size_t n, std::size_t attribute_count) {
 }
 
 std::vector<Kernel> available_kernels() {
-  __builtin_cpu_init();
+  const ProcessorKind own = processor_kind();
   std::vector<Kernel> kernels{kernel_v2::kernel()};
-  bool v3 = __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") && __builtin_cpu_supports("bmi") &&
-            __builtin_cpu_supports("bmi2");
-#ifndef __clang__  // which knows no names for the rest of v3 before its version 19
-  v3 = v3 && __builtin_cpu_supports("f16c") && __builtin_cpu_supports("movbe");
-#endif
-  if (v3) kernels.push_back(kernel_v3::kernel());
-  const bool v4 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-                  __builtin_cpu_supports("avx512cd") && __builtin_cpu_supports("avx512dq") &&
-                  __builtin_cpu_supports("avx512vl");
-  if (v3 && v4) kernels.push_back(kernel_v4::kernel());
+  if (own >= ProcessorKind::v3) kernels.push_back(kernel_v3::kernel());
+  if (own >= ProcessorKind::v4) kernels.push_back(kernel_v4::kernel());
   return kernels;
 }
 
 Kernel select_kernel() {
-  const std::vector<Kernel> kernels = available_kernels();
-  const char* wanted = std::getenv("LAMINA_KERNEL");
-  if (wanted == nullptr || *wanted == '\0') return kernels.back();
-  for (const Kernel& k : kernels) {
-    if (std::string_view(k.name).ends_with(wanted)) return k;
+  switch (wanted_kind()) {
+    case ProcessorKind::v2:
+      return kernel_v2::kernel();
+    case ProcessorKind::v3:
+      return kernel_v3::kernel();
+    case ProcessorKind::v4:
+      break;
   }
-  throw Error(ExitCode::usage, "LAMINA_KERNEL=" + std::string(wanted) +
-                                   ": no such kernel on this processor; leave it unset or name one of v2, v3, v4");
+  return kernel_v4::kernel();
 }
 
 }  // namespace lamina

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <span>
 #include <vector>
 
 #include "base/four.h"
@@ -25,13 +26,6 @@ void link(const Neighbour* found, std::size_t count, std::uint32_t place, std::s
   const std::size_t n = std::min(count, Links::kMost);
   for (std::size_t l = 0; l < n; ++l) neighbours[l] = found[(l + 1) * count / n - 1].sample;
   links.scale[i] = count > 0 ? found[count - 1].squared : 0.0F;
-}
-
-Moments moments_of(const SampleTree& tree, std::uint32_t place, const Neighbour* found, std::size_t count) {
-  Moments m;
-  m.count = 1;  // the sample itself
-  for (std::size_t n = 0; n < count; ++n) m.add(tree.offset(place, found[n].sample));
-  return m;
 }
 
 bool is_line(const Plane& plane) {
@@ -98,12 +92,15 @@ class DirectionFinder {
   void run() {
     tbb::parallel_for(blocks_of_core(), [&](const auto& range) {
       NearestSearch nearest(tree_);
-      std::array<Around, 2> two;
-      for (std::size_t i = range.begin(); i < range.end(); i += two.size()) {
-        const std::size_t n = std::min(two.size(), range.end() - i);
-        for (std::size_t k = 0; k < n; ++k) find_nearest(i + k, nearest, two[k]);
-        const std::array<Plane, 2> planes = fit_planes({two[0].moments, two[1].moments});
-        for (std::size_t k = 0; k < n; ++k) search(i + k, two[k], planes[k]);
+      std::array<Around, NearestSearch::kAtOnce> some;
+      for (std::size_t i = range.begin(); i < range.end(); i += some.size()) {
+        const std::size_t n = std::min(some.size(), range.end() - i);
+        nearest.start(std::span(links_.core).subspan(i, n), wanted_at_first(), bound_);
+        for (std::size_t k = 0; k < n; ++k) finish_nearest(links_.core[i + k], nearest, k, some[k]);
+        for (std::size_t k = 0; k < n; k += 2) {
+          const std::array<Plane, 2> planes = fit_planes({some[k].moments, some[k + 1].moments});
+          for (std::size_t one = k; one < std::min(k + 2, n); ++one) search(i + one, some[one], planes[one - k]);
+        }
       }
     });
     // Noise is no matter of single samples: levels that neighbours do not share are chance.
@@ -129,11 +126,10 @@ class DirectionFinder {
   [[nodiscard]] std::size_t wanted_at_first() const {
     return std::max(static_cast<std::size_t>(settings_.k), kLeastLinked);
   }
-  void find_nearest(std::size_t i, NearestSearch& nearest, Around& out) const {
-    const std::uint32_t place = links_.core[i];
-    out.count = nearest.nearest(place, wanted_at_first(), bound_, out.found.data());
+  void finish_nearest(std::uint32_t place, NearestSearch& nearest, std::size_t k, Around& out) const {
+    out.count = nearest.finish(k, out.found.data());
     const std::size_t taken = std::min(out.count, static_cast<std::size_t>(settings_.k));
-    out.moments = moments_of(tree_, place, out.found.data(), taken);
+    out.moments = moments_around(tree_, place, {out.found.data(), taken});
   }
 
   void search(std::size_t i, Around& around, Plane plane) {
@@ -145,7 +141,7 @@ class DirectionFinder {
     while (is_line(plane) && count == wanted && wanted < most) {
       wanted = std::min(2 * wanted, most);
       taken = count = tree_.nearest(place, wanted, bound_, found.data());
-      plane = fit_plane(moments_of(tree_, place, found.data(), count));
+      plane = fit_plane(moments_around(tree_, place, {found.data(), count}));
     }
     float squared = taken > 0 ? found[taken - 1].squared : 0.0F;
     AcrossLines& across = across_.local();

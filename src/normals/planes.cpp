@@ -43,7 +43,53 @@ TwoDoubles least_root(const TwoDoubles& s, const TwoDoubles& d) {
   return l;
 }
 
+/// Sums of whole numbers up to this are exact, in whatever order.
+constexpr double kExact = 9007199254740992;  // 2^53
+
+/// Of four others at a time, all of them.
+Moments moments_by_four(const SampleTree& tree, std::uint32_t place, std::span<const Neighbour> others) {
+  TwoVectors sum{};
+  std::array<TwoDoubles, 6> products{};
+  for (std::size_t n = 0; n < others.size(); n += 4) {
+    const std::array<std::uint32_t, 4> places{others[n].sample, others[n + 1].sample, others[n + 2].sample,
+                                              others[n + 3].sample};
+    const std::array<FourFloats, 3> d = tree.offsets(place, places.data());
+    const auto add = [&](const TwoDoubles& x, const TwoDoubles& y, const TwoDoubles& z) {
+      sum[0] += x;
+      sum[1] += y;
+      sum[2] += z;
+      products[0] += x * x;
+      products[1] += x * y;
+      products[2] += x * z;
+      products[3] += y * y;
+      products[4] += y * z;
+      products[5] += z * z;
+    };
+    const auto low = [&](std::size_t a) { return TwoDoubles{d[a][0], d[a][1]}; };
+    const auto high = [&](std::size_t a) { return TwoDoubles{d[a][2], d[a][3]}; };
+    add(low(0), low(1), low(2));
+    add(high(0), high(1), high(2));
+  }
+  const auto all = [](const TwoDoubles& v) { return v[0] + v[1]; };
+  Moments m;
+  m.count = static_cast<double>(others.size() + 1);
+  std::transform(sum.begin(), sum.end(), m.sum.begin(), all);
+  std::transform(products.begin(), products.end(), m.products.begin(), all);
+  return m;
+}
+
 }  // namespace
+
+Moments moments_around(const SampleTree& tree, std::uint32_t place, std::span<const Neighbour> others) {
+  // Offsets are whole numbers of steps, and no product exceeds the squared distance; half of it is for its rounding.
+  const bool exact =
+      !others.empty() && static_cast<double>(others.size() + 1) * double{others.back().squared} < kExact / 2;
+  if (exact && others.size() % 4 == 0) return moments_by_four(tree, place, others);
+  Moments m;
+  m.count = 1;  // the sample itself
+  for (const Neighbour& other : others) m.add(tree.offset(place, other.sample));
+  return m;
+}
 
 std::array<Plane, 2> fit_planes(const std::array<Moments, 2>& m) {
   const auto both = [&](const auto& of) { return TwoDoubles{of(m[0]), of(m[1])}; };

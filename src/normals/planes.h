@@ -3,8 +3,10 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "base/four.h"
+#include "samples/nearest.h"
 #include "samples/sample_tree.h"
 
 namespace lamina::normals {
@@ -46,6 +48,9 @@ struct Moments {
     products[5] += weight * z * z;
   }
 };
+
+/// Over the sample at `place` and others, nearest first.
+Moments moments_around(const SampleTree& tree, std::uint32_t place, std::span<const Neighbour> others);
 
 struct Plane {
   std::array<float, 3> normal{};           ///< unit length; zero where there is none: samples on a line or a point

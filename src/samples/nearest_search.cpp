@@ -1,13 +1,9 @@
 #include "samples/nearest_search.h"
 
 #include <algorithm>
-#include <bit>
+#include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
-#include <span>
-
-#include "base/four.h"
 
 namespace lamina {
 namespace {
@@ -16,172 +12,101 @@ constexpr std::size_t kMostWanted = 16;  ///< more of them are left to the tree,
 constexpr std::size_t kMostBlocks = 24;  ///< from more of them on the tree is faster
 constexpr float kGuessedReach = 1.2F;    ///< of the distance to the k-th neighbour of the sample before
 constexpr float kGatheredReach = 1.6F;   ///< likewise: farther ones are left to the tree
+constexpr float kLeafReach = 1.5F;       ///< likewise, of what is gathered for a leaf
 constexpr float kRounding = 1 + 1e-4F;   ///< of distances: nothing must be lost to it
-
-/// By the bits of a mask: the bytes of those of four values that it has, one after another.
-using BytesOfFour = std::array<std::array<std::uint8_t, 16>, 16>;
-constexpr BytesOfFour bytes_by_mask() {
-  BytesOfFour all{};
-  for (std::size_t mask = 0; mask < 16; ++mask) {
-    std::size_t at = 0;
-    for (std::size_t lane = 0; lane < 4; ++lane) {
-      if ((mask >> lane & 1) == 0) continue;
-      for (std::size_t byte = 0; byte < 4; ++byte) all[mask][at++] = static_cast<std::uint8_t>(4 * lane + byte);
-    }
-  }
-  return all;
-}
-
-/// Those of four values that a mask has, one after another.
-class PackedFour {
- public:
-  explicit PackedFour(unsigned mask) : mask_(mask) {
-    static constexpr BytesOfFour kBytes = bytes_by_mask();
-    std::memcpy(&bytes_, kBytes[mask].data(), sizeof(bytes_));
-  }
-  [[nodiscard]] std::size_t count() const { return static_cast<std::size_t>(std::popcount(mask_)); }
-  /// From four values of four bytes to room for as many.
-  void write(const void* from, void* to) const {
-    __m128i four;
-    std::memcpy(&four, from, sizeof(four));
-    four = _mm_shuffle_epi8(four, bytes_);
-    std::memcpy(to, &four, sizeof(four));
-  }
-
- private:
-  unsigned mask_;
-  __m128i bytes_;
-};
-
-/// Samples within a distance of one of them, itself left out, in the order in which they were found.
-class Near {
- public:
-  Near(const SampleTree& tree, std::uint32_t place, float bound) : tree_(&tree), place_(place), bound_(bound) {}
-  [[nodiscard]] bool is_full() const { return count_ > kMost; }
-  [[nodiscard]] std::size_t count() const { return count_; }
-
-  /// From at most kMostBlocks blocks. First the leaves in reach are listed: which ones are is as good as random, and
-  /// a branch for each could not be guessed.
-  void take(std::span<const SampleTree::Block* const> blocks) {
-    const std::array<std::int32_t, 3> at = tree_->position(place_);
-    const ItemBox box = ItemBox::of(at);
-    std::array<std::int32_t, 4 * kMostBlocks + 4> begins;
-    std::array<std::int32_t, 4 * kMostBlocks + 4> ends;
-    std::size_t leaves = 0;
-    for (const SampleTree::Block* const block : blocks) {
-      const PackedFour in_reach(block->within(box, bound_));
-      in_reach.write(block->begin.data(), begins.data() + leaves);
-      in_reach.write(block->begin.data() + 1, ends.data() + leaves);
-      leaves += in_reach.count();
-    }
-    for (std::size_t i = 0; i < leaves; ++i) take_places(at, begins[i], ends[i]);
-  }
-
-  /// Writes the nearest ones in order and returns how many.
-  std::size_t write(std::span<Neighbour> found) {
-    std::array<std::uint64_t, kMost> sorted;  // distance, then place: as bits that compare like neighbours
-    const auto key = [&](std::size_t i) {
-      return std::uint64_t{std::bit_cast<std::uint32_t>(squared_[i])} << 32 | static_cast<std::uint32_t>(places_[i]);
-    };
-    if (rank()) {
-      // All of them: which ones are among the first is as good as random, a branch could not be guessed.
-      for (std::size_t i = 0; i < count_; ++i) sorted[static_cast<std::size_t>(ranks_[i])] = key(i);
-    } else {
-      for (std::size_t i = 0; i < count_; ++i) sorted[i] = key(i);
-      std::sort(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(count_));
-    }
-    const std::size_t n = std::min(found.size(), count_);
-    for (std::size_t i = 0; i < n; ++i)
-      found[i] = {std::bit_cast<float>(static_cast<std::uint32_t>(sorted[i] >> 32)),
-                  static_cast<std::uint32_t>(sorted[i])};
-    return n;
-  }
-
- private:
-  static constexpr std::size_t kMost = 64;
-  static constexpr std::size_t kRankedAtOnce = 8;
-
-  void take_places(const std::array<std::int32_t, 3>& at, std::int32_t begin, std::int32_t end) {
-    // Copies that what is written to the lists cannot change.
-    const float bound = bound_;
-    const auto place = static_cast<std::int32_t>(place_);
-    std::size_t count = count_;
-    const auto places_end = static_cast<std::size_t>(end);
-    tree_->fours_of(at, static_cast<std::size_t>(begin), places_end, [&](const SampleTree::FourSamples& four) {
-      if (count > kMost) return;
-      const PackedFour wanted(bits_of((four.squared <= bound) & (four.places != place)));
-      wanted.write(&four.squared, squared_.data() + count);
-      wanted.write(&four.places, places_.data() + count);
-      count += wanted.count();
-    });
-    count_ = count;
-  }
-
-  /// How many are nearer than each. False where some are as far as others.
-  bool rank() {
-    constexpr float kFar = std::numeric_limits<float>::infinity();
-    std::fill_n(squared_.begin() + static_cast<std::ptrdiff_t>(count_), kRankedAtOnce, kFar);
-    FourInts sum{};
-    std::size_t ranked = 0;
-    for (; ranked < count_; ranked += kRankedAtOnce) {
-      FourFloats here;
-      FourFloats next;
-      std::memcpy(&here, squared_.data() + ranked, sizeof(here));
-      std::memcpy(&next, squared_.data() + ranked + 4, sizeof(next));
-      FourInts before_here{};
-      FourInts before_next{};
-      for (std::size_t j = 0; j < count_; ++j) {
-        before_here -= squared_[j] < here;
-        before_next -= squared_[j] < next;
-      }
-      std::memcpy(ranks_.data() + ranked, &before_here, sizeof(before_here));
-      std::memcpy(ranks_.data() + ranked + 4, &before_next, sizeof(before_next));
-      sum += before_here + before_next;
-    }
-    // Those behind the last one have all before them.
-    const auto all = static_cast<std::size_t>(sum[0] + sum[1] + sum[2] + sum[3]) - (ranked - count_) * count_;
-    return all == count_ * (count_ - 1) / 2;
-  }
-
-  const SampleTree* tree_;
-  std::uint32_t place_;
-  float bound_;  ///< squared
-  std::size_t count_ = 0;
-  std::array<float, kMost + kRankedAtOnce> squared_;
-  std::array<std::int32_t, kMost + kRankedAtOnce> places_, ranks_;
-};
 
 }  // namespace
 
-std::size_t NearestSearch::nearest(std::uint32_t place, std::size_t k, float bound, Neighbour* found) {
+void NearestSearch::start(std::span<const std::uint32_t> places, std::size_t k, float bound) {
   if (k != k_ || bound != bound_) {
     k_ = k;
     bound_ = bound;
     block_ = nullptr;
     farthest_ = 0;
   }
-  if (block_ == nullptr || !block_->holds(place)) gather(place);
-  // Mostly its neighbours lie about as far as those of the sample before: enough within a guess are the nearest.
-  for (const float guess : {kGuessedReach * farthest_, reach_}) {
-    if (around_.empty() || guess > reach_) continue;
-    Near near(tree_, place, std::min(bound, guess * guess));
-    near.take(around_);
-    if (near.is_full() || (near.count() < k && guess * guess < bound)) continue;
-    const std::size_t count = near.write(std::span(found, k));
-    if (count == k) farthest_ = std::sqrt(found[k - 1].squared);
-    return count;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    Started& one = started_[i];
+    one.place = places[i];
+    if (block_ == nullptr || !block_->holds(one.place)) gather(one.place);
+    // Mostly its neighbours lie about as far as those of the samples before: enough within a guess are the nearest.
+    one.found = look(one.place, kGuessedReach * farthest_, one.near);
   }
-  const std::size_t count = tree_.nearest(place, k, bound, found);
-  if (count == k && !around_.empty()) {
-    farthest_ = std::sqrt(found[k - 1].squared);
+}
+
+std::size_t NearestSearch::finish(std::size_t i, Neighbour* found) {
+  Started& one = started_[i];
+  if (!one.found && !(block_ != nullptr && block_->holds(one.place) && look(one.place, reach_, one.near)))
+    return nearest_in_tree(one.place, found);
+  sort(one.near, found);
+  const std::size_t count = std::min(k_, one.near.count);
+  if (count == k_) farthest_ = std::sqrt(found[count - 1].squared);
+  return count;
+}
+
+/// Those within a distance of a place of the block. False where they are too many, or not sure to be enough.
+bool NearestSearch::look(std::uint32_t place, float reach, NearSamples& near) {
+  if (around_.empty() || reach > reach_ || !gather_near_leaf(place, reach)) return false;
+  const float squared = std::min(bound_, reach * reach);
+  kernel_.find(near_leaf_, tree_.position(place), static_cast<std::int32_t>(place), squared, near);
+  return near.count <= NearSamples::kMost && (near.count >= k_ || reach * reach >= bound_);
+}
+
+std::size_t NearestSearch::nearest_in_tree(std::uint32_t place, Neighbour* found) {
+  const std::size_t count = tree_.nearest(place, k_, bound_, found);
+  if (count == k_ && !around_.empty()) {
+    farthest_ = std::sqrt(found[count - 1].squared);
     // Samples may lie farther apart here than where the blocks were gathered for.
     if (kGuessedReach * farthest_ > reach_) block_ = nullptr;
   }
   return count;
 }
 
+/// Sees to it that all samples within `reach` of the leaf that has a place of the block are at hand. False where they
+/// are too many.
+bool NearestSearch::gather_near_leaf(std::uint32_t place, float reach) {
+  const bool in_leaf = place >= leaf_begin_ && place < leaf_end_;
+  if (in_leaf && reach <= leaf_reach_) return true;
+  if (!in_leaf) leaf_limit_ = std::numeric_limits<float>::infinity();
+  if (reach >= leaf_limit_) return false;
+  std::size_t leaf = 0;
+  while (place >= block_->begin[leaf + 1]) ++leaf;
+  leaf_begin_ = block_->begin[leaf];
+  leaf_end_ = block_->begin[leaf + 1];
+  leaf_reach_ = std::max(reach, std::min(kLeafReach * farthest_, reach_));
+  if (leaf_reach_ >= leaf_limit_) leaf_reach_ = reach;
+  const ItemBox box = block_->box_of(leaf);
+  const NearBox near{{box.low[0], box.low[1], box.low[2]},
+                     {box.high[0], box.high[1], box.high[2]},
+                     kRounding * leaf_reach_ * leaf_reach_};
+  // First the leaves in reach are listed: which ones are is as good as random, and a branch for each could not be
+  // guessed.
+  std::array<PlaceRange, 4 * kMostBlocks + 1> leaves;
+  std::size_t count = 0;
+  for (const SampleTree::Block* const block : around_) {
+    const unsigned in_reach = block->within(box, near.squared);
+    for (std::size_t i = 0; i < 4; ++i) {
+      leaves[count] = {block->begin[i], block->begin[i + 1]};
+      count += in_reach >> i & 1;
+    }
+  }
+  if (kernel_.gather(tree_.axes(), leaves.data(), count, near, near_leaf_)) return true;
+  leaf_limit_ = leaf_reach_;
+  leaf_reach_ = -1;
+  return false;
+}
+
+/// Nearest first, equally near ones by place.
+void NearestSearch::sort(NearSamples& near, Neighbour* found) const {
+  static_assert(SampleTree::kSpare + 1 >= kNearLanes);
+  static_assert(NearSamples::kMost + 2 * kNearLanes <= SampleTree::kMostNeighbours);
+  if (kernel_.sort(near, found)) return;
+  for (std::size_t i = 0; i < near.count; ++i) found[i] = {near.squared[i], static_cast<std::uint32_t>(near.places[i])};
+  std::sort(found, found + near.count);
+}
+
 void NearestSearch::gather(std::uint32_t place) {
   block_ = &tree_.block_of(place);
+  leaf_end_ = 0;
   around_.clear();
   std::array<Neighbour, kMostWanted> found;
   if (k_ == 0 || k_ > found.size()) return;

@@ -36,7 +36,7 @@ SampleTree::SampleTree(std::span<const std::int32_t> x, std::span<const std::int
   blocks_.resize(nodes_.size() + 1);
   build(items, {0, n}, {0, 0});
   order_.resize(n);
-  for (auto& axis : at_) axis.resize(n + 3);
+  for (auto& axis : at_) axis.resize(n + kSpare);
   tbb::parallel_for(all, [&](const auto& range) {
     for (std::size_t i = range.begin(); i < range.end(); ++i) {
       order_[i] = items[i].number;
@@ -122,12 +122,9 @@ unsigned SampleTree::Block::beyond(const std::array<std::int32_t, 3>& at, float 
 }
 
 ItemBox SampleTree::Block::box() const {
-  const auto leaf = [&](std::size_t i) {
-    return ItemBox{{low[0][i], low[1][i], low[2][i], 0}, {high[0][i], high[1][i], high[2][i], 0}};
-  };
-  ItemBox all = leaf(0);
+  ItemBox all = box_of(0);
   for (std::size_t i = 1; i < 4; ++i) {
-    if (begin[i] < begin[i + 1]) all = all.with(leaf(i));
+    if (begin[i] < begin[i + 1]) all = all.with(box_of(i));
   }
   return all;
 }
@@ -155,7 +152,7 @@ std::size_t SampleTree::nearest(std::uint32_t place, std::size_t k, float bound,
 }
 
 void SampleTree::search(Query& q, const Below& below, float squared) const {
-  const PlacedAxes axes{at_[0].data(), at_[1].data(), at_[2].data()};
+  const PlacedAxes axes = this->axes();
   if (below.depth == depth_) {
     const Block& block = block_at(below);
     for (unsigned leaves = block.within(ItemBox::of(q.at), q.bound); leaves != 0; leaves &= leaves - 1) {

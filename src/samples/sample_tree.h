@@ -23,6 +23,7 @@ namespace lamina {
 class SampleTree {
  public:
   static constexpr std::size_t kMostNeighbours = 256;
+  static constexpr std::size_t kSpare = 15;
 
   /// Wants three arrays of one length below 2^32, coordinates within +-(2^30 - 1).
   SampleTree(std::span<const std::int32_t> x, std::span<const std::int32_t> y, std::span<const std::int32_t> z);
@@ -84,6 +85,9 @@ class SampleTree {
     /// A bit for each leaf that reaches farther than a squared distance from a position.
     [[nodiscard]] unsigned beyond(const std::array<std::int32_t, 3>& at, float squared) const;
     [[nodiscard]] ItemBox box() const;
+    [[nodiscard]] ItemBox box_of(std::size_t leaf) const {
+      return ItemBox{{low[0][leaf], low[1][leaf], low[2][leaf], 0}, {high[0][leaf], high[1][leaf], high[2][leaf], 0}};
+    }
     [[nodiscard]] bool holds(std::uint32_t place) const { return place >= begin.front() && place < begin.back(); }
   };
   [[nodiscard]] const Block& block_of(std::uint32_t place) const;
@@ -101,6 +105,8 @@ class SampleTree {
   [[nodiscard]] std::array<std::int32_t, 3> position(std::uint32_t place) const {
     return {at_[0][place], at_[1][place], at_[2][place]};
   }
+  /// Positions by place; behind the last one there are some more numbers, so that kSpare more can be loaded.
+  [[nodiscard]] PlacedAxes axes() const { return {at_[0].data(), at_[1].data(), at_[2].data()}; }
   /// From the sample at place `a` to that at place `b`, steps.
   [[nodiscard]] std::array<float, 3> offset(std::uint32_t a, std::uint32_t b) const {
     return {static_cast<float>(at_[0][b] - at_[0][a]), static_cast<float>(at_[1][b] - at_[1][a]),
@@ -158,7 +164,7 @@ class SampleTree {
     go(n.split - around.box.high[axis], below.upper());
   }
 
-  /// By place; behind the last one there are some more numbers, so that four can be loaded from anywhere.
+  /// By place, and kSpare more.
   std::array<std::vector<std::int32_t>, 3> at_;
   std::vector<std::uint32_t> order_;
   std::vector<Node> nodes_;  ///< a heap: the children of i are 2 i + 1 and 2 i + 2

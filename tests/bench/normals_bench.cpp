@@ -63,6 +63,19 @@ void find_all(const Window& window, Find&& find) {
     benchmark::DoNotOptimize(find.nearest(place, kNeighbours, bound, found.data()));
 }
 
+void find_all_in_turn(Window& window) {
+  std::array<std::array<Neighbour, SampleTree::kMostNeighbours>, NearestSearch::kAtOnce> found;
+  const float bound = window.settings.search_radius * window.settings.search_radius;
+  NearestSearch search(*window.tree);
+  std::vector<std::uint32_t> places(window.samples.size());
+  std::iota(places.begin(), places.end(), 0U);
+  for (std::size_t i = 0; i < places.size(); i += found.size()) {
+    const std::size_t n = std::min(found.size(), places.size() - i);
+    search.start(std::span(places).subspan(i, n), kNeighbours, bound);
+    for (std::size_t k = 0; k < n; ++k) benchmark::DoNotOptimize(search.finish(k, found[k].data()));
+  }
+}
+
 void grow(Window& window) {
   normals::PatchGraph graph;
   normals::PatchSettings patches;
@@ -91,7 +104,7 @@ void add_normal_benches(const Scene& scene) {
     benchmark::DoNotOptimize(tree.size());
   });
   bench("nearest/one_by_one", window, [](const std::unique_ptr<Window>& w) { find_all(*w, *w->tree); });
-  bench("nearest/in_turn", window, [](const std::unique_ptr<Window>& w) { find_all(*w, NearestSearch(*w->tree)); });
+  bench("nearest/in_turn", window, [](const std::unique_ptr<Window>& w) { find_all_in_turn(*w); });
   bench("directions", window, [](const std::unique_ptr<Window>& w) { w->find_directions(); });
   bench("patches", with_directions, [](const std::unique_ptr<Window>& w) { grow(*w); });
 }

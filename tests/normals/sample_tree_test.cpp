@@ -4,6 +4,7 @@
 #include <rapidcheck/gtest.h>
 
 #include <algorithm>
+#include <numeric>
 #include <random>
 
 #include "samples/nearest_search.h"
@@ -43,14 +44,20 @@ std::vector<Neighbour> all_by_distance(const SampleTree& tree, std::uint32_t pla
   return all;
 }
 
-void expect_nearest(const Positions& p, std::size_t k, float bound) {
+/// As many at once as `search` takes, found by one kernel.
+void expect_nearest(const Positions& p, std::size_t k, float bound, const NearKernel& kernel) {
   const SampleTree tree(p.x, p.y, p.z);
   std::array<Neighbour, SampleTree::kMostNeighbours> found;
-  NearestSearch search(tree);
+  NearestSearch search(tree, kernel);
   std::array<Neighbour, SampleTree::kMostNeighbours> found_in_turn;
   const auto step = static_cast<std::uint32_t>(tree.size() / 40 + 1);
   for (std::uint32_t place = 0; place < tree.size(); ++place) {
-    const std::size_t in_turn = search.nearest(place, k, bound, found_in_turn.data());
+    if (place % NearestSearch::kAtOnce == 0) {
+      std::vector<std::uint32_t> places(std::min(NearestSearch::kAtOnce, tree.size() - place));
+      std::iota(places.begin(), places.end(), place);
+      search.start(places, k, bound);
+    }
+    const std::size_t in_turn = search.finish(place % NearestSearch::kAtOnce, found_in_turn.data());
     if (place % step != 0) continue;
     std::vector<Neighbour> expected = all_by_distance(tree, place);
     std::erase_if(expected, [&](const Neighbour& n) { return n.squared > bound; });
@@ -65,6 +72,10 @@ void expect_nearest(const Positions& p, std::size_t k, float bound) {
       ASSERT_EQ(found_in_turn[i].sample, expected[i].sample) << place << ", " << i;
     }
   }
+}
+
+void expect_nearest(const Positions& p, std::size_t k, float bound) {
+  for (const NearKernel* kernel : available_near_kernels()) expect_nearest(p, k, bound, *kernel);
 }
 
 TEST(SampleTree, FindsTheNearestOfScatteredSamples) {
