@@ -27,9 +27,9 @@ ProcessorKind wanted_kind() {
   const ProcessorKind own = processor_kind();
   const char* wanted = std::getenv("LAMINA_KERNEL");
   if (wanted == nullptr || *wanted == '\0') return own;
-  constexpr std::array<std::string_view, 3> kNames{"v2", "v3", "v4"};
+  constexpr std::array<std::string_view, 3> kKindNames{"v2", "v3", "v4"};
   for (std::size_t i = 0; i <= static_cast<std::size_t>(own); ++i) {
-    if (kNames[i].ends_with(wanted)) return static_cast<ProcessorKind>(i);
+    if (kKindNames[i].ends_with(wanted)) return static_cast<ProcessorKind>(i);
   }
   throw Error(ExitCode::usage, "LAMINA_KERNEL=" + std::string(wanted) +
                                    ": no such kernel on this processor; leave it unset or name one of v2, v3, v4");

@@ -7,7 +7,7 @@
 //   kVectorsAtOnce   so many vectors of counts fit the registers
 // No include guard on purpose.
 
-constexpr std::size_t kLanes = sizeof(Ints) / sizeof(std::int32_t);
+inline constexpr std::size_t kLanes = sizeof(Ints) / sizeof(std::int32_t);
 static_assert(kLanes <= kNearLanes);
 
 inline Ints load_ints(const std::int32_t* from) {
@@ -36,8 +36,8 @@ inline Floats past_of(const Ints& at, std::int32_t low, std::int32_t high) {
   return floats_of(more > 0 ? more : Ints{});
 }
 
-bool gather(const PlacedAxes& from, const PlaceRange* ranges, std::size_t count, const NearBox& box,
-            SamplesNearLeaf& out) {
+inline bool gather(const PlacedAxes& from, const PlaceRange* ranges, std::size_t count, const NearBox& box,
+                   SamplesNearLeaf& out) {
   std::int32_t* const x = out.at[0].data();
   std::int32_t* const y = out.at[1].data();
   std::int32_t* const z = out.at[2].data();
@@ -67,8 +67,8 @@ bool gather(const PlacedAxes& from, const PlaceRange* ranges, std::size_t count,
   return true;
 }
 
-void find(SamplesNearLeaf& from, const std::array<std::int32_t, 3>& at, std::int32_t place, float squared,
-          NearSamples& out) {
+inline void find(SamplesNearLeaf& from, const std::array<std::int32_t, 3>& at, std::int32_t place, float squared,
+                 NearSamples& out) {
   const std::int32_t* const x = from.at[0].data();
   const std::int32_t* const y = from.at[1].data();
   const std::int32_t* const z = from.at[2].data();
@@ -92,7 +92,7 @@ void find(SamplesNearLeaf& from, const std::array<std::int32_t, 3>& at, std::int
 }
 
 /// Counts of how many are nearer than each.
-bool sort(NearSamples& near, Neighbour* sorted) {
+inline bool sort(NearSamples& near, Neighbour* sorted) {
   constexpr std::size_t kCounted = kVectorsAtOnce * kLanes;
   constexpr std::size_t kStep = 8;  // more of them, and where the last one is could not be guessed
   static_assert(kCounted <= SamplesNearLeaf::kRoom - NearSamples::kMost && kCounted <= 2 * kNearLanes);
