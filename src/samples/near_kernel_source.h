@@ -20,6 +20,11 @@ inline Floats load_floats(const float* from) {
   __builtin_memcpy(&v, from, sizeof(v));
   return v;
 }
+typedef std::uint32_t Words __attribute__((vector_size(sizeof(Ints))));  // NOLINT(modernize-use-using)
+/// Lanes behind the last sample hold anything: their differences may pass the range of an int, and do not count.
+inline Ints difference(const Ints& a, const Ints& b) {
+  return std::bit_cast<Ints>(std::bit_cast<Words>(a) - std::bit_cast<Words>(b));
+}
 inline Floats floats_of(const Ints& v) {
   return __builtin_convertvector(v, Floats);
 }
@@ -30,8 +35,8 @@ inline Ints lane_numbers() {
 }
 
 inline Floats past_of(const Ints& at, std::int32_t low, std::int32_t high) {
-  const Ints below = low - at;
-  const Ints above = at - high;
+  const Ints below = difference(Ints{} + low, at);
+  const Ints above = difference(at, Ints{} + high);
   const Ints more = below > above ? below : above;
   return floats_of(more > 0 ? more : Ints{});
 }
@@ -78,9 +83,9 @@ inline void find(SamplesNearLeaf& from, const std::array<std::int32_t, 3>& at, s
   __builtin_memcpy(places + end, &itself, sizeof(itself));
   std::size_t n = 0;
   for (std::size_t i = 0; i < end; i += kLanes) {
-    const Floats dx = floats_of(load_ints(x + i) - at[0]);
-    const Floats dy = floats_of(load_ints(y + i) - at[1]);
-    const Floats dz = floats_of(load_ints(z + i) - at[2]);
+    const Floats dx = floats_of(difference(load_ints(x + i), Ints{} + at[0]));
+    const Floats dy = floats_of(difference(load_ints(y + i), Ints{} + at[1]));
+    const Floats dz = floats_of(difference(load_ints(z + i), Ints{} + at[2]));
     const Floats far = dx * dx + dy * dy + dz * dz;
     const Ints others = load_ints(places + i);
     const Packed near(not_above(far, squared) & ~equal(others, itself));
