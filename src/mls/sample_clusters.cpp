@@ -156,10 +156,6 @@ void find_clusters(const std::vector<Keyed>& order, ClusteredBucket& out) {
   for (const auto& piece : pieces) out.clusters.insert(out.clusters.end(), piece.begin(), piece.end());
 }
 
-}  // namespace
-
-namespace {
-
 void fill(const ActiveBucket& bucket, const std::vector<Keyed>& order, ClusteredBucket& out) {
   const LocalSamples& s = bucket.samples;
   for (auto* values : {&out.x, &out.y, &out.z}) resize_anew(*values, order.size() + ClusteredBucket::kBehind);

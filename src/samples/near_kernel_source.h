@@ -2,13 +2,29 @@
 // once per processor kind, behind what differs between the kinds:
 //   Ints, Floats     vectors of kLanes
 //   not_above(floats, float), below(ints, int), equal(ints, ints)  a bit for each lane that it holds for
-//   Packed(bits)     write(v, to) stores the lanes with a bit one after another, behind them anything
+//   Order, order_of(bits), in_order(ints, order)  the lanes with a bit one after another, behind them anything
 //   count_nearer(one, others, counts)  adds 1 to the counts of those of the others that are farther than the one
 //   kVectorsAtOnce   so many vectors of counts fit the registers
 // No include guard on purpose.
 
 inline constexpr std::size_t kLanes = sizeof(Ints) / sizeof(std::int32_t);
 static_assert(kLanes <= kNearLanes);
+
+/// The lanes that a mask has a bit for, one after another.
+class Packed {
+ public:
+  explicit Packed(unsigned mask) : mask_(mask), order_(order_of(mask)) {}
+  [[nodiscard]] std::size_t count() const { return static_cast<std::size_t>(__builtin_popcount(mask_)); }
+  template <class V>
+  void write(const V& v, void* to) const {
+    const Ints packed = in_order(std::bit_cast<Ints>(v), order_);
+    __builtin_memcpy(to, &packed, sizeof(packed));
+  }
+
+ private:
+  unsigned mask_;
+  Order order_;
+};
 
 inline Ints load_ints(const std::int32_t* from) {
   Ints v;

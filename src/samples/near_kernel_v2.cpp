@@ -19,15 +19,7 @@ inline unsigned bits_of(const Ints& mask) {
   return static_cast<unsigned>(_mm_movemask_ps(std::bit_cast<__m128>(mask)));
 }
 
-inline unsigned not_above(const Floats& v, float most) {
-  return bits_of(v <= most);
-}
-inline unsigned below(const Ints& v, std::int32_t end) {
-  return bits_of(v < end);
-}
-inline unsigned equal(const Ints& v, const Ints& other) {
-  return bits_of(v == other);
-}
+#include "samples/near_kernel_masks.h"
 
 /// By the bits of a mask: the bytes of those of four values that it has, one after another.
 using BytesOfFour = std::array<std::array<std::uint8_t, 16>, 16>;
@@ -44,23 +36,14 @@ constexpr BytesOfFour bytes_by_mask() {
 }
 constexpr BytesOfFour kBytes = bytes_by_mask();
 
-class Packed {
- public:
-  explicit Packed(unsigned mask) : mask_(mask) { __builtin_memcpy(&bytes_, kBytes[mask].data(), sizeof(bytes_)); }
-  [[nodiscard]] std::size_t count() const { return static_cast<std::size_t>(__builtin_popcount(mask_)); }
-  template <class V>
-  void write(const V& v, void* to) const {
-    const __m128i packed = _mm_shuffle_epi8(std::bit_cast<__m128i>(v), bytes_);
-    __builtin_memcpy(to, &packed, sizeof(packed));
-  }
-
- private:
-  unsigned mask_;
-  __m128i bytes_;
-};
-
-inline void count_nearer(const Floats& one, const Floats& others, Ints& counts) {
-  counts -= one < others;
+using Order = __m128i;
+inline Order order_of(unsigned mask) {
+  Order order;
+  __builtin_memcpy(&order, kBytes[mask].data(), sizeof(order));
+  return order;
+}
+inline Ints in_order(const Ints& v, const Order& order) {
+  return std::bit_cast<Ints>(_mm_shuffle_epi8(std::bit_cast<__m128i>(v), order));
 }
 
 #include "samples/near_kernel_source.h"

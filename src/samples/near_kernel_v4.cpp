@@ -25,20 +25,14 @@ inline unsigned equal(const Ints& v, const Ints& other) {
   return _mm512_cmpeq_epi32_mask(std::bit_cast<__m512i>(v), std::bit_cast<__m512i>(other));
 }
 
-class Packed {
- public:
-  explicit Packed(unsigned mask) : mask_(static_cast<__mmask16>(mask)) {}
-  [[nodiscard]] std::size_t count() const { return static_cast<std::size_t>(__builtin_popcount(mask_)); }
-  /// Not by the instruction that packs into memory: on some processors that takes a hundred times as long.
-  template <class V>
-  void write(const V& v, void* to) const {
-    const __m512i packed = _mm512_maskz_compress_epi32(mask_, std::bit_cast<__m512i>(v));
-    __builtin_memcpy(to, &packed, sizeof(packed));
-  }
-
- private:
-  __mmask16 mask_;
-};
+using Order = __mmask16;
+inline Order order_of(unsigned mask) {
+  return static_cast<Order>(mask);
+}
+/// Not by the instruction that packs into memory: on some processors that takes a hundred times as long.
+inline Ints in_order(const Ints& v, Order order) {
+  return std::bit_cast<Ints>(_mm512_maskz_compress_epi32(order, std::bit_cast<__m512i>(v)));
+}
 
 inline void count_nearer(const Floats& one, const Floats& others, Ints& counts) {
   const __mmask16 farther = _mm512_cmp_ps_mask(std::bit_cast<__m512>(one), std::bit_cast<__m512>(others), _CMP_LT_OQ);
