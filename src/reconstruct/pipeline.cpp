@@ -36,18 +36,19 @@ Pipeline::Pipeline(const ReconstructionPlan& plan, SampleFeed& feed, const SlabS
   if (const auto from = z_read(plan, span).from) feed_.begin_at(*from);
 }
 
-void Pipeline::mark(const ActiveBucket& bucket) {
+void Pipeline::mark(const Batch& buckets) {
   constexpr std::size_t kPiece = 1024;
-  const std::size_t n = bucket.samples.size();
-  const auto [low, high] = least_and_greatest(bucket.samples.z);
-  for (covered_ = std::min(covered_, plan_.lattice.slab_of(low) - 1); covered_ <= plan_.lattice.slab_of(high) + 2;
-       ++covered_) {
-    window_.cover(covered_);
+  for (const auto& bucket : buckets) {
+    const auto [low, high] = least_and_greatest(bucket->samples.z);
+    for (covered_ = std::min(covered_, plan_.lattice.slab_of(low) - 1); covered_ <= plan_.lattice.slab_of(high) + 2;
+         ++covered_) {
+      window_.cover(covered_);
+    }
   }
-  tbb::parallel_for(std::size_t{0}, (n + kPiece - 1) / kPiece, [&](std::size_t piece) {
+  const auto mark_piece = [&](const ActiveBucket& bucket, std::size_t begin) {
     std::array<Mark, kPiece> marks;
     std::size_t count = 0;
-    for (std::size_t i = piece * kPiece; i < std::min(n, (piece + 1) * kPiece); ++i) {
+    for (std::size_t i = begin; i < std::min(begin + kPiece, bucket.samples.size()); ++i) {
       if (bucket.support[i] <= 0) continue;
       // Corners beyond the band keep no value. Samples mark up to two cells away: what a wider band holds beyond that,
       // others have to mark for them.
@@ -59,6 +60,11 @@ void Pipeline::mark(const ActiveBucket& bucket) {
           s.x[i], s.y[i], s.z[i], bucket.level[i], reach, {s.nx[i], s.ny[i], s.nz[i]}, plan_.projection.height};
     }
     mark_samples(window_, {marks.data(), count});
+  };
+  tbb::parallel_for(std::size_t{0}, buckets.size(), [&](std::size_t b) {
+    const ActiveBucket& bucket = *buckets[b];
+    tbb::parallel_for(std::size_t{0}, (bucket.samples.size() + kPiece - 1) / kPiece,
+                      [&](std::size_t piece) { mark_piece(bucket, piece * kPiece); });
   });
 }
 
@@ -137,7 +143,8 @@ void Pipeline::run(const RunContext& run, Stopwatch& watch) {
     const std::int64_t marked = (above + kTouchSlabs) * height;
     const std::int64_t needed = above * height + static_cast<std::int64_t>(sample_reach_) + 1;
     watch.time("radii", [&] {
-      feed_.prepare(std::max(marked, needed), [&](const ActiveBucket& b) { watch.time("mark", [&] { mark(b); }); });
+      feed_.prepare(std::max(marked, needed), [&](const Batch& b) { watch.time("mark", [&] { mark(b); }); });
+      feed_.look_ahead(plan_.window * height);
     });
     if (projected_ < stages_.of(Stage::project).end) projector_.begin(plan_.lattice, projected_, feed_);
     watch.time("refine", [&] { refine_to(ahead(Stage::refine)); });

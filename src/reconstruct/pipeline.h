@@ -30,7 +30,7 @@ class Pipeline {
   void report(SurfaceStats& stats) const;
 
  private:
-  void mark(const ActiveBucket& bucket);
+  void mark(const Batch& buckets);
   void refine_to(std::int32_t slab);
   void project_to(std::int32_t slab);
   void extend_to(std::int32_t slab);

@@ -1,5 +1,5 @@
-// Buckets in memory: read in the background before they are needed, kept within a budget; their samples in order by
-// blocks of cells, so that neighbours in space are neighbours in memory.
+// Buckets in memory: read in the background before they are needed, kept within a budget, their samples in order by
+// blocks of cells.
 #pragma once
 #include <tbb/task_group.h>
 
@@ -11,24 +11,10 @@
 #include <vector>
 
 #include "lattice/lattice.h"
+#include "samples/block_order.h"
 #include "store/slab_store.h"
 
 namespace lamina {
-
-/// Memory of sort_by_block().
-struct BlockOrderScratch {
-  std::vector<std::uint64_t> order, other;
-  std::vector<std::int32_t> integers;
-  std::vector<float> floats;
-};
-
-/// Sorts the samples of a bucket by the block of 8^3 finest cells they lie in: blocks by z, then y, then x (fastest);
-/// inside a block in the order they had. A bucket that spans more than 2^32 such blocks is sorted by larger ones (twice
-/// the side, four times, ...). The result is a function of the samples and the lattice alone.
-void sort_by_block(LocalSamples& samples, const Lattice& lattice, BlockOrderScratch& scratch);
-
-/// Numbers of a bucket's samples before they were sorted, in the order they were put in; empty: they had it already.
-using BlockOrder = std::vector<std::uint32_t>;
 
 /// A bucket's samples with what refinement and projection need of each.
 struct ActiveBucket {
@@ -55,26 +41,20 @@ class BucketCache {
   std::shared_ptr<ActiveBucket> get(std::size_t bucket);
   /// Starts reading a bucket in the background unless it is here or on its way. It stays until get() or drop().
   void prefetch(std::size_t bucket);
-  // Where the samples of a bucket lie is wanted long before the rest. They are not kept so long, but read again; in
-  // their order, which is kept, so that they are sorted once.
-  /// Starts reading positions as prefetch() does; they stay until get_positions().
-  void prefetch_positions(std::size_t bucket);
-  /// The positions alone, sorted as all of the bucket will be. Nothing of them stays here.
-  LocalSamples get_positions(std::size_t bucket);
+  /// The order of sort_by_block() of a bucket that comes is known.
+  void know_order(std::size_t bucket, BlockOrder order);
   /// Forgets a bucket.
   void drop(std::size_t bucket);
-  [[nodiscard]] std::uint64_t reads() const { return reads_; }  ///< times a bucket or its positions were read
+  [[nodiscard]] std::uint64_t reads() const { return reads_; }  ///< times a bucket was read
 
  private:
   struct Incoming {
     std::shared_ptr<ActiveBucket> loaded = std::make_shared<ActiveBucket>();
-    std::optional<BlockOrder> order;  ///< of the samples: known before, or found with the positions
+    std::optional<BlockOrder> order;  ///< of the samples, where it is known
     std::exception_ptr error;
   };
-  using Arriving = std::map<std::size_t, Incoming>;
-  void load(std::size_t bucket, Columns wanted, Incoming& incoming);
-  void start(std::size_t bucket, Columns wanted, Arriving& among);
-  Incoming take(Arriving& from, std::size_t bucket);
+  void load(std::size_t bucket, Incoming& incoming) const;
+  std::shared_ptr<ActiveBucket> take(std::size_t bucket);
   void keep_within_budget(std::size_t wanted);
 
   const SlabStore& store_;
@@ -83,8 +63,8 @@ class BucketCache {
   std::size_t bytes_ = 0;
   std::uint64_t reads_ = 0;
   std::map<std::size_t, std::shared_ptr<ActiveBucket>> here_;
-  Arriving incoming_, positions_;
-  std::map<std::size_t, BlockOrder> orders_;  ///< of buckets whose positions have been asked for, and nothing else
+  std::map<std::size_t, Incoming> incoming_;
+  std::map<std::size_t, BlockOrder> orders_;  ///< of buckets that are neither here nor on their way
   tbb::task_group tasks_;
 };
 

@@ -11,11 +11,6 @@
 namespace lamina {
 namespace {
 
-/// Buckets on their way from the store while the stages work.
-constexpr int kReadAhead = 2;
-/// Buckets beyond them that the system is told of.
-constexpr int kAnnounceAhead = 6;
-
 std::int64_t cell_of(std::int64_t z, std::int64_t height) {
   return z / height - (z % height < 0 ? 1 : 0);
 }
@@ -77,9 +72,9 @@ SampleFeed::SampleFeed(SlabStore& store, const Lattice& lattice, const FeedSetti
     : store_(store),
       lattice_(lattice),
       settings_(settings),
-      radii_(radii),
+      radii_settings_(radii),
       cache_(store, lattice, settings.cache_bytes) {
-  if (!given_radii) estimator_ = std::make_unique<RadiusEstimator>(radii);
+  if (!given_radii) measuring_ = std::make_unique<RadiiAhead>(store, lattice, radii);
   if (settings.refines_sheets()) sheets_ = std::make_unique<SheetRefinement>(lattice);
   radius_limit_ = radius_limit(settings, lattice);
   support_limit_ = lamina::support_limit(settings, lattice);
@@ -87,7 +82,7 @@ SampleFeed::SampleFeed(SlabStore& store, const Lattice& lattice, const FeedSetti
 
 FeedCounts SampleFeed::counts() const {
   FeedCounts counts = counts_;
-  counts.bucket_reads = cache_.reads();
+  counts.bucket_reads = cache_.reads() + (measuring_ ? measuring_->reads() : 0);
   return counts;
 }
 
@@ -98,8 +93,9 @@ std::size_t SampleFeed::next_filled(std::size_t bucket) const {
 
 void SampleFeed::begin_at(std::int64_t z) {
   const FeedHalo halo =
-      feed_halo(settings_, lattice_, radii_, estimator_ == nullptr, filter_ == nullptr ? 0 : filter_->halo());
-  pushed_ = announced_ = measured_ = oriented_ = ready_ = first_ = first_bucket(store_, z, halo);
+      feed_halo(settings_, lattice_, radii_settings_, measuring_ == nullptr, filter_ == nullptr ? 0 : filter_->halo());
+  measured_ = oriented_ = ready_ = first_ = first_bucket(store_, z, halo);
+  if (measuring_) measuring_->begin_at(first_);
 }
 
 BucketSpan buckets_read(const SlabStore& store, const FeedHalo& halo, std::optional<std::int64_t> from,
@@ -125,58 +121,64 @@ BucketSpan buckets_read(const SlabStore& store, const FeedHalo& halo, std::optio
   return span;
 }
 
+bool SampleFeed::begins_below(std::size_t bucket, std::int64_t z) const {
+  return bucket < store_.buckets() && store_.z_lower(bucket) < z;
+}
+
 void SampleFeed::prepare(std::int64_t z_limit, const OnReady& on_ready) {
-  while (ready_ < store_.buckets()) {
-    // Buckets are ascending and disjoint in z: the next one decides.
-    const std::size_t next = next_filled(ready_);
-    if (next == store_.buckets() || store_.z_lower(next) >= z_limit) break;
-    if (!hand_over_next(on_ready) && !orient_next()) measure_next();
-  }
-  read_ahead();
-}
-
-void SampleFeed::read_ahead() {
-  std::size_t next = estimator_ == nullptr ? measured_ : pushed_;  // to be read for the first time
-  for (int i = 0; i < kReadAhead && (next = next_filled(next)) < store_.buckets(); ++i) {
-    if (estimator_ == nullptr) {
-      cache_.prefetch(next++);
-    } else {
-      cache_.prefetch_positions(next++);
+  // Buckets are ascending and disjoint in z: the next one decides.
+  while (begins_below(next_filled(ready_), z_limit)) {
+    if (const auto buckets = settle_below(z_limit); !buckets.empty()) {
+      hand_over(buckets, on_ready);
+    } else if (!orient_next()) {
+      learn_radii();
     }
   }
-  announced_ = std::max(announced_, next);
-  if (estimator_ != nullptr && next_filled(measured_) < pushed_) cache_.prefetch(next_filled(measured_));
-  for (int i = 0; i < kAnnounceAhead && (next = next_filled(next)) < store_.buckets(); ++i, ++next) {
-    if (next < announced_) continue;
-    store_.will_read(next);
-    announced_ = next + 1;
+  prepared_ = z_limit;
+}
+
+void SampleFeed::look_ahead(std::int64_t step) {
+  // A bucket waits for those around it.
+  const double reach = (filter_ == nullptr ? 0 : filter_->halo()) +
+                       (sheets_ == nullptr ? 0 : 2.0 * lattice_.cell_size(lattice_.levels - 1));
+  const std::int64_t next = prepared_ + step + static_cast<std::int64_t>(reach);
+  std::size_t known = store_.buckets();
+  if (measuring_) {
+    take_measured();
+    measuring_->measure_below(next + step);
+    known = measured_ + radii_.size();
+  }
+  std::size_t b = next_filled(ready_);
+  for (; b < known && begins_below(b, next); b = next_filled(b + 1)) cache_.prefetch(b);
+  if (measuring_) return;
+  for (announced_ = std::max(announced_, b); begins_below(announced_, next + step);
+       announced_ = next_filled(announced_ + 1))
+    store_.will_read(announced_);
+}
+
+void SampleFeed::take_measured() {
+  for (RadiiAhead::Measured& bucket : measuring_->take()) {
+    if (!bucket.radii.empty()) cache_.know_order(measured_ + radii_.size(), std::move(bucket.order));
+    radii_.push_back(std::move(bucket.radii));
   }
 }
 
-void SampleFeed::measure_next() {
+void SampleFeed::learn_radii() {
   std::vector<float> radii;
-  if (estimator_ == nullptr) {
-    read_ahead();
+  if (measuring_ == nullptr) {
     if (store_.count(measured_) > 0) radii = cache_.get(measured_)->samples.radius;
-    learn_radii(std::move(radii));
-  } else if (estimator_->pop(radii)) {
-    learn_radii(std::move(radii));
   } else {
-    read_ahead();
-    if (store_.count(pushed_) > 0) {
-      estimator_->push(cache_.get_positions(pushed_));
-    } else {
-      estimator_->push({});
+    if (radii_.empty()) {
+      measuring_->measure_below(first_from(measured_) + 1);
+      take_measured();
     }
-    if (++pushed_ == store_.buckets()) estimator_->finish();
+    radii = std::move(radii_.front());
+    radii_.pop_front();
   }
-}
-
-void SampleFeed::learn_radii(std::vector<float> radii) {
   Known& known = known_[measured_];
   for (float& r : radii) {
     ++counts_.samples;
-    if (estimator_ != nullptr) r *= settings_.radius_scale;
+    if (measuring_ != nullptr) r *= settings_.radius_scale;
     if (settings_.max_radius > 0 && r > settings_.max_radius) {
       ++counts_.undersampled;
       r = 0;
@@ -215,17 +217,26 @@ bool SampleFeed::orient_next() {
   return true;
 }
 
-bool SampleFeed::hand_over_next(const OnReady& on_ready) {
-  if (ready_ == oriented_) return false;
-  if (store_.count(ready_) > 0) {
-    if (sheets_ != nullptr) {
-      if (!sheets_->pop(first_from(oriented_), known_[ready_].finer)) return false;
-      annotate(ready_, *cache_.get(ready_));
-    }
-    on_ready(*fetch(ready_));
+std::vector<std::size_t> SampleFeed::settle_below(std::int64_t z_limit) {
+  std::vector<std::size_t> settled;
+  std::uint64_t samples = 0;
+  for (; ready_ < oriented_ && samples < kSamplesTogether; ++ready_) {
+    if (store_.count(ready_) == 0) continue;
+    if (store_.z_lower(ready_) >= z_limit) break;
+    if (sheets_ != nullptr && !sheets_->pop(first_from(oriented_), known_[ready_].finer)) break;
+    settled.push_back(ready_);
+    samples += store_.count(ready_);
   }
-  ++ready_;
-  return true;
+  return settled;
+}
+
+void SampleFeed::hand_over(const std::vector<std::size_t>& buckets, const OnReady& on_ready) {
+  for (const std::size_t b : buckets) cache_.prefetch(b);
+  std::vector<std::shared_ptr<ActiveBucket>> here;
+  here.reserve(buckets.size());
+  for (const std::size_t b : buckets) here.push_back(cache_.get(b));
+  tbb::parallel_for(std::size_t{0}, buckets.size(), [&](std::size_t k) { annotate(buckets[k], *here[k]); });
+  on_ready({here.begin(), here.end()});
 }
 
 void SampleFeed::annotate(std::size_t bucket, ActiveBucket& out) const {

@@ -4,6 +4,7 @@
 #pragma once
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -14,6 +15,7 @@
 #include "lattice/lattice.h"
 #include "samples/bucket_cache.h"
 #include "samples/bucket_runs.h"
+#include "samples/radii_ahead.h"
 #include "samples/radius_estimator.h"
 #include "samples/sheet_refinement.h"
 #include "samples/support_field.h"
@@ -115,10 +117,13 @@ class SampleFeed {
   /// and so come in the batches, of a feed that begins at the bottom; buckets below may have other radii.
   void begin_at(std::int64_t z);
 
-  /// Called for every bucket in ascending order once its radii are known.
-  using OnReady = std::function<void(const ActiveBucket&)>;
+  /// Called for all buckets in ascending order, some at a time, once their radii are known.
+  using OnReady = std::function<void(const Batch&)>;
   /// Makes sure the radii of all samples with z < limit are known.
   void prepare(std::int64_t z_limit, const OnReady& on_ready);
+  /// Begins in the background what prepare() will have to do for a limit that is `step` higher than the last one, and
+  /// some of what it will for the next.
+  void look_ahead(std::int64_t step);
   /// Samples whose influence meets z in [lo, hi), batch after batch; how they are cut into batches depends on the cloud
   /// alone. `margin` enlarges every influence (steps).
   [[nodiscard]] std::vector<std::vector<std::size_t>> batches(std::int64_t lo, std::int64_t hi, float margin) const;
@@ -144,25 +149,27 @@ class SampleFeed {
   /// The next bucket with samples from `bucket` on, the number of buckets when there is none.
   [[nodiscard]] std::size_t next_filled(std::size_t bucket) const;
   std::shared_ptr<const ActiveBucket> fetch(std::size_t bucket);
-  // A bucket passes these steps, each when the buckets around have passed the one before; false: not yet.
-  void measure_next();
-  void learn_radii(std::vector<float> radii);
-  bool orient_next();
-  bool hand_over_next(const OnReady& on_ready);
+  [[nodiscard]] bool begins_below(std::size_t bucket, std::int64_t z) const;
+  // A bucket passes these steps, each when the buckets around have passed the one before.
+  void take_measured();
+  void learn_radii();
+  bool orient_next();  ///< false: not yet
+  [[nodiscard]] std::vector<std::size_t> settle_below(std::int64_t z_limit);
+  void hand_over(const std::vector<std::size_t>& buckets, const OnReady& on_ready);
   /// Least z of the samples from a bucket on, beyond all z when there are none.
   [[nodiscard]] std::int64_t first_from(std::size_t bucket) const;
-  void read_ahead();
 
   SlabStore& store_;
   Lattice lattice_;
   FeedSettings settings_;
-  RadiiSettings radii_;
-  std::unique_ptr<RadiusEstimator> estimator_;  ///< null when the input gave radii
-  std::unique_ptr<SheetRefinement> sheets_;     ///< null where sheets are not refined
+  RadiiSettings radii_settings_;
+  std::unique_ptr<RadiiAhead> measuring_;    ///< null when the input gave radii
+  std::deque<std::vector<float>> radii_;     ///< of the buckets from measured_ on
+  std::unique_ptr<SheetRefinement> sheets_;  ///< null where sheets are not refined
   float support_limit_;
   float radius_limit_;
-  std::size_t pushed_ = 0;     ///< buckets handed to the estimator
-  std::size_t announced_ = 0;  ///< buckets the store knows are wanted
+  std::int64_t prepared_ = 0;  ///< the last limit
+  std::size_t announced_ = 0;  ///< buckets the system knows are wanted, where radii are given
   std::size_t measured_ = 0;   ///< buckets with known radii
   std::size_t oriented_ = 0;   ///< of these, with their final normals
   std::size_t ready_ = 0;      ///< of these, with their final levels

@@ -57,7 +57,10 @@ double ScanOverlap::share() const {
 namespace {
 
 constexpr std::size_t kChunk = 1u << 15;            ///< rows a piece
-constexpr std::uint64_t kBucketSamples = 1u << 15;  ///< samples a bucket should hold
+/// Samples a bucket should hold: few, so that little is read before it is needed and threads share the work evenly. Of
+/// small clouds more, for it makes no difference there.
+constexpr std::uint64_t kBucketSamples = 1u << 14, kSmallCloudsBucket = 1u << 15;
+constexpr std::uint64_t kSmallCloud = 1u << 21;
 constexpr std::uint64_t kMaxBuckets = 4096;
 
 /// Fixed-point coordinates may reach a little beyond the box surveyed, and qualities beyond the greatest seen.
@@ -207,7 +210,8 @@ StoreSettings store_settings(const Survey& survey, const Frame& frame, const Sto
   s.directory = place.directory;
   s.keep = place.keep;
   s.z_min = static_cast<std::int32_t>(-std::ceil(reach));
-  const std::uint64_t wanted = std::clamp<std::uint64_t>(survey.usable / kBucketSamples, 1, kMaxBuckets);
+  const std::uint64_t held = survey.usable < kSmallCloud ? kSmallCloudsBucket : kBucketSamples;
+  const std::uint64_t wanted = std::clamp<std::uint64_t>(survey.usable / held, 1, kMaxBuckets);
   s.bucket_height = static_cast<std::int32_t>(std::ceil(2 * reach / static_cast<double>(wanted))) + 1;
   s.buckets = static_cast<std::size_t>(std::ceil(2 * reach / s.bucket_height)) + 1;
   return s;

@@ -24,6 +24,8 @@ struct LocalSamples {
 
 /// Samples of a bucket that a thread takes at a time: few enough that a dozen threads have work.
 inline constexpr std::size_t kSampleGrain = 2048;
+/// Samples of several buckets that all threads work on together, where buckets are small.
+inline constexpr std::uint64_t kSamplesTogether = 1U << 15;
 
 /// What is read of a bucket's samples.
 enum class Columns : std::uint8_t { all, positions };

@@ -97,8 +97,9 @@ void Replay::run(Stage stage) {
   };
   switch (stage) {
     case Stage::load:
-      feed_.prepare(std::numeric_limits<std::int64_t>::max(),
-                    [&](const ActiveBucket& b) { buckets_.push_back(std::make_shared<ActiveBucket>(b)); });
+      feed_.prepare(std::numeric_limits<std::int64_t>::max(), [&](const Batch& ready) {
+        for (const auto& b : ready) buckets_.push_back(std::make_shared<ActiveBucket>(*b));
+      });
       every_slab([&](std::int32_t s) { window_.cover(s); });
       return;
     case Stage::mark:

@@ -96,20 +96,21 @@ SlabStore three_buckets(const LocalSamples& samples) {
   return writer.finish();
 }
 
-TEST(BucketCache, PositionsComeFirstInTheOrderOfTheRest) {
+TEST(BucketCache, TakesAnOrderThatIsKnown) {
   std::mt19937 random(7);
   const SlabStore store = three_buckets(numbered_samples(3000, -3000, 3000, random));
   const Lattice lattice{20, 4};
   BucketCache cache(store, lattice, 0), other(store, lattice, 0);
-  for (std::size_t b = 0; b < 3; ++b) cache.prefetch_positions(b);
   for (std::size_t b = 0; b < 3; ++b) {
-    const LocalSamples at = cache.get_positions(b);
-    const LocalSamples all = cache.get(b)->samples;
-    const LocalSamples expected = other.get(b)->samples;
+    LocalSamples at;
+    BlockOrderScratch scratch;
+    store.read(b, at, Columns::positions);
     EXPECT_EQ(at.size(), store.count(b));
     EXPECT_TRUE(at.nx.empty() && at.quality.empty());
-    for (const LocalSamples* const same : {&at, &all})
-      EXPECT_TRUE(same->x == expected.x && same->y == expected.y && same->z == expected.z);
+    cache.know_order(b, order_by_block(at, lattice, scratch));
+    const LocalSamples all = cache.get(b)->samples;
+    const LocalSamples expected = other.get(b)->samples;
+    EXPECT_TRUE(all.x == expected.x && all.y == expected.y && all.z == expected.z);
     EXPECT_TRUE(all.nx == expected.nx && all.ny == expected.ny && all.nz == expected.nz);
     EXPECT_EQ(all.quality, expected.quality);
     EXPECT_EQ(all.attributes, expected.attributes);

@@ -49,10 +49,12 @@ std::map<Place, std::multiset<int>> levels_from(const LocalSamples& cloud, std::
   std::map<Place, std::multiset<int>> levels;
   // In small steps, which must change nothing.
   for (std::int64_t limit = -10; limit < 9000; limit += 130) {
-    feed.prepare(limit, [&](const ActiveBucket& b) {
-      for (std::size_t i = 0; i < b.samples.size(); ++i) {
-        if (b.samples.z[i] < from.value_or(-1)) continue;
-        levels[{b.samples.x[i], b.samples.y[i], b.samples.z[i]}].insert(b.level[i]);
+    feed.prepare(limit, [&](const Batch& ready) {
+      for (const auto& b : ready) {
+        for (std::size_t i = 0; i < b->samples.size(); ++i) {
+          if (b->samples.z[i] < from.value_or(-1)) continue;
+          levels[{b->samples.x[i], b->samples.y[i], b->samples.z[i]}].insert(b->level[i]);
+        }
       }
     });
   }

@@ -138,11 +138,14 @@ TEST(SampleFeed, GivenRadiiBecomeSupportsLevelsAndWeights) {
     std::size_t next = 0;
     // In several steps: after each, exactly the buckets that begin below the limit are known.
     for (std::int64_t z = stored.store.z_lower(order[0]) - 3; next < order.size(); z += c.bucket_height / 2 + 1) {
-      feed.prepare(z, [&](const ActiveBucket& b) {
-        RC_ASSERT(next < order.size());
-        expect_bucket(c, stored.buckets[order[next]], stored.buckets[order[next]].radius, b);
-        ++next;
+      feed.prepare(z, [&](const Batch& ready) {
+        for (const auto& b : ready) {
+          RC_ASSERT(next < order.size());
+          expect_bucket(c, stored.buckets[order[next]], stored.buckets[order[next]].radius, *b);
+          ++next;
+        }
       });
+      if (next % 2 == 0) feed.look_ahead(c.bucket_height / 2 + 1);
       for (std::size_t k = 0; k < order.size(); ++k) {
         RC_ASSERT((k < next) == (stored.store.z_lower(order[k]) < z));
       }
@@ -176,14 +179,17 @@ TEST(SampleFeed, EstimatedRadiiAreTheEstimatorsScaled) {
     std::size_t bucket = 0;
     std::size_t samples = 0;
     for (std::int64_t z = -1200; z < 1400; z += 150) {
-      feed.prepare(z, [&](const ActiveBucket& b) {
-        while (stored.buckets[bucket].size() == 0) ++bucket;
-        std::vector<float> scaled = expected[bucket];
-        for (float& r : scaled) r *= c.settings.radius_scale;
-        expect_bucket(c, stored.buckets[bucket], scaled, b);
-        samples += b.samples.size();
-        ++bucket;
+      feed.prepare(z, [&](const Batch& ready) {
+        for (const auto& b : ready) {
+          while (stored.buckets[bucket].size() == 0) ++bucket;
+          std::vector<float> scaled = expected[bucket];
+          for (float& r : scaled) r *= c.settings.radius_scale;
+          expect_bucket(c, stored.buckets[bucket], scaled, *b);
+          samples += b->samples.size();
+          ++bucket;
+        }
       });
+      if (seed % 3 != 0) feed.look_ahead(seed % 3 == 1 ? 150 : 700);
     }
     EXPECT_EQ(samples, cloud.size());
     EXPECT_EQ(feed.counts().samples, cloud.size());
@@ -238,7 +244,7 @@ TEST(SampleFeed, BatchesHoldEverySampleInReachOnceWhateverTheCache) {
     const Case c = random_case(seed);
     Stored stored(c.cloud, c.lattice, c.bucket_height);
     SampleFeed feed(stored.store, c.lattice, c.settings, {}, true);
-    feed.prepare(kEverything, [](const ActiveBucket&) {});
+    feed.prepare(kEverything, [](const Batch&) {});
     std::mt19937_64 random(seed);
     for (int round = 0; round < 8; ++round) {
       const std::int64_t lo = static_cast<std::int64_t>(random() % 20000) - 10000;
@@ -256,13 +262,13 @@ TEST(SampleFeed, ReleaseForgetsOnlyWhatEndsBelow) {
     Stored stored(c.cloud, c.lattice, c.bucket_height);
     SampleFeed feed(stored.store, c.lattice, c.settings, {}, true);
     SampleFeed whole(stored.store, c.lattice, c.settings, {}, true);
-    whole.prepare(kEverything, [](const ActiveBucket&) {});
+    whole.prepare(kEverything, [](const Batch&) {});
     const auto [low, high] = std::minmax_element(c.cloud.z.begin(), c.cloud.z.end());
     std::mt19937_64 random(seed);
     const auto limit = static_cast<std::int64_t>(feed.support_limit());
     // A sweep as the job makes it: what lies below the reach of the range asked for is released.
     for (std::int64_t z = *low; z <= *high; z += 1 + static_cast<std::int64_t>(random() % 900)) {
-      feed.prepare(z + 500 + limit + 1, [](const ActiveBucket&) {});
+      feed.prepare(z + 500 + limit + 1, [](const Batch&) {});
       feed.release(z - limit - 1);
       std::uint64_t below = 0;
       for (std::size_t b = 0; b < stored.buckets.size(); ++b) {
@@ -272,7 +278,7 @@ TEST(SampleFeed, ReleaseForgetsOnlyWhatEndsBelow) {
       RC_ASSERT(feed.batches(z, z + 500, 0) == whole.batches(z, z + 500, 0));
       expect_batches(c, stored, feed, z, z + 500, 0);
     }
-    feed.prepare(kEverything, [](const ActiveBucket&) {});
+    feed.prepare(kEverything, [](const Batch&) {});
     feed.release(kEverything);
     RC_ASSERT(feed.released() == c.cloud.size());
     RC_ASSERT(feed.batches(-100000, 100000, 0).empty());
@@ -287,7 +293,7 @@ TEST(SampleFeed, CacheHoldsWhatItsBudgetAllows) {
     FeedSettings settings;
     settings.cache_bytes = cache_bytes;
     SampleFeed feed(stored.store, {64, 4}, settings, {}, true);
-    feed.prepare(kEverything, [](const ActiveBucket&) {});
+    feed.prepare(kEverything, [](const Batch&) {});
     const std::uint64_t before = feed.counts().bucket_reads;
     for (int round = 0; round < 3; ++round) {
       for (const auto& batch : feed.batches(-5000, 5000, 0)) (void)feed.load(batch);
@@ -302,7 +308,7 @@ TEST(SampleFeed, BucketsSetAsideAreReadAgainWhenTheyAreAskedFor) {
   const LocalSamples cloud = random_cloud({Shape::sphere, 2000, {0, 0, 0}, 1000}, 3);
   Stored stored(cloud, {64, 4}, 200);
   SampleFeed feed(stored.store, {64, 4}, {}, {}, true);
-  feed.prepare(kEverything, [](const ActiveBucket&) {});
+  feed.prepare(kEverything, [](const Batch&) {});
   const std::vector<std::size_t> one{feed.batches(-5000, 5000, 0).at(0).at(1)};
   const Batch before = feed.load(one);
   const std::uint64_t reads = feed.counts().bucket_reads;
@@ -320,7 +326,7 @@ TEST(SampleFeed, LoadedSamplesOutliveTheCache) {
   FeedSettings settings;
   settings.cache_bytes = 1;
   SampleFeed feed(stored.store, {64, 4}, settings, {}, true);
-  feed.prepare(kEverything, [](const ActiveBucket&) {});
+  feed.prepare(kEverything, [](const Batch&) {});
   const auto batches = feed.batches(-5000, 5000, 0);
   ASSERT_EQ(batches.size(), 1U);
   const Batch batch = feed.load(batches[0]);

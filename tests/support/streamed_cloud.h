@@ -52,11 +52,12 @@ class StreamedCloud {
         first(lattice.slab_of(*std::min_element(cloud.z.begin(), cloud.z.end())) - 2),
         end(lattice.slab_of(*std::max_element(cloud.z.begin(), cloud.z.end())) + 4) {
     if (filter != nullptr) feed.filter_normals(*filter);
-    feed.prepare(std::numeric_limits<std::int32_t>::max(), [&](const ActiveBucket& b) {
+    feed.prepare(std::numeric_limits<std::int32_t>::max(), [&](const Batch& ready) {
       std::vector<Mark> marks;
-      for (std::size_t i = 0; i < b.samples.size(); ++i) {
-        if (b.support[i] > 0) {
-          marks.push_back({b.samples.x[i], b.samples.y[i], b.samples.z[i], b.level[i], b.support[i]});
+      for (const auto& b : ready) {
+        for (std::size_t i = 0; i < b->samples.size(); ++i) {
+          if (b->support[i] > 0)
+            marks.push_back({b->samples.x[i], b->samples.y[i], b->samples.z[i], b->level[i], b->support[i]});
         }
       }
       mark_samples(window, marks);
