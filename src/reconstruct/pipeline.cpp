@@ -133,18 +133,21 @@ void Pipeline::retire() {
   feed_.release(std::int64_t{projected_} * plan_.lattice.slab_height() - static_cast<std::int64_t>(sample_reach_) - 1);
 }
 
-void Pipeline::run(const RunContext& run, Stopwatch& watch) {
+std::int64_t Pipeline::samples_for(std::int32_t step) const {
   const std::int64_t height = plan_.lattice.slab_height();
+  const std::int64_t projected = std::int64_t{step} + plan_.window + reach_of(Stage::project).ahead;
+  const std::int64_t above = std::min<std::int64_t>(projected, stages_.of(Stage::project).end);
+  return std::max((above + kTouchSlabs) * height, above * height + static_cast<std::int64_t>(sample_reach_) + 1);
+}
+
+void Pipeline::run(const RunContext& run, Stopwatch& watch) {
   const auto [first, end] = stages_.of(Stage::triangulate);
   for (std::int32_t step = first; step < end; step += plan_.window) {
     const std::int32_t top = std::min(step + plan_.window, end) - 1;  // slabs to triangulate in this step
     const auto ahead = [&](Stage stage) { return top + reach_of(stage).ahead; };
-    const std::int64_t above = std::min(ahead(Stage::project), stages_.of(Stage::project).end - 1) + 1;
-    const std::int64_t marked = (above + kTouchSlabs) * height;
-    const std::int64_t needed = above * height + static_cast<std::int64_t>(sample_reach_) + 1;
     watch.time("radii", [&] {
-      feed_.prepare(std::max(marked, needed), [&](const Batch& b) { watch.time("mark", [&] { mark(b); }); });
-      feed_.look_ahead(plan_.window * height);
+      feed_.prepare(samples_for(step), [&](const Batch& b) { watch.time("mark", [&] { mark(b); }); });
+      feed_.look_ahead(samples_for(step + plan_.window), samples_for(step + 2 * plan_.window));
     });
     if (projected_ < stages_.of(Stage::project).end) projector_.begin(plan_.lattice, projected_, feed_);
     watch.time("refine", [&] { refine_to(ahead(Stage::refine)); });

@@ -30,6 +30,8 @@ class Pipeline {
   void report(SurfaceStats& stats) const;
 
  private:
+  /// Samples below this are wanted by the step that begins to triangulate with a slab.
+  [[nodiscard]] std::int64_t samples_for(std::int32_t step) const;
   void mark(const Batch& buckets);
   void refine_to(std::int32_t slab);
   void project_to(std::int32_t slab);

@@ -134,24 +134,22 @@ void SampleFeed::prepare(std::int64_t z_limit, const OnReady& on_ready) {
       learn_radii();
     }
   }
-  prepared_ = z_limit;
 }
 
-void SampleFeed::look_ahead(std::int64_t step) {
-  // A bucket waits for those around it.
-  const double reach = (filter_ == nullptr ? 0 : filter_->halo()) +
-                       (sheets_ == nullptr ? 0 : 2.0 * lattice_.cell_size(lattice_.levels - 1));
-  const std::int64_t next = prepared_ + step + static_cast<std::int64_t>(reach);
+void SampleFeed::look_ahead(std::int64_t next, std::int64_t after_that) {
+  // A bucket waits for those around it: no more than buckets_read() says.
+  const std::int64_t reach = (filter_ == nullptr ? 0 : static_cast<std::int64_t>(filter_->halo())) +
+                             (sheets_ == nullptr ? 0 : lattice_.cell_size(lattice_.levels - 1));
   std::size_t known = store_.buckets();
   if (measuring_) {
     take_measured();
-    measuring_->measure_below(next + step);
+    measuring_->measure_below(after_that + reach);
     known = measured_ + radii_.size();
   }
   std::size_t b = next_filled(ready_);
-  for (; b < known && begins_below(b, next); b = next_filled(b + 1)) cache_.prefetch(b);
+  for (; b < known && begins_below(b, next + reach); b = next_filled(b + 1)) cache_.prefetch(b);
   if (measuring_) return;
-  for (announced_ = std::max(announced_, b); begins_below(announced_, next + step);
+  for (announced_ = std::max(announced_, b); begins_below(announced_, after_that + reach);
        announced_ = next_filled(announced_ + 1))
     store_.will_read(announced_);
 }

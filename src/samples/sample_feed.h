@@ -97,7 +97,7 @@ FeedHalo feed_halo(const FeedSettings& settings, const Lattice& lattice, const R
                    double filter_halo = 0);
 
 /// The buckets that a feed reads which begins at `from` (begin_at(); nothing: at the bottom) and prepares all below
-/// `to`: it may look for two more, but does without them.
+/// `to`: it may look for more, but does without them.
 BucketSpan buckets_read(const SlabStore& store, const FeedHalo& halo, std::optional<std::int64_t> from,
                         std::int64_t to);
 
@@ -121,9 +121,9 @@ class SampleFeed {
   using OnReady = std::function<void(const Batch&)>;
   /// Makes sure the radii of all samples with z < limit are known.
   void prepare(std::int64_t z_limit, const OnReady& on_ready);
-  /// Begins in the background what prepare() will have to do for a limit that is `step` higher than the last one, and
-  /// some of what it will for the next.
-  void look_ahead(std::int64_t step);
+  /// Begins in the background what prepare() will have to do for its next limit, and some of what it will for the one
+  /// after that.
+  void look_ahead(std::int64_t next, std::int64_t after_that);
   /// Samples whose influence meets z in [lo, hi), batch after batch; how they are cut into batches depends on the cloud
   /// alone. `margin` enlarges every influence (steps).
   [[nodiscard]] std::vector<std::vector<std::size_t>> batches(std::int64_t lo, std::int64_t hi, float margin) const;
@@ -168,7 +168,6 @@ class SampleFeed {
   std::unique_ptr<SheetRefinement> sheets_;  ///< null where sheets are not refined
   float support_limit_;
   float radius_limit_;
-  std::int64_t prepared_ = 0;  ///< the last limit
   std::size_t announced_ = 0;  ///< buckets the system knows are wanted, where radii are given
   std::size_t measured_ = 0;   ///< buckets with known radii
   std::size_t oriented_ = 0;   ///< of these, with their final normals

@@ -56,7 +56,7 @@ double ScanOverlap::share() const {
 
 namespace {
 
-constexpr std::size_t kChunk = 1u << 15;            ///< rows a piece
+constexpr std::size_t kChunk = 1u << 15;  ///< rows a piece
 /// Samples a bucket should hold: few, so that little is read before it is needed and threads share the work evenly. Of
 /// small clouds more, for it makes no difference there.
 constexpr std::uint64_t kBucketSamples = 1u << 14, kSmallCloudsBucket = 1u << 15;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <rapidcheck.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
@@ -11,6 +12,7 @@
 #include <random>
 #include <set>
 
+#include "store/block_codec.h"
 #include "support/random_cloud.h"
 #include "support/streamed_cloud.h"
 
@@ -145,7 +147,7 @@ TEST(SampleFeed, GivenRadiiBecomeSupportsLevelsAndWeights) {
           ++next;
         }
       });
-      if (next % 2 == 0) feed.look_ahead(c.bucket_height / 2 + 1);
+      if (next % 2 == 0) feed.look_ahead(z + c.bucket_height / 2 + 1, z + c.bucket_height);
       for (std::size_t k = 0; k < order.size(); ++k) {
         RC_ASSERT((k < next) == (stored.store.z_lower(order[k]) < z));
       }
@@ -189,10 +191,59 @@ TEST(SampleFeed, EstimatedRadiiAreTheEstimatorsScaled) {
           ++bucket;
         }
       });
-      if (seed % 3 != 0) feed.look_ahead(seed % 3 == 1 ? 150 : 700);
+      if (seed % 3 != 0) feed.look_ahead(z + (seed % 3 == 1 ? 150 : 700), z + 300);
     }
     EXPECT_EQ(samples, cloud.size());
     EXPECT_EQ(feed.counts().samples, cloud.size());
+  }
+}
+
+/// The buckets of a store outside of a span lie in others.
+SlabStore part_of(const Stored& stored, const BucketSpan& span, std::int32_t bucket_height,
+                  const TemporaryFolder& folder) {
+  StoreSettings settings;
+  settings.directory = folder.path();
+  settings.z_min = floor_div(stored.store.z_lower(0), bucket_height) * bucket_height;
+  settings.bucket_height = bucket_height;
+  settings.buckets = stored.buckets.size();
+  SlabStoreWriter writer(stored.store.layout(), settings);
+  for (std::size_t b = span.begin; b < span.end; ++b) {
+    LocalSamples samples;
+    stored.store.read(b, samples);
+    writer.append(samples);
+  }
+  SlabStore part = writer.finish();
+  declare_shares(part, bucket_shares(stored.store));
+  return part;
+}
+
+TEST(SampleFeed, LooksAheadNoFartherThanTheBucketsThatAreRead) {
+  for (std::uint64_t seed = 0; seed < 12; ++seed) {
+    LocalSamples cloud = random_cloud({Shape::sphere, 3000, {0, 0, 0}, 1000}, seed);
+    cloud.radius.clear();
+    FeedSettings settings;
+    settings.refine_sheets = seed % 2 == 0;
+    const std::int32_t height = 30 + 10 * static_cast<std::int32_t>(seed);
+    const Lattice lattice{20, 3};
+    const RadiiSettings radii{30, 2};
+    const Stored stored(cloud, lattice, height);
+    const std::int64_t from = -500, to = 100;
+    const BucketSpan span = buckets_read(stored.store, feed_halo(settings, lattice, radii, false), from, to);
+    ASSERT_LT(span.end, stored.buckets.size()) << seed;
+    ASSERT_GT(span.begin, 0U) << seed;
+    const TemporaryFolder folder;
+    SlabStore part = part_of(stored, span, height, folder);
+    SampleFeed feed(part, lattice, settings, radii, false);
+    feed.begin_at(from);
+    std::uint64_t samples = 0;
+    for (std::int64_t z = from; z <= to; z += 60) {
+      const auto take = [&](const Batch& ready) {
+        for (const auto& b : ready) samples += b->samples.size();
+      };
+      ASSERT_NO_THROW(feed.prepare(z, take)) << seed;
+      ASSERT_NO_THROW(feed.look_ahead(std::min(z + 60, to), std::min(z + 120, to))) << seed;
+    }
+    EXPECT_GT(samples, 300U);
   }
 }
 
