@@ -103,16 +103,19 @@ constexpr double kLine = 32;
 /// Half of a normal distribution lies within so many of its deviations.
 constexpr double kMedianDeviation = 0.67;
 
-/// Buckets about the sample with this rank, until they are tall enough for whole neighbourhoods or many enough.
+/// Buckets about the sample with this rank, until they are tall enough for whole neighbourhoods or many enough. It
+/// grows by so many buckets as hold a run's samples, that runs be as wide whatever the buckets' size.
 BucketSpan noise_run(const SlabStore& store, std::uint64_t rank, double height) {
-  const std::size_t middle = bucket_of_rank(store, rank);
-  BucketSpan run{middle, middle + 1};
+  const std::uint64_t mean = std::max<std::uint64_t>(store.total() / store.buckets(), 1);
+  const auto step = static_cast<std::size_t>(std::max<std::uint64_t>(kRunSamples / mean, 1));
+  const std::size_t first = bucket_of_rank(store, rank) / step * step;
+  BucketSpan run{first, std::min(first + step, store.buckets())};
   for (;;) {
     const std::uint64_t held = samples_in(store, run);
     if (held >= kRunSamples && z_range(store, run).height() >= height) return run;
     if (held >= 4 * kRunSamples || (run.begin == 0 && run.end == store.buckets())) return run;
-    if (run.begin > 0) --run.begin;
-    if (run.end < store.buckets()) ++run.end;
+    run.begin -= std::min(run.begin, step);
+    run.end = std::min(run.end + step, store.buckets());
   }
 }
 
