@@ -106,8 +106,11 @@ constexpr double kMedianDeviation = 0.67;
 /// Buckets about the sample with this rank, until they are tall enough for whole neighbourhoods or many enough. It
 /// grows by so many buckets as hold a run's samples, that runs be as wide whatever the buckets' size.
 BucketSpan noise_run(const SlabStore& store, std::uint64_t rank, double height) {
-  const std::uint64_t mean = std::max<std::uint64_t>(store.total() / store.buckets(), 1);
-  const auto step = static_cast<std::size_t>(std::max<std::uint64_t>(kRunSamples / mean, 1));
+  std::uint64_t filled = 0;
+  for (std::size_t b = 0; b < store.buckets(); ++b) filled += store.count(b) > 0 ? 1 : 0;
+  const double in_run =
+      static_cast<double>(kRunSamples * filled) / static_cast<double>(std::max<std::uint64_t>(store.total(), 1));
+  const auto step = static_cast<std::size_t>(std::max(std::round(in_run), 1.0));
   const std::size_t first = bucket_of_rank(store, rank) / step * step;
   BucketSpan run{first, std::min(first + step, store.buckets())};
   for (;;) {

@@ -52,15 +52,18 @@ Scene noisy_sphere(std::size_t count, double k) {
   return scene;
 }
 
-/// Samples whose scene gives them no normals have none.
-Noise survey(const Scene& scene, std::size_t buckets) {
+/// Samples whose scene gives them no normals have none. Tells how many samples were read, where asked.
+Noise survey(const Scene& scene, std::size_t buckets, std::uint64_t* samples_read = nullptr) {
   const auto height = static_cast<std::int32_t>(2 * kSide / static_cast<double>(buckets)) + 1;
   SlabStoreWriter writer({}, {::testing::TempDir(), static_cast<std::int32_t>(-kSide), height, buckets, 1 << 20});
   LocalSamples full = scene.samples;
   for (auto* a : {&full.nx, &full.ny, &full.nz}) a->resize(full.size(), 0);
   writer.append(full);
   const SlabStore store = writer.finish();
-  const ReadBucket read = [&](std::size_t b, LocalSamples& out) { store.read(b, out); };
+  const ReadBucket read = [&](std::size_t b, LocalSamples& out) {
+    store.read(b, out);
+    if (samples_read != nullptr) *samples_read += out.size();
+  };
   return survey_noise(store, read, static_cast<float>(scene.radius));
 }
 
@@ -77,6 +80,18 @@ TEST(SurveyNoise, OfAPlane) {
   EXPECT_LT(noise_of(noisy_plane(20'000, 0), 50), 1e-3);
   for (const double k : {0.1, 0.5, 1.0})
     EXPECT_NEAR(noise_of(noisy_plane(20'000, k), 50), expected(k), 0.15 * expected(k)) << k;
+}
+
+TEST(SurveyNoise, SeesAsManyPlacesWhateverTheBucketsSize) {
+  const Scene scene = noisy_plane(400'000, 0.5);
+  std::uint64_t of_large = 0;
+  survey(scene, 24, &of_large);  // 12 with samples
+  for (const std::size_t buckets : {48, 96, 240}) {
+    std::uint64_t samples = 0;
+    survey(scene, buckets, &samples);
+    EXPECT_GT(static_cast<double>(samples), 0.8 * static_cast<double>(of_large)) << buckets;
+    EXPECT_LT(static_cast<double>(samples), 1.25 * static_cast<double>(of_large)) << buckets;
+  }
 }
 
 TEST(SurveyNoise, OfASphereIsNotItsCurvature) {
