@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -61,7 +62,10 @@ constexpr std::size_t kChunk = 1u << 15;  ///< rows a piece
 /// small clouds more, for it makes no difference there.
 constexpr std::uint64_t kBucketSamples = 1u << 14, kSmallCloudsBucket = 1u << 15;
 constexpr std::uint64_t kSmallCloud = 1u << 21;
+/// Where samples come in random order, each bucket has blocks as long as its part of the buffer allows. So there are at
+/// most so many buckets, and of large clouds, beside which a larger buffer is small, up to four times as many.
 constexpr std::uint64_t kMaxBuckets = 4096;
+constexpr std::uint64_t kLargeCloud = 1u << 26, kMostTimes = 4;
 
 /// Fixed-point coordinates may reach a little beyond the box surveyed, and qualities beyond the greatest seen.
 constexpr double kMostSteps = (1 << 29) + (1 << 25);
@@ -199,8 +203,6 @@ void widen(Extent& b, const Extent& by) {
   b.z_max = std::max(b.z_max, by.z_max);
 }
 
-namespace {
-
 StoreSettings store_settings(const Survey& survey, const Frame& frame, const StorePlace& place) {
   // The rotated bounding box bounds the samples' z.
   const Eigen::Vector3d half = 0.5 * (survey.high - survey.low) / frame.step;
@@ -211,13 +213,13 @@ StoreSettings store_settings(const Survey& survey, const Frame& frame, const Sto
   s.keep = place.keep;
   s.z_min = static_cast<std::int32_t>(-std::ceil(reach));
   const std::uint64_t held = survey.usable < kSmallCloud ? kSmallCloudsBucket : kBucketSamples;
-  const std::uint64_t wanted = std::clamp<std::uint64_t>(survey.usable / held, 1, kMaxBuckets);
+  const std::uint64_t times = std::bit_floor(std::clamp<std::uint64_t>(survey.usable / kLargeCloud, 1, kMostTimes));
+  s.buffer_bytes *= times;
+  const std::uint64_t wanted = std::clamp<std::uint64_t>(survey.usable / held, 1, kMaxBuckets * times);
   s.bucket_height = static_cast<std::int32_t>(std::ceil(2 * reach / static_cast<double>(wanted))) + 1;
   s.buckets = static_cast<std::size_t>(std::ceil(2 * reach / s.bucket_height)) + 1;
   return s;
 }
-
-}  // namespace
 
 Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, const StorePlace& place,
                 const RunContext& run, const IngestSettings& settings) {

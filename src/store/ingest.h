@@ -143,6 +143,9 @@ struct IngestSettings {
   RowSpan rows{};
 };
 
+/// Buckets for so many samples, along the frame's z, and the memory they wait in for the disk.
+StoreSettings store_settings(const Survey& survey, const Frame& frame, const StorePlace& place);
+
 /// Reads the input, or some of its rows, into the store; samples with a defect are left out. After a survey of all rows
 /// the result is always complete; after one of a part it need not be.
 Ingested ingest(PointSource& source, const Survey& survey, const Frame& frame, const StorePlace& place,

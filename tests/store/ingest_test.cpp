@@ -128,5 +128,29 @@ TEST(Ingest, QualitiesThatAreAllZeroTellNoWeights) {
   EXPECT_THAT(store(cloud).samples.quality, ::testing::Each(1.0F));
 }
 
+TEST(StoreSettings, BucketsAreAsSmallAsTheBufferAllows) {
+  Survey survey;
+  survey.low = {0, 0, 0};
+  survey.high = {1, 1, 1};
+  const auto settings_for = [&](std::uint64_t samples) {
+    survey.usable = samples;
+    return store_settings(survey, choose_frame(survey, FrameMode::axis), {testing::TempDir()});
+  };
+  std::size_t buckets = 0;
+  for (const std::uint64_t samples :
+       {1'000ULL, 1'000'000ULL, 4'000'000ULL, 60'000'000ULL, 140'000'000ULL, 400'000'000ULL, 10'000'000'000ULL}) {
+    const StoreSettings s = settings_for(samples);
+    EXPECT_GE(s.buckets, buckets) << samples;
+    buckets = s.buckets;
+    // Of samples in random order each bucket has some kilobytes of the buffer, and blocks are no shorter.
+    EXPECT_GE(s.buffer_bytes / s.buckets, 8000U) << samples;
+    EXPECT_GE(static_cast<std::int64_t>(s.buckets) * s.bucket_height, 2 * std::int64_t{-s.z_min}) << samples;
+    if (samples >= 4'000'000 && samples <= 60'000'000) {
+      EXPECT_LE(samples / s.buckets, 16'384U) << samples;
+    }
+  }
+  EXPECT_GT(buckets, 16'000U);
+}
+
 }  // namespace
 }  // namespace lamina
