@@ -134,10 +134,8 @@ void Pipeline::retire() {
 }
 
 std::int64_t Pipeline::samples_for(std::int32_t step) const {
-  const std::int64_t height = plan_.lattice.slab_height();
   const std::int64_t projected = std::int64_t{step} + plan_.window + reach_of(Stage::project).ahead;
-  const std::int64_t above = std::min<std::int64_t>(projected, stages_.of(Stage::project).end);
-  return std::max((above + kTouchSlabs) * height, above * height + static_cast<std::int64_t>(sample_reach_) + 1);
+  return samples_end(plan_.lattice, std::min<std::int64_t>(projected, stages_.of(Stage::project).end), sample_reach_);
 }
 
 void Pipeline::run(const RunContext& run, Stopwatch& watch) {

@@ -320,6 +320,11 @@ double sample_reach(const ReconstructionPlan& plan) {
          static_cast<double>(Projector(plan.projection, select_kernel()).margin(plan.lattice));
 }
 
+std::int64_t samples_end(const Lattice& lattice, std::int64_t end, double reach) {
+  const std::int64_t height = lattice.slab_height();
+  return std::max((end + kTouchSlabs) * height, end * height + static_cast<std::int64_t>(reach) + 1);
+}
+
 ZRead z_read(const ReconstructionPlan& plan, const SlabSpan& span) {
   const std::int64_t height = plan.lattice.slab_height();
   const StageSpans stages = plan.stages_of(span);
@@ -330,8 +335,7 @@ ZRead z_read(const ReconstructionPlan& plan, const SlabSpan& span) {
     z.from = std::min(stages.of(Stage::mark).begin * height,
                       projected.begin * height - static_cast<std::int64_t>(std::ceil(ahead)) - 1);
   }
-  z.to =
-      std::max((projected.end + kTouchSlabs) * height, projected.end * height + static_cast<std::int64_t>(ahead) + 1);
+  z.to = samples_end(plan.lattice, projected.end, ahead);
   return z;
 }
 

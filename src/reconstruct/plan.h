@@ -126,6 +126,9 @@ ZRead z_read(const ReconstructionPlan& plan, const SlabSpan& span);
 /// How far beyond a slab samples may lie that act on its corners.
 double sample_reach(const ReconstructionPlan& plan);
 
+/// All samples that act on slabs before `end`, or mark cells there, lie below. `reach`: sample_reach().
+std::int64_t samples_end(const Lattice& lattice, std::int64_t end, double reach);
+
 /// What the plan comes to in the input's units; time and threads are not known yet.
 SurfacePlan summary_of(const ReconstructionPlan& plan);
 

@@ -25,12 +25,7 @@ struct Axis {
 };
 
 Axis axis_of(const std::vector<std::int32_t>& values, const FloorDivider& cell, int shift) {
-  std::int32_t low = values.front();
-  std::int32_t high = low;
-  for (const std::int32_t v : values) {
-    low = std::min(low, v);
-    high = std::max(high, v);
-  }
+  const auto [low, high] = least_and_greatest(values);
   Axis axis{cell(low) >> shift, 1};
   axis.blocks += static_cast<std::uint64_t>(std::int64_t{cell(high) >> shift} - axis.low);
   return axis;

@@ -39,8 +39,7 @@ void RadiiAhead::measure_below(std::int64_t z) {
   tasks_.wait();  // one thing after the other
   tasks_.run([this, z] {
     const auto wanted = [&] {
-      std::size_t next = measured_;
-      while (next < store_.buckets() && store_.count(next) == 0) ++next;
+      const std::size_t next = store_.next_filled(measured_);
       return next < store_.buckets() && store_.z_lower(next) < z;
     };
     tbb::this_task_arena::isolate([&] {
@@ -72,11 +71,10 @@ void RadiiAhead::measure_next() {
 void RadiiAhead::read_next() {
   const std::size_t begin = read_;
   read_ = end_of(store_, begin, kSamplesTogether);
-  for (announced_ = std::max(announced_, read_); announced_ < end_of(store_, read_, kAnnounced); ++announced_)
-    store_.will_read(announced_);
+  const std::size_t announced = end_of(store_, read_, kAnnounced);
+  for (announced_ = std::max(announced_, read_); announced_ < announced; ++announced_) store_.will_read(announced_);
   waiting_.resize(read_ - begin);
   tbb::parallel_for(std::size_t{0}, waiting_.size(), [&](std::size_t k) { read(begin + k, waiting_[k]); });
-  reads_ += waiting_.size();
 }
 
 void RadiiAhead::read(std::size_t bucket, Positions& out) const {

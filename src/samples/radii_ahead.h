@@ -38,7 +38,6 @@ class RadiiAhead {
   /// Those measured and not taken yet, in ascending order, empty ones too. Waits for the background. Throws as
   /// SlabStore::read() and RadiusEstimator::push() do.
   std::vector<Measured> take();
-  [[nodiscard]] std::uint64_t reads() const { return reads_; }  ///< times a bucket was read
 
  private:
   /// Where a bucket's samples lie.
@@ -61,7 +60,6 @@ class RadiiAhead {
   std::deque<Positions> waiting_;  ///< read and not pushed
   std::deque<BlockOrder> orders_;  ///< of those pushed and not measured
   std::vector<Measured> done_;     ///< measured and not taken
-  std::uint64_t reads_ = 0;
   tbb::task_group tasks_;
 };
 

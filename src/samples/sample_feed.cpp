@@ -82,13 +82,8 @@ SampleFeed::SampleFeed(SlabStore& store, const Lattice& lattice, const FeedSetti
 
 FeedCounts SampleFeed::counts() const {
   FeedCounts counts = counts_;
-  counts.bucket_reads = cache_.reads() + (measuring_ ? measuring_->reads() : 0);
+  counts.bucket_reads += cache_.reads();
   return counts;
-}
-
-std::size_t SampleFeed::next_filled(std::size_t bucket) const {
-  while (bucket < store_.buckets() && store_.count(bucket) == 0) ++bucket;
-  return bucket;
 }
 
 void SampleFeed::begin_at(std::int64_t z) {
@@ -127,7 +122,7 @@ bool SampleFeed::begins_below(std::size_t bucket, std::int64_t z) const {
 
 void SampleFeed::prepare(std::int64_t z_limit, const OnReady& on_ready) {
   // Buckets are ascending and disjoint in z: the next one decides.
-  while (begins_below(next_filled(ready_), z_limit)) {
+  while (begins_below(store_.next_filled(ready_), z_limit)) {
     if (const auto buckets = settle_below(z_limit); !buckets.empty()) {
       hand_over(buckets, on_ready);
     } else if (!orient_next()) {
@@ -146,17 +141,20 @@ void SampleFeed::look_ahead(std::int64_t next, std::int64_t after_that) {
     measuring_->measure_below(after_that + reach);
     known = measured_ + radii_.size();
   }
-  std::size_t b = next_filled(ready_);
-  for (; b < known && begins_below(b, next + reach); b = next_filled(b + 1)) cache_.prefetch(b);
+  std::size_t b = store_.next_filled(ready_);
+  for (; b < known && begins_below(b, next + reach); b = store_.next_filled(b + 1)) cache_.prefetch(b);
   if (measuring_) return;
   for (announced_ = std::max(announced_, b); begins_below(announced_, after_that + reach);
-       announced_ = next_filled(announced_ + 1))
+       announced_ = store_.next_filled(announced_ + 1))
     store_.will_read(announced_);
 }
 
 void SampleFeed::take_measured() {
   for (RadiiAhead::Measured& bucket : measuring_->take()) {
-    if (!bucket.radii.empty()) cache_.know_order(measured_ + radii_.size(), std::move(bucket.order));
+    if (!bucket.radii.empty()) {
+      ++counts_.bucket_reads;
+      cache_.know_order(measured_ + radii_.size(), std::move(bucket.order));
+    }
     radii_.push_back(std::move(bucket.radii));
   }
 }
@@ -192,7 +190,7 @@ void SampleFeed::learn_radii() {
 }
 
 std::int64_t SampleFeed::first_from(std::size_t bucket) const {
-  const std::size_t next = next_filled(bucket);
+  const std::size_t next = store_.next_filled(bucket);
   return next == store_.buckets() ? std::numeric_limits<std::int64_t>::max() : std::int64_t{store_.z_lower(next)};
 }
 

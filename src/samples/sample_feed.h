@@ -146,8 +146,6 @@ class SampleFeed {
     std::vector<std::uint8_t> finer;  ///< 1: the sample takes a level less; empty: none does
   };
   void annotate(std::size_t bucket, ActiveBucket& out) const;
-  /// The next bucket with samples from `bucket` on, the number of buckets when there is none.
-  [[nodiscard]] std::size_t next_filled(std::size_t bucket) const;
   std::shared_ptr<const ActiveBucket> fetch(std::size_t bucket);
   [[nodiscard]] bool begins_below(std::size_t bucket, std::int64_t z) const;
   // A bucket passes these steps, each when the buckets around have passed the one before.

@@ -76,6 +76,10 @@ std::size_t SlabStore::buckets() const {
 std::uint64_t SlabStore::count(std::size_t bucket) const {
   return impl_->buckets[bucket].count;
 }
+std::size_t SlabStore::next_filled(std::size_t bucket) const {
+  while (bucket < buckets() && count(bucket) == 0) ++bucket;
+  return bucket;
+}
 std::int32_t SlabStore::z_lower(std::size_t bucket) const {
   return impl_->buckets[bucket].z_lower;
 }

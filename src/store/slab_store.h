@@ -66,6 +66,8 @@ class SlabStore {
   [[nodiscard]] const StoreLayout& layout() const;
   [[nodiscard]] std::size_t buckets() const;
   [[nodiscard]] std::uint64_t count(std::size_t bucket) const;
+  /// The first bucket with samples from `bucket` on, buckets() when there is none.
+  [[nodiscard]] std::size_t next_filled(std::size_t bucket) const;
   [[nodiscard]] std::int32_t z_lower(
       std::size_t bucket) const;  ///< smallest z stored in the bucket (exact); greatest int32 when it is empty
   [[nodiscard]] std::int32_t z_upper(
