@@ -206,13 +206,24 @@ void HoleCloser::settle_occupied(std::vector<Closing>& closings) const {
   for (const std::size_t island : taken) closings[island].filling.verdict = Verdict::joined;
 }
 
+namespace {
+
+bool is_slit(const Closure& closure) {
+  return closure.width <= kSlit && closure.leads_in >= kLiesBack && closure.folded <= kMostUnfit;
+}
+
+}  // namespace
+
 void HoleCloser::bridge_gaps(std::vector<Closing>& closings) const {
   std::vector<Closing> bridges(loops_.size());
   tbb::parallel_for(std::size_t{0}, loops_.size(), [&](std::size_t l) {
-    if (closings[l].filling.verdict != Verdict::bent) return;
+    const Verdict verdict = closings[l].filling.verdict;
+    if (verdict != Verdict::bent && verdict != Verdict::outer_boundary) return;
     const auto& [loop, extent] = loops_[l];
     Closure closure = close_loop(loop);
-    if (closure.leads_in < kBridgeLeadsIn + kBridgePerRadius * extent.radii) return;
+    const double least = kBridgeLeadsIn + kBridgePerRadius * extent.radii;
+    const bool leads_in = verdict == Verdict::bent && closure.leads_in >= least;
+    if (!leads_in && !is_slit(closure)) return;
     bridges[l].filling = std::move(closure.filling);
     bridges[l].filling.verdict = Verdict::filled;
   });

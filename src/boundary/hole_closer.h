@@ -28,6 +28,9 @@ inline constexpr double kMostLeadsAway = 0.2;
 /// rim: at rims of 10 radii 70 degrees on the average, of 25 60, of 50 41. What a wide gap hides may look otherwise.
 inline constexpr double kBridgeLeadsIn = 0.25;
 inline constexpr double kBridgePerRadius = 0.012;
+/// So is what is no wider than this (Closure::width), whatever its sides do: the slit between an edge
+/// and what lies a little behind it. A bridge misses by half of it at most.
+inline constexpr double kSlit = 0.5;
 /// Other loops run through a filling with no more vertices than this for each of the rim: scraps of surface that lie
 /// on it here and there, as noise and scans that disagree leave them, say nothing against it.
 inline constexpr double kMostOccupied = 0.1;
@@ -83,7 +86,8 @@ class HoleCloser {
   bool take_islands(std::size_t outer, const Occupants& occupants, const std::vector<Closing>& closings,
                     Closing& out) const;
   void settle_occupied(std::vector<Closing>& closings) const;
-  /// Closes what is `bent` where the surface leads into it and no other loop lies in the way.
+  /// Closes what is `bent` where the surface leads into it, and slits (where one steps back behind itself the plane
+  /// across its mean normal may see an outer boundary), as far as no other loop lies in the way.
   void bridge_gaps(std::vector<Closing>& closings) const;
   [[nodiscard]] bool is_wide(std::size_t l) const { return loops_[l].second.radii > HoleSettings::kWatertight; }
   /// Whether the short loops that are left look like those of a closed thing.

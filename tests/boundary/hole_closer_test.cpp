@@ -62,5 +62,49 @@ TEST(HoleCloser, WhatLiesFartherOffThanHalfARadiusIsNotInTheGap) {
   EXPECT_EQ(close_gap_beside({10, 0.6, 5}).closed, 1U);
 }
 
+/// The slit, 10 influence radii long, between a plane's edge and a plane `step` lower that begins below it, both facing
+/// up; or, the other way around, the outer boundary of the wall that would stand in it.
+BoundaryBatch slit_of(double step, bool outer_boundary) {
+  constexpr Number kSide = 20;
+  BoundaryBatch batch;
+  for (Number i = 0; i < 2 * kSide; ++i) {
+    const bool upper = i < kSide;
+    const auto along = static_cast<double>(upper ? kSide - i : i - kSide + 1);
+    BoundaryVertex v;
+    v.number = i;
+    v.position = {along / 2, 0, upper ? 0 : -step};
+    if (outer_boundary) {
+      v.normal = {0, -1, 0};
+    } else {
+      v.normal = {0, 0, 1};
+    }
+    v.radius = 1;
+    batch.vertices.push_back(v);
+    const Number next = (i + 1) % (2 * kSide);
+    batch.edges.push_back({i, next, {0, double{v.normal[1]}, double{v.normal[2]}}});
+  }
+  return batch;
+}
+
+std::uint64_t closed_slits(const BoundaryBatch& batch, bool bridge) {
+  HoleSettings settings;
+  settings.longest = 300;
+  settings.bridge = bridge;
+  HoleCloser closer(settings, 0, true);
+  closer.add(batch);
+  closer.finish(batch.vertices.size());
+  return closer.stats().closed;
+}
+
+TEST(HoleCloser, NarrowSlitsAreBridgedWhateverTheirSidesDo) {
+  EXPECT_EQ(closed_slits(slit_of(0.4, false), true), 1U);
+  EXPECT_EQ(closed_slits(slit_of(0.4, false), false), 0U) << "nobody asked for bridges";
+  EXPECT_EQ(closed_slits(slit_of(1.5, false), true), 0U) << "too wide";
+}
+
+TEST(HoleCloser, NarrowSheetsAreNoSlits) {
+  EXPECT_EQ(closed_slits(slit_of(0.4, true), true), 0U);
+}
+
 }  // namespace
 }  // namespace lamina::boundary
