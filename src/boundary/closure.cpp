@@ -127,23 +127,6 @@ double width_of(const Disc& disc, double radius) {
   return 2 * area / (length * radius);
 }
 
-/// Closure::folded.
-double share_folded(const Disc& disc, const Loop& loop) {
-  std::size_t folded = 0;
-  for (const auto& t : disc.triangles) {
-    const Vec3& a = disc.points[t[0]];
-    const Vec3 normal = (disc.points[t[1]] - a).cross(disc.points[t[2]] - a);
-    for (std::size_t k = 0; k < 3; ++k) {
-      if (t[k] >= disc.rim || t[(k + 1) % 3] != (t[k] + 1) % disc.rim) continue;
-      const auto& n = loop.vertices[t[k]].normal;
-      const Vec3 around(n[0], n[1], n[2]);
-      const double lengths = normal.norm() * around.norm();
-      if (!(lengths > 0) || 1 - normal.dot(around) / lengths > kMostFold) ++folded;
-    }
-  }
-  return static_cast<double>(folded) / static_cast<double>(disc.rim);
-}
-
 double mean_radius(const Loop& loop) {
   double sum = 0;
   for (const BoundaryVertex& v : loop.vertices) sum += static_cast<double>(v.radius);
@@ -297,7 +280,7 @@ Closure close_loop(const Loop& loop) {
   const double width = width_of(disc, mean_radius(loop) / unit);
   const Turns turned = turns(loop, disc, stiff);
   bend(turned.at_rim, stiff, disc);
-  return {filling_of(disc, origin, unit, values), turned.leads_in, width, share_folded(disc, loop)};
+  return {filling_of(disc, origin, unit, values), turned.leads_in, width};
 }
 
 }  // namespace lamina::boundary

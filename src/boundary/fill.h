@@ -135,8 +135,6 @@ struct Closure {
   /// Of the flat closure, influence radii: twice its area over the rim's length. Of a long one that is how far apart
   /// its sides are, of a round one half of its diameter.
   double width = 0;
-  /// Share of the rim's edges along which it folds farther than kMostFold, by the normals of the surface around.
-  double folded = 0;
 };
 
 /// A disc of new vertices and triangles, whatever the loop looks like, so that a mesh whose loops all get theirs is

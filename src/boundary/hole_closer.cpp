@@ -209,7 +209,7 @@ void HoleCloser::settle_occupied(std::vector<Closing>& closings) const {
 namespace {
 
 bool is_slit(const Closure& closure) {
-  return closure.width <= kSlit && closure.leads_in >= kLiesBack && closure.folded <= kMostUnfit;
+  return closure.width >= kLeastSlit && closure.width <= kSlit && closure.leads_in >= kLiesBack;
 }
 
 }  // namespace

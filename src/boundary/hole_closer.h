@@ -28,9 +28,10 @@ inline constexpr double kMostLeadsAway = 0.2;
 /// rim: at rims of 10 radii 70 degrees on the average, of 25 60, of 50 41. What a wide gap hides may look otherwise.
 inline constexpr double kBridgeLeadsIn = 0.25;
 inline constexpr double kBridgePerRadius = 0.012;
-/// So is what is no wider than this (Closure::width), whatever its sides do: the slit between an edge
-/// and what lies a little behind it. A bridge misses by half of it at most.
+/// So is a slit (Closure::width), whatever its sides do, as between an edge and what lies a little behind it: a bridge
+/// misses by half of that at most. In the narrowest, the two sides of one line of edges, triangles would have no area.
 inline constexpr double kSlit = 0.5;
+inline constexpr double kLeastSlit = 0.02;
 /// Other loops run through a filling with no more vertices than this for each of the rim: scraps of surface that lie
 /// on it here and there, as noise and scans that disagree leave them, say nothing against it.
 inline constexpr double kMostOccupied = 0.1;
