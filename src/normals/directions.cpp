@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/four.h"
+#include "normals/edges.h"
 #include "samples/nearest_search.h"
 
 namespace lamina::normals {
@@ -83,7 +84,7 @@ class DirectionFinder {
         bound_(settings.search_radius * settings.search_radius),
         samples_(samples),
         links_(links),
-        reach_(links.core.size(), 0.0F),
+        first_{std::vector<float>(samples.size(), -1.0F), std::vector<float>(links.core.size(), 0.0F)},
         level_(samples.size(), kNoLevel) {
     links_.neighbours.resize(links.core.size());
     links_.scale.resize(links.core.size());
@@ -106,6 +107,7 @@ class DirectionFinder {
     // Noise is no matter of single samples: levels that neighbours do not share are chance.
     const std::vector<std::uint8_t> chosen = level_;
     for_core([&](std::size_t i) { settle(i, chosen); });
+    sharpen_edges(tree_, first_, links_, samples_);
   }
 
  private:
@@ -160,8 +162,9 @@ class DirectionFinder {
     if (settings_.radius > 0) {
       plane = plane_of_ball(place, plane);
     } else if (taken > 0) {
-      reach_[i] = plane.valid() ? squared : 0.0F;
-      level_[place] = choose_level(tree_, {place, plane, static_cast<double>(taken + 1), reach_[i], bound_});
+      first_.reach[i] = plane.valid() ? squared : 0.0F;
+      first_.variance[place] = plane.valid() ? static_cast<float>(plane.least) : -1.0F;
+      level_[place] = choose_level(tree_, {place, plane, static_cast<double>(taken + 1), first_.reach[i], bound_});
     }
     set_normal(place, plane);
   }
@@ -174,7 +177,8 @@ class DirectionFinder {
 
   /// The median of the sample's level and its neighbours'.
   void settle(std::size_t i, const std::vector<std::uint8_t>& chosen) {
-    if (reach_[i] == 0) return;
+    const float reach = first_.reach[i];
+    if (reach == 0) return;
     const std::uint32_t place = links_.core[i];
     std::array<std::uint8_t, Links::kMost + 1> levels;
     levels.fill(chosen[place]);
@@ -185,11 +189,11 @@ class DirectionFinder {
     std::nth_element(levels.begin(), levels.begin() + Links::kMost / 2, levels.end());
     const std::uint8_t level = levels[Links::kMost / 2];
     if (level == 0) return;
-    const float squared = std::min(reach_of_level(reach_[i], level), bound_);
+    const float squared = std::min(reach_of_level(reach, level), bound_);
     const Plane plane = plane_within(tree_, place, squared);
     if (!plane.valid()) return;
     set_normal(place, plane);
-    samples_.lift[place] = height_of_sheet(tree_, place, plane.normal, {squared, reach_[i]});
+    samples_.lift[place] = height_of_sheet(tree_, place, plane.normal, {squared, reach});
   }
 
   void set_normal(std::uint32_t place, const Plane& plane) {
@@ -203,7 +207,7 @@ class DirectionFinder {
   float bound_;
   WindowSamples& samples_;
   Links& links_;
-  std::vector<float> reach_;  ///< by number of the core sample: of its first plane, squared; 0 where there is none
+  FirstPlanes first_;
   std::vector<std::uint8_t> level_;  ///< by place
   tbb::enumerable_thread_specific<AcrossLines> across_;
 };

@@ -17,7 +17,6 @@ constexpr std::size_t kPaired = 10;
 constexpr std::size_t kLeastNeighbours = 6;
 /// Two neighbours and the sample nearly in line make no plane.
 constexpr float kLeastSine = 0.3F;
-constexpr float kDistance = kConsensusDistance / kConsensusReach;
 constexpr int kFits = 2;
 constexpr std::size_t kAbreast = 8;  ///< neighbours side by side
 
@@ -33,7 +32,7 @@ struct Quadric {
 };
 
 /// The quadric of least squares through the neighbours near the given one.
-Quadric fitted(const std::vector<Vec3f>& neighbours, const Quadric& from) {
+Quadric fitted(const std::vector<Vec3f>& neighbours, float near, const Quadric& from) {
   const Eigen::Vector3d n = from.normal;
   const Eigen::Vector3d u = n.unitOrthogonal();
   const Eigen::Vector3d v = n.cross(u);
@@ -42,7 +41,7 @@ Quadric fitted(const std::vector<Vec3f>& neighbours, const Quadric& from) {
   Row b = Row::Zero();
   for (const Vec3f& p : neighbours) {
     const Eigen::Vector3d q(p[0], p[1], p[2]);
-    const double h = from.distance(q) / double{kDistance};
+    const double h = from.distance(q) / double{near};
     if (h * h >= 1) continue;
     const double x = q.dot(u);
     const double y = q.dot(v);
@@ -76,7 +75,7 @@ void ConsensusPlane::lay_out() {
 
 float ConsensusPlane::score(const Vec3f& normal) const {
   std::array<float, kAbreast> sum{};
-  const std::array<float, 3> n{normal[0] / kDistance, normal[1] / kDistance, normal[2] / kDistance};
+  const std::array<float, 3> n{normal[0] / distance, normal[1] / distance, normal[2] / distance};
   for (std::size_t i = 0; i < x_.size(); i += kAbreast) {
     for (std::size_t l = 0; l < kAbreast; ++l) {
       const float h = n[0] * x_[i + l] + n[1] * y_[i + l] + n[2] * z_[i + l];
@@ -94,7 +93,7 @@ bool ConsensusPlane::find(const Vec3f& own, Vec3f& normal) {
   lay_out();
   float best = kConsensusGain * score(own);
   if (std::accumulate(weight_.begin(), weight_.end(), 0.0F) <= best) return false;
-  const std::size_t paired = std::min(kPaired, neighbours.size());
+  const std::size_t paired = std::min(kPaired * stride, neighbours.size());
   std::partial_sort(neighbours.begin(), neighbours.begin() + static_cast<std::ptrdiff_t>(paired), neighbours.end(),
                     [](const Vec3f& a, const Vec3f& b) {
                       const float na = inner(a, a);
@@ -103,8 +102,8 @@ bool ConsensusPlane::find(const Vec3f& own, Vec3f& normal) {
                     });
   Quadric quadric;
   bool found = false;
-  for (std::size_t j = 0; j < paired; ++j) {
-    for (std::size_t k = j + 1; k < paired; ++k) {
+  for (std::size_t j = 0; j < paired; j += stride) {
+    for (std::size_t k = j + stride; k < paired; k += stride) {
       const Vec3f& a = neighbours[j];
       const Vec3f& b = neighbours[k];
       const Vec3f across{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
@@ -120,7 +119,7 @@ bool ConsensusPlane::find(const Vec3f& own, Vec3f& normal) {
     }
   }
   if (!found) return false;
-  for (int fit = 0; fit < kFits; ++fit) quadric = fitted(neighbours, quadric);
+  for (int fit = 0; fit < kFits; ++fit) quadric = fitted(neighbours, distance, quadric);
   normal = {static_cast<float>(quadric.normal.x()), static_cast<float>(quadric.normal.y()),
             static_cast<float>(quadric.normal.z())};
   return inner(normal, own) > 0;

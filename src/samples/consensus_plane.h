@@ -1,6 +1,7 @@
 // The plane, slightly bent, through a sample that most of its neighbours lie on: beside a sharp edge, that of its side.
 #pragma once
 #include <array>
+#include <cstddef>
 #include <vector>
 
 namespace lamina {
@@ -20,6 +21,10 @@ class ConsensusPlane {
   /// Neighbours of the sample that is being looked at, in units of kConsensusReach radii, relative to it, all nearer
   /// than one. Cleared by the caller.
   std::vector<std::array<float, 3>> neighbours;
+  /// How far from a plane they may lie and count for it a little, in the same units.
+  float distance = kConsensusDistance / kConsensusReach;
+  /// Planes are tried through pairs of the nearest of them, of every so many one: noisy ones are to lie far apart.
+  std::size_t stride = 1;
 
   /// The normal at the origin of the surface through it that most neighbours lie on, on the side of `own`, which must
   /// be a unit vector; false where none is much better than `own`. Planes are those through two of the nearest

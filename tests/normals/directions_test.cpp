@@ -177,6 +177,23 @@ TEST(FindDirections, KeepAnEdge) {
   EXPECT_LT(cloud.error([](const test::Vector& p) { return std::abs(p[0] - 0.5) > 0.03; }), 4.5);
 }
 
+// Where noise is little beside the spacing (0.009) the nearest sixteen of a sample beside an edge hold both of its
+// sides. What is nearer to it than five deviations lies on either.
+TEST(FindDirections, TellTheSidesOfASharpEdgeApart) {
+  const auto beside_edge = [](const test::Vector& p) {
+    const double off = std::abs(p[0] - 0.5);
+    return off > 0.004 && off < 0.015 && std::abs(p[1] - 0.5) < 0.45;
+  };
+  NoisyCloud roof;
+  test::add_sheet(roof.truth, 12000, [](double x, double) { return std::abs(x - 0.5); });
+  roof.move(0.0005);
+  EXPECT_LT(roof.error(beside_edge), 11) << "20 by the nearest sixteen";
+  NoisyCloud ridge;
+  test::add_sheet(ridge.truth, 12000, [](double x, double) { return std::hypot(x - 0.5, 0.1); });
+  ridge.move(0.0005);
+  EXPECT_LT(ridge.error(beside_edge), 2) << "round";
+}
+
 // The two faces of a wall four deviations of noise thick: the other one's samples must not turn the plane.
 TEST(FindDirections, OfAThinWallAreAcrossIt) {
   NoisyCloud cloud;
