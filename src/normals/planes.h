@@ -17,22 +17,7 @@ struct Moments {
   std::array<double, 3> sum{};
   std::array<double, 6> products{};  ///< xx xy xz yy yz zz
 
-  void add(const std::array<float, 3>& d) {
-    const double x = d[0];
-    const double y = d[1];
-    const double z = d[2];
-    count += 1;
-    sum[0] += x;
-    sum[1] += y;
-    sum[2] += z;
-    products[0] += x * x;
-    products[1] += x * y;
-    products[2] += x * z;
-    products[3] += y * y;
-    products[4] += y * z;
-    products[5] += z * z;
-  }
-  void add(const std::array<float, 3>& d, double weight) {
+  void add(const std::array<float, 3>& d, double weight = 1) {
     const double x = d[0];
     const double y = d[1];
     const double z = d[2];
