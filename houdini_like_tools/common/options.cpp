@@ -273,8 +273,8 @@ void add_hole_options(CLI::App& tool, SurfaceSettings& settings, const std::stri
   add_yes_no_or_auto(
       tool, "--bridge", settings.bridge,
       "Bridge gaps of that length whose rims are too bent to show it, where the surface leads into them from all "
-      "around; auto: where --blend is auto and the cloud is noisy, of several scans or came without normals, "
-      "since gaps in it are what nobody saw")
+      "around, and narrow slits; auto: where --blend is auto and the cloud is noisy, of several scans or came without "
+      "normals, since gaps in it are what nobody saw")
       ->group(group);
   tool.add_flag("--filled", settings.vertex_filled,
                 "Give vertices a property filled: 1 where one was added to close a hole, else 0: 'lamina render "

@@ -35,7 +35,8 @@ struct HoleSettings {
   Watertight watertight = Watertight::no;
   static constexpr double kWatertight = 24;
   /// Loops up to `longest` around which nothing flat tells how the surface goes on are closed by a smooth surface over
-  /// the rim (boundary/fill.h) where the surface leads into them from all around, the more so the longer they are.
+  /// the rim (boundary/fill.h) where the surface leads into them from all around, the more so the longer they are, and
+  /// where they are narrow slits.
   bool bridge = false;
   /// Vertices' last attribute says which of them were added: those that are get 1.
   bool mark = false;

@@ -72,6 +72,7 @@ class EdgeSharpener {
     samples_.nx[place] = found[0];
     samples_.ny[place] = found[1];
     samples_.nz[place] = found[2];
+    samples_.lift[place] = 0;
   }
 
  private:

@@ -26,8 +26,8 @@ struct FirstPlanes {
   std::vector<float> reach;     ///< squared, by number of the core sample, steps^2; 0: it has none
 };
 
-/// Replaces the normals of core samples whose first plane holds an edge by that of the plane, slightly bent, that most
-/// samples around lie on (samples/consensus_plane.h).
+/// Replaces the normals of core samples whose first plane holds an edge by that of the plane that most samples around
+/// lie on (samples/consensus_plane.h); such a sample is on its sheet.
 void sharpen_edges(const SampleTree& tree, const FirstPlanes& planes, const Links& links, WindowSamples& samples);
 
 }  // namespace lamina::normals
