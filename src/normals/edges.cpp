@@ -64,10 +64,11 @@ class EdgeSharpener {
   void sharpen(std::uint32_t place, float noise, float reach) {
     const float around = std::sqrt(kAround) * reach;
     gather(place, around);
-    plane_.distance = kOnPlane * noise / around;
+    plane_.distance = kOnSide * noise / around;
     const std::array<float, 3> own{samples_.nx[place], samples_.ny[place], samples_.nz[place]};
     std::array<float, 3> found{};
     if (!plane_.find(own, found)) return;
+    // That holds curved sides as well, but passes through the sample, whose noise it follows.
     for (int fit = 0; fit < kFits; ++fit) found = fitted(found);
     samples_.nx[place] = found[0];
     samples_.ny[place] = found[1];
@@ -115,9 +116,9 @@ void sharpen_edges(const SampleTree& tree, const FirstPlanes& planes, const Link
     const float own = planes.variance[place];
     if (squared == 0 || own < kSharp * kSharp * squared || !samples.has_normal(place)) return;
     const float noise = quiet.of(i);
-    const float near = kOnPlane * kOnPlane * noise;
-    if (own < kEdgeDeviation * kEdgeDeviation * noise || near < kLeastOnPlane * kLeastOnPlane * squared ||
-        near > kMostOnPlane * kMostOnPlane * squared)
+    const float near = kOnSide * kOnSide * noise;
+    if (own < kEdgeDeviation * kEdgeDeviation * noise || near < kLeastOnSide * kLeastOnSide * squared ||
+        near > kMostOnSide * kMostOnSide * squared)
       return;
     sharpeners.local().sharpen(place, std::sqrt(noise), std::sqrt(squared));
   };

@@ -14,11 +14,11 @@ inline constexpr float kEdgeDeviation = 3;
 /// and such a share of its reach, the distance of its farthest sample: at a right angle 0.2, and what is round less.
 inline constexpr float kSharp = 0.08F;
 /// So many deviations of noise from a plane samples still lie on it:
-inline constexpr float kOnPlane = 5;
+inline constexpr float kOnSide = 5;
 /// no larger share of the reach, or the sides could not be told apart by what is left,
-inline constexpr float kMostOnPlane = 0.15F;
+inline constexpr float kMostOnSide = 0.15F;
 /// and no smaller one: normals beside edges of clean clouds are found while the surface is (RefitNormals).
-inline constexpr float kLeastOnPlane = 0.02F;
+inline constexpr float kLeastOnSide = 0.02F;
 
 /// The planes that samples got first, of their nearest samples.
 struct FirstPlanes {

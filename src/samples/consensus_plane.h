@@ -18,8 +18,9 @@ inline constexpr float kConsensusGain = 1.3F;
 /// One thread's.
 class ConsensusPlane {
  public:
-  /// Neighbours of the sample that is being looked at, in units of kConsensusReach radii, relative to it, all nearer
-  /// than one. Cleared by the caller.
+  /// Neighbours of the sample that is being looked at, relative to it and in units of the distance they are looked for
+  /// within (kConsensusReach radii where the next ones stay as they are), so that all are nearer than one. Cleared by
+  /// the caller.
   std::vector<std::array<float, 3>> neighbours;
   /// How far from a plane they may lie and count for it a little, in the same units.
   float distance = kConsensusDistance / kConsensusReach;
