@@ -56,6 +56,7 @@ void clean_cloud(StoredCloud& cloud, const SurfaceSettings& settings, const std:
   counts.clipped = in.census.clipped;
   counts.skipped = in.census.skipped;
   Cleaning cleaning{settings.clean, cloud.frame.step, tmp};
+  if (cloud.info.found_normals) cleaning.normals = SampleNormals::found;
   if (!settings.rejected.empty() && !settings.dry_run) {
     job.rejected = open_rejected(cloud, settings);
     cleaning.rejected = [&](const Reasons& reasons) { write_rejected(cloud, reasons, *job.rejected); };

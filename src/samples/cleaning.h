@@ -101,13 +101,14 @@ struct StrayCounts {
   [[nodiscard]] std::uint64_t all() const { return lonely + off_surface; }
 };
 
-/// Whether the store's normals say anything.
-enum class SampleNormals : std::uint8_t { given, none };
+/// What the store's normals say: measured ones tell more than those found from the positions.
+enum class SampleNormals : std::uint8_t { given, found, none };
 
 /// Clears the masks of stray samples; those they find cleared are not there. Strays left over are judged without those
-/// found first, and samples too sparse to have a dozen neighbours by each other. `reasons`: where wanted, is told of
-/// each. Depends on the cloud alone. Memory: some 60 bytes for each sample of twelve dozen spacings of the cloud's
-/// height, a bit for each of the cloud, and of buckets with samples too sparse two more.
+/// found first, and samples too sparse to have a dozen neighbours by each other; where normals were not measured, those
+/// far from their neighbours by find_clutter() in the end. `reasons`: where wanted, is told of each. Depends on the
+/// cloud alone. Memory: some 60 bytes for each sample of twelve dozen spacings of the cloud's height, a bit for each of
+/// the cloud, and of buckets with samples too sparse three more.
 StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, SampleNormals normals, const RunContext& run,
                         Reasons* reasons = nullptr);
 

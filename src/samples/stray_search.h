@@ -31,6 +31,7 @@ struct Surroundings {
   std::vector<std::uint8_t> suspect;      ///< Suspicion
   std::vector<std::uint8_t> look;         ///< Search's
   std::vector<std::uint8_t> beside;       ///< 1: few neighbours, but many samples not much farther away
+  std::vector<std::uint8_t> far;          ///< 1: may be clutter by its distance, whether it stays or not
   std::vector<float> scatter;             ///< scatter_of() where samples are sparse, else negative
 
   /// Of a place that has been searched around: `count` of them.

@@ -100,15 +100,19 @@ bool is_off_plane(const Placed& s, std::size_t place, const Company& company, fl
   return within(kNearPlane) < least * found && within(kOnPlane) < kLeastExact * found;
 }
 
-float scatter_of(const Placed& s, std::size_t place, const Company& company, SampleNormals normals) {
+float thickness_of(const Placed& s, std::size_t place, const Company& company) {
   if (company.count < kStrayNeighbours) return -1;
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
-  if (normals == SampleNormals::none) {
-    const Around at = around_of(s, place, company);
-    solver.computeDirect(at * at.transpose(), Eigen::EigenvaluesOnly);
-    const Eigen::Vector3f along = solver.eigenvalues();
-    return along[2] > 0 ? std::max(along[0], 0.0F) / along[2] : 0;
-  }
+  const Around at = around_of(s, place, company);
+  solver.computeDirect(at * at.transpose(), Eigen::EigenvaluesOnly);
+  const Eigen::Vector3f along = solver.eigenvalues();
+  return along[2] > 0 ? std::max(along[0], 0.0F) / along[2] : 0;
+}
+
+float scatter_of(const Placed& s, std::size_t place, const Company& company, SampleNormals normals) {
+  if (normals == SampleNormals::none) return thickness_of(s, place, company);
+  if (company.count < kStrayNeighbours) return -1;
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
   Around facing;
   facing.col(0) << s.nx[place], s.ny[place], s.nz[place];
   for (std::size_t k = 0; k < company.count; ++k) {
@@ -129,7 +133,11 @@ bool fills_space(const Surroundings& known, std::size_t place, const Company& co
     sum += its;
     ++count;
   }
-  return sum > (normals == SampleNormals::given ? kDisordered : kThick) * count;
+  return sum > (normals != SampleNormals::none ? kDisordered : kThick) * count;
+}
+
+void doubt_all(const Placed& /*samples*/, const SampleLeaf& leaf, std::uint8_t* doubtful) {
+  std::fill_n(doubtful, leaf.size(), std::uint8_t{1});
 }
 
 void find_doubtful(const Placed& s, const SampleLeaf& leaf, std::uint8_t* doubtful) {

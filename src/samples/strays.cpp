@@ -12,6 +12,8 @@
 #include "lamina/error.h"
 #include "samples/neighbourhoods.h"
 #include "samples/sampling_survey.h"
+#include "samples/stray_clutter.h"
+#include "samples/stray_passes.h"
 #include "samples/stray_search.h"
 #include "samples/stray_tests.h"
 
@@ -21,15 +23,14 @@ namespace {
 constexpr std::uint64_t kSurveyed = 1u << 16;  ///< samples the spacing is taken from
 /// How far neighbours are looked for, in median density radii (two spacings each).
 constexpr double kStrayReach = 6;
-/// Samples without a dozen neighbours so near are looked at again among themselves, so many times farther, and so on.
-constexpr double kNextReach = 4;
-constexpr int kMostReaches = 4;
-/// As long as there are more of them than so many, and than one in so many of all: far ends of a scan.
-constexpr std::uint64_t kFewSparse = kStrayNeighbours;
-constexpr std::uint64_t kRarelySparse = 10000;
 /// Samples are sparse for their cloud where their neighbours lie so many median radii away in the mean, more than
 /// twice as far as usual: whether they fill space is asked there alone, since under noise those of a surface do.
 constexpr float kSparse = 1.5F;
+/// Clutter is sparser: outliers that are a fifth of a cloud lie five median radii from their dozen, the inner wall of a
+/// bowl that was hardly seen two and a half.
+constexpr float kFarApart = 3;
+/// How far the first dozens of clutter are looked for, in reaches of the strays: samples so sparse are few.
+constexpr double kClutterReach = 2;
 
 /// The median of the distances of its company; 0 where it has none.
 float usual_distance(const Surroundings& known, const Company& company) {
@@ -49,6 +50,7 @@ float usual_distance(const Surroundings& known, const Company& company) {
 struct Measures {
   float reach = 1;   ///< neighbours are looked for as far
   float sparse = 0;  ///< mean distance to a dozen neighbours from which on samples are sparse for their cloud
+  float far = 0;     ///< and from which on they may be clutter
   SampleNormals normals = SampleNormals::given;
 };
 
@@ -71,9 +73,12 @@ void judge_places(const Neighbourhoods& around, const Measures& by, float margin
     if (known.distance[p] > by.sparse) known.scatter[p] = scatter_of(samples, p, company_of(known, p), by.normals);
   });
   const auto is_off = [&](std::size_t p, const Company& company, float least) {
-    return by.normals == SampleNormals::given ? is_off_surface(samples, p, company, least)
-                                              : is_off_plane(samples, p, company, least);
+    return by.normals != SampleNormals::none ? is_off_surface(samples, p, company, least)
+                                             : is_off_plane(samples, p, company, least);
   };
+  for_places([&](std::size_t p) {
+    if (known.distance[p] < 0 || known.distance[p] > by.far) known.far[p] = 1;
+  });
   std::vector<std::uint8_t> verdicts = known.stray;
   for_places([&](std::size_t p) {
     if (known.suspect[p] == kClear || !around.is_near(p, margin)) return;
@@ -90,21 +95,19 @@ void judge_places(const Neighbourhoods& around, const Measures& by, float margin
   known.stray = std::move(verdicts);
 }
 
-void doubt_all(const Placed& /*samples*/, const SampleLeaf& leaf, std::uint8_t* doubtful) {
-  std::fill_n(doubtful, leaf.size(), std::uint8_t{1});
-}
-
 /// One pass over the store.
 class StraySweep {
  public:
   StraySweep(const SlabStore& store, KeepMasks& masks, Reasons* reasons)
-      : store_(store), masks_(masks), reasons_(reasons) {}
+      : store_(store), masks_(masks), reasons_(reasons), far_(masks.size()) {}
 
   /// Judges the samples that `among` has, by each other. Returns those that stay, but have not a dozen neighbours.
   KeepMasks judge(const KeepMasks& among, const Measures& by, const RunContext& run);
+  /// Judges the samples far from their neighbours that stay by all of these, strays too.
+  void judge_clutter(double reach, const RunContext& run);
 
   [[nodiscard]] const StrayCounts& counts() const { return counts_; }
-  [[nodiscard]] std::uint64_t sparse() const { return sparse_; }  ///< how many the last pass returned
+  [[nodiscard]] std::uint64_t alone() const { return alone_; }  ///< how many the last pass returned
 
  private:
   void drop(std::uint32_t bucket, std::uint32_t number, std::uint8_t verdict);
@@ -113,18 +116,21 @@ class StraySweep {
   KeepMasks& masks_;
   Reasons* reasons_;
   StrayCounts counts_;
-  std::uint64_t sparse_ = 0;
+  KeepMasks far_;  ///< of all passes, whether they stay or not
+  std::uint64_t far_samples_ = 0;
+  std::uint64_t alone_ = 0;
 };
 
 KeepMasks StraySweep::judge(const KeepMasks& among, const Measures& by, const RunContext& run) {
-  KeepMasks sparse(among.size());
-  sparse_ = 0;
-  Neighbourhoods around(store_, among, by.reach, by.normals == SampleNormals::given ? find_doubtful : doubt_all);
+  KeepMasks alone(among.size());
+  alone_ = 0;
+  Neighbourhoods around(store_, among, by.reach, by.normals != SampleNormals::none ? find_doubtful : doubt_all);
   Surroundings known;
   while (around.advance()) {
     if (run.cancelled()) throw Error(ExitCode::internal, "cancelled");
     Search search(around, by.reach, known);
     search.start();
+    known.far.assign(around.samples().size(), 0);
     judge_places(around, by, by.reach, known);
     // Strays keep each other company: those left are judged again without the others.
     search.go_on();
@@ -132,17 +138,29 @@ KeepMasks StraySweep::judge(const KeepMasks& among, const Measures& by, const Ru
     const Placed& samples = around.samples();
     for (std::size_t p = 0; p < samples.size(); ++p) {
       if (!around.is_own(p) || known.suspect[p] == kClear) continue;
+      if (known.far[p] != 0) {
+        include(far_, store_, samples.bucket[p], samples.number[p]);
+        ++far_samples_;
+      }
       if (known.stray[p] != kStays) {
         drop(samples.bucket[p], samples.number[p], known.stray[p]);
       } else if (company_of(known, p).count < kStrayNeighbours) {
-        std::vector<bool>& bucket = sparse[samples.bucket[p]];
-        bucket.resize(store_.count(samples.bucket[p]), false);
-        bucket[samples.number[p]] = true;
-        ++sparse_;
+        include(alone, store_, samples.bucket[p], samples.number[p]);
+        ++alone_;
       }
     }
   }
-  return sparse;
+  return alone;
+}
+
+void StraySweep::judge_clutter(double reach, const RunContext& run) {
+  if (!are_many(far_samples_, store_)) return;
+  const KeepMasks clutter = find_clutter(store_, far_, reach, run);
+  for (std::uint32_t bucket = 0; bucket < clutter.size(); ++bucket) {
+    for (std::uint32_t number = 0; number < clutter[bucket].size(); ++number) {
+      if (clutter[bucket][number] && masks_[bucket][number]) drop(bucket, number, kIsOffSurface);
+    }
+  }
 }
 
 void StraySweep::drop(std::uint32_t bucket, std::uint32_t number, std::uint8_t verdict) {
@@ -158,19 +176,22 @@ void StraySweep::drop(std::uint32_t bucket, std::uint32_t number, std::uint8_t v
 
 StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, SampleNormals normals, const RunContext& run,
                         Reasons* reasons) {
-  constexpr double kMostReach = 1 << 27;
   const double radius = survey_density(store, kSurveyed).median;
-  double reach = kStrayReach * radius;
+  const double first_reach = kStrayReach * radius;
+  double reach = first_reach;
   StraySweep sweep(store, masks, reasons);
   KeepMasks among = masks;
   for (int pass = 0; pass < kMostReaches; ++pass, reach *= kNextReach) {
     Measures by;
-    by.reach = static_cast<float>(std::clamp(reach, 1.0, kMostReach));
+    by.reach = usable_reach(reach);
     by.sparse = kSparse * static_cast<float>(radius);
+    by.far = kFarApart * static_cast<float>(radius);
     by.normals = normals;
     among = sweep.judge(among, by, run);
-    if (sweep.sparse() <= std::max(kFewSparse, store.total() / kRarelySparse)) break;
+    if (!are_many(sweep.alone(), store)) break;
   }
+  // Normals that were measured tell outliers by their disorder.
+  if (normals != SampleNormals::given) sweep.judge_clutter(kClutterReach * first_reach, run);
   return sweep.counts();
 }
 

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -103,6 +104,51 @@ TEST(Strays, AreToldByPositionsAloneWhereThereAreNoNormals) {
   const Dropped dropped = drop(s, 1 << 16, SampleNormals::none);
   EXPECT_LE(dropped.low, surface / 1000);
   EXPECT_GE(dropped.high, 200u);
+}
+
+// Dust whose normals agree, as those found from its positions do.
+LocalSamples plane_in_agreeing_dust() {
+  LocalSamples s;
+  add_plane(s, 150, 0, kGap, 16);
+  const std::size_t surface = s.size();
+  add_dust(s, 2000, 150, 17);
+  std::fill(s.nx.begin() + static_cast<std::ptrdiff_t>(surface), s.nx.end(), 0.0F);
+  std::fill(s.ny.begin() + static_cast<std::ptrdiff_t>(surface), s.ny.end(), 1.0F);
+  std::fill(s.nz.begin() + static_cast<std::ptrdiff_t>(surface), s.nz.end(), 0.0F);
+  return s;
+}
+
+TEST(Strays, FoundNormalsThatAgreeAreNoSurface) {
+  const LocalSamples s = plane_in_agreeing_dust();
+  const Dropped dropped = drop(s, 1 << 16, SampleNormals::found);
+  EXPECT_GE(dropped.high, 1900u);
+  EXPECT_LE(dropped.low, 5u);
+  EXPECT_LT(drop(s, 1 << 16, SampleNormals::given).high, 1000u) << "measured ones that agree are";
+}
+
+TEST(Strays, AmongDustASparseSurfaceStays) {
+  LocalSamples s = plane_in_agreeing_dust();
+  LocalSamples sheet;
+  add_plane(sheet, 40, -20, 8 * kGap, 18);
+  for (std::size_t i = 0; i < sheet.size(); ++i) {
+    s.x.push_back(sheet.x[i]);
+    s.y.push_back(sheet.y[i]);
+    s.z.push_back(sheet.z[i]);
+    s.nx.push_back(0);
+    s.ny.push_back(1);
+    s.nz.push_back(0);
+  }
+  const Dropped dropped = drop(s, 1 << 16, SampleNormals::found);
+  EXPECT_GE(dropped.high, 1900u);
+  EXPECT_LE(dropped.low, 16u) << "of 1600";
+}
+
+TEST(Strays, ClutterDoesNotDependOnHowTheStoreIsCut) {
+  const LocalSamples s = plane_in_agreeing_dust();
+  const Dropped a = drop(s, 1 << 14, SampleNormals::found);
+  const Dropped b = drop(s, 1 << 20, SampleNormals::found);
+  EXPECT_EQ(a.high, b.high);
+  EXPECT_EQ(a.low, b.low);
 }
 
 TEST(Strays, ASparseSurfaceBesideADenseOneIsNoStray) {

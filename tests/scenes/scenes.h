@@ -54,6 +54,7 @@ inline std::vector<Scene> all_scenes(int resolution) {
       {"KnotWithoutNormals", knot_truth, ball, kMild, true},
       {"KnotBadlyScanned", knot_truth, ball, kBad},
       {"KnotInDust", knot_truth, ball, kDusty},
+      {"KnotInDustWithoutNormals", knot_truth, ball, kDusty, true},
       {"KnotVeryNoisy", knot_truth, ball, kNoisy},
       {"KnotFromOneSide", knot_truth, {ball[2]}, kStray},
       {"Facade", facade_truth, street_views(resolution), kStray},
