@@ -41,10 +41,28 @@ Around around_of(const Placed& s, std::size_t place, const Company& company) {
   return at;
 }
 
+/// The normal of a sample's surface. One that was found is its own and its neighbours', half and half: it comes from so
+/// few positions that their noise turns it.
+std::array<float, 3> normal_at(const Placed& s, std::size_t place, const Company& company, SampleNormals normals) {
+  const std::array<float, 3> own{s.nx[place], s.ny[place], s.nz[place]};
+  if (normals == SampleNormals::given) return own;
+  const auto all = static_cast<float>(company.count);
+  std::array<float, 3> sum{all * own[0], all * own[1], all * own[2]};
+  for (std::size_t i = 0; i < company.count; ++i) {
+    const std::size_t n = company.places[i];
+    const std::array<float, 3> its{s.nx[n], s.ny[n], s.nz[n]};
+    const float way = own[0] * its[0] + own[1] * its[1] + own[2] * its[2] < 0 ? -1.0F : 1.0F;
+    for (std::size_t k = 0; k < 3; ++k) sum[k] += way * its[k];
+  }
+  const float length = std::sqrt(sum[0] * sum[0] + sum[1] * sum[1] + sum[2] * sum[2]);
+  return {sum[0] / length, sum[1] / length, sum[2] / length};
+}
+
 }  // namespace
 
-bool is_off_surface(const Placed& s, std::size_t place, const Company& company, float least) {
+bool is_off_surface(const Placed& s, std::size_t place, const Company& company, float least, SampleNormals normals) {
   if (company.count == 0) return true;
+  const std::array<float, 3> normal = normal_at(s, place, company, normals);
   std::array<float, kStrayNeighbours> off;
   float farthest2 = 0;
   for (std::size_t i = 0; i < company.count; ++i) {
@@ -52,7 +70,7 @@ bool is_off_surface(const Placed& s, std::size_t place, const Company& company, 
     const auto dx = static_cast<float>(s.x[n] - s.x[place]);
     const auto dy = static_cast<float>(s.y[n] - s.y[place]);
     const auto dz = static_cast<float>(s.z[n] - s.z[place]);
-    off[i] = std::abs(dx * s.nx[place] + dy * s.ny[place] + dz * s.nz[place]);
+    off[i] = std::abs(dx * normal[0] + dy * normal[1] + dz * normal[2]);
     farthest2 = std::max(farthest2, dx * dx + dy * dy + dz * dz);
   }
   const float limit = kNearPlane * std::sqrt(farthest2);
@@ -63,7 +81,7 @@ bool is_off_surface(const Placed& s, std::size_t place, const Company& company, 
   std::array<float, 3> mean{};  // of all neighbours' normals
   for (std::size_t i = 0; i < company.count; ++i) {
     const std::size_t n = company.places[i];
-    const float cosine = s.nx[n] * s.nx[place] + s.ny[n] * s.ny[place] + s.nz[n] * s.nz[place];
+    const float cosine = s.nx[n] * normal[0] + s.ny[n] * normal[1] + s.nz[n] * normal[2];
     exact += off[i] <= exact_limit && cosine > kSameWay ? 1 : 0;
     along += off[i] <= limit && cosine > kAlongSurface ? 1 : 0;
     against += off[i] <= limit && cosine < -kAlongSurface ? 1 : 0;

@@ -15,8 +15,9 @@ void find_doubtful(const Placed& s, const SampleLeaf& leaf, std::uint8_t* doubtf
 /// All of them may be. Neighbourhoods::LeafTest.
 void doubt_all(const Placed& s, const SampleLeaf& leaf, std::uint8_t* doubtful);
 
-/// Whether fewer than `least` of the company lie on the surface of a sample, and too few exactly.
-bool is_off_surface(const Placed& s, std::size_t place, const Company& company, float least);
+/// Whether fewer than `least` of the company lie on the surface of a sample, and too few exactly. Not for
+/// SampleNormals::none.
+bool is_off_surface(const Placed& s, std::size_t place, const Company& company, float least, SampleNormals normals);
 /// The same by positions alone: its surface is the plane that its company lies along.
 bool is_off_plane(const Placed& s, std::size_t place, const Company& company, float least);
 

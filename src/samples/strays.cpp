@@ -73,7 +73,7 @@ void judge_places(const Neighbourhoods& around, const Measures& by, float margin
     if (known.distance[p] > by.sparse) known.scatter[p] = scatter_of(samples, p, company_of(known, p), by.normals);
   });
   const auto is_off = [&](std::size_t p, const Company& company, float least) {
-    return by.normals != SampleNormals::none ? is_off_surface(samples, p, company, least)
+    return by.normals != SampleNormals::none ? is_off_surface(samples, p, company, least, by.normals)
                                              : is_off_plane(samples, p, company, least);
   };
   for_places([&](std::size_t p) {

@@ -126,6 +126,23 @@ TEST(Strays, FoundNormalsThatAgreeAreNoSurface) {
   EXPECT_LT(drop(s, 1 << 16, SampleNormals::given).high, 1000u) << "measured ones that agree are";
 }
 
+TEST(Strays, AFoundNormalThatIsOffMakesNoStray) {
+  LocalSamples s;
+  add_plane(s, 100, 0, kGap, 19);
+  std::mt19937 random(20);
+  std::uniform_real_distribution<float> turn(0, 6.2831853F);
+  for (std::size_t i = 0; i < s.size(); i += 10) {
+    const float by = turn(random);
+    s.nx[i] = 0.985F * std::cos(by);  // 80 degrees off
+    s.ny[i] = 0.174F;
+    s.nz[i] = 0.985F * std::sin(by);
+  }
+  const auto given = drop(s, 1 << 16, SampleNormals::given).counts.all();
+  const auto found = drop(s, 1 << 16, SampleNormals::found).counts.all();
+  EXPECT_GT(given, 300u) << "of 1000 that are off";
+  EXPECT_LT(found, given / 10);
+}
+
 TEST(Strays, AmongDustASparseSurfaceStays) {
   LocalSamples s = plane_in_agreeing_dust();
   LocalSamples sheet;

@@ -30,8 +30,8 @@ const std::map<std::string, MeshQuality> kLimits{
   {"KnotWithoutNormals", {  0.19,   0.03,    0.04, 1.05,    0.03,     9.5,   11.5,  2,   0.02, 0.03,  18,   1.3,   12,   0}},
   {"KnotBadlyScanned",   {  0.55,   0.5,     0.18, 1.05,    0.15,    20.5,   27.2,  3,   0.4,  0.19,  13,   1.32, 14.5,   0}},
   {"KnotInDust",         {  0.2,    0.06,    0.06, 1.05,    0.05,    10.5,   10.4,  2,   0.02, 0.03,  14,   1.3,   12,   0}},
-  // A sheet or two of dust beside the tube stay; without find_clutter() the error is 22.8 and 37 % are invented.
-  {"KnotInDustWithoutNormals", { 0.7, 0.06,  1.4,  1.05,    2.1,     10.5,   15,  5,   0.02, 0.7,  16,   1.45,   22,   0}},
+  // Sheets of dust beside the tube stay; without find_clutter() the error is 22.8 and 37 % are invented.
+  {"KnotInDustWithoutNormals", { 0.9, 0.06,  2.5,  1.05,    4,       11,     18,  6,   0.02, 1.1,  16,   1.45,   25,   0}},
   // Two wide gaps are bridged.
   {"KnotVeryNoisy",      {  0.68,   1.9,     1.3,  1.05,    0.35,    28,     42,   3,   0.1,  0.4,   10,   1.45,   26,   0}},
   {"KnotFromOneSide",    {  0.11,   0.95,    0.17, 1.0,     0.2,     12.5,     18, 10,   1,    0.1,   11,   1.12,  8.5,   0}},
