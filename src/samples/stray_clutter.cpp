@@ -109,27 +109,32 @@ class ClutterSweep {
   ClutterSweep(const SlabStore& store, const KeepMasks& among, double reach, const RunContext& run)
       : store_(store), among_(among), reach_(usable_reach(reach)), run_(run) {}
 
-  /// Adds what is clutter by itself. Returns those without a dozen, and how many they are.
-  std::pair<KeepMasks, std::uint64_t> add(KeepMasks& clutter) const {
-    std::pair<KeepMasks, std::uint64_t> alone{KeepMasks(among_.size()), 0};
+  struct Found {
+    std::uint64_t clutter = 0;  ///< samples added
+    KeepMasks alone;            ///< without a dozen within reach
+    std::uint64_t alone_count = 0;
+  };
+  /// Adds what is clutter by itself.
+  Found add(KeepMasks& clutter) const {
+    Found found;
+    found.alone.resize(among_.size());
     // The thickness of the dozens of those in the dozens of a slab's dozens.
     for_slabs(2, [&](const Neighbourhoods& around, const Dozens& dozens, const Figures& thickness) {
       const Placed& samples = around.samples();
       const Figures mean = averaged(dozens, averaged(dozens, thickness));
       for (std::size_t p = 0; p < samples.size(); ++p) {
         if (!around.is_own(p)) continue;
-        if (mean[p] > kClutter) include(clutter, store_, samples.bucket[p], samples.number[p]);
-        if (dozens.is_whole(p)) continue;
-        include(alone.first, store_, samples.bucket[p], samples.number[p]);
-        ++alone.second;
+        if (mean[p] > kClutter && include(clutter, store_, samples.bucket[p], samples.number[p])) ++found.clutter;
+        if (!dozens.is_whole(p) && include(found.alone, store_, samples.bucket[p], samples.number[p]))
+          ++found.alone_count;
       }
     });
-    return alone;
+    return found;
   }
 
   /// Adds what lies among clutter: where the box of outliers ends their dozens are flatter. Returns how many it has
   /// added.
-  std::size_t grow(KeepMasks& clutter) const {
+  std::uint64_t grow(KeepMasks& clutter) const {
     std::vector<std::pair<std::uint32_t, std::uint32_t>> more;
     for_slabs(1, [&](const Neighbourhoods& around, const Dozens& dozens, const Figures& thickness) {
       const Placed& samples = around.samples();
@@ -175,11 +180,10 @@ KeepMasks find_clutter(const SlabStore& store, const KeepMasks& far, double reac
   KeepMasks among = far;
   for (int pass = 0; pass < kMostReaches; ++pass, reach *= kNextReach) {
     const ClutterSweep sweep(store, among, reach, run);
-    auto [alone, count] = sweep.add(clutter);
-    for (int round = 0; round < kMostRounds && sweep.grow(clutter) > 0; ++round) {
-    }
-    if (!are_many(count, store)) break;
-    among = std::move(alone);
+    ClutterSweep::Found found = sweep.add(clutter);
+    for (int round = 0; round < kMostRounds && found.clutter > 0; ++round) found.clutter = sweep.grow(clutter);
+    if (!are_many(found.alone_count, store)) break;
+    among = std::move(found.alone);
   }
   return clutter;
 }

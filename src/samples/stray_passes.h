@@ -3,6 +3,7 @@
 #pragma once
 #include <algorithm>
 #include <cstdint>
+#include <vector>
 
 #include "samples/cleaning.h"
 #include "store/slab_store.h"
@@ -25,10 +26,13 @@ inline bool are_many(std::uint64_t sparse, const SlabStore& store) {
   return sparse > std::max<std::uint64_t>(kStrayNeighbours, store.total() / kRarelySparse);
 }
 
-/// Makes a sample one of those that are meant.
-inline void include(KeepMasks& masks, const SlabStore& store, std::uint32_t bucket, std::uint32_t number) {
-  masks[bucket].resize(store.count(bucket), false);
-  masks[bucket][number] = true;
+/// Makes a sample one of those that are meant; false where it is already.
+inline bool include(KeepMasks& masks, const SlabStore& store, std::uint32_t bucket, std::uint32_t number) {
+  std::vector<bool>& mask = masks[bucket];
+  mask.resize(store.count(bucket), false);
+  if (mask[number]) return false;
+  mask[number] = true;
+  return true;
 }
 
 }  // namespace lamina

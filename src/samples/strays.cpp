@@ -67,6 +67,7 @@ void judge_places(const Neighbourhoods& around, const Measures& by, float margin
   known.distance.assign(samples.size(), -1);
   for_places([&](std::size_t p) {
     if (known.count[p] > 0) known.distance[p] = mean_distance(samples, p, company_of(known, p), by.reach);
+    if (known.distance[p] < 0 || known.distance[p] > by.far) known.far[p] = 1;
   });
   known.scatter.assign(samples.size(), -1);
   for_places([&](std::size_t p) {
@@ -76,9 +77,6 @@ void judge_places(const Neighbourhoods& around, const Measures& by, float margin
     return by.normals != SampleNormals::none ? is_off_surface(samples, p, company, least, by.normals)
                                              : is_off_plane(samples, p, company, least);
   };
-  for_places([&](std::size_t p) {
-    if (known.distance[p] < 0 || known.distance[p] > by.far) known.far[p] = 1;
-  });
   std::vector<std::uint8_t> verdicts = known.stray;
   for_places([&](std::size_t p) {
     if (known.suspect[p] == kClear || !around.is_near(p, margin)) return;
@@ -116,7 +114,7 @@ class StraySweep {
   KeepMasks& masks_;
   Reasons* reasons_;
   StrayCounts counts_;
-  KeepMasks far_;  ///< of all passes, whether they stay or not
+  KeepMasks far_;  ///< those that may be clutter, of all passes, whether they stay or not
   std::uint64_t far_samples_ = 0;
   std::uint64_t alone_ = 0;
 };
@@ -124,6 +122,8 @@ class StraySweep {
 KeepMasks StraySweep::judge(const KeepMasks& among, const Measures& by, const RunContext& run) {
   KeepMasks alone(among.size());
   alone_ = 0;
+  // Normals that were measured tell outliers by their disorder.
+  const bool may_be_clutter = by.normals != SampleNormals::given;
   Neighbourhoods around(store_, among, by.reach, by.normals != SampleNormals::none ? find_doubtful : doubt_all);
   Surroundings known;
   while (around.advance()) {
@@ -138,10 +138,8 @@ KeepMasks StraySweep::judge(const KeepMasks& among, const Measures& by, const Ru
     const Placed& samples = around.samples();
     for (std::size_t p = 0; p < samples.size(); ++p) {
       if (!around.is_own(p) || known.suspect[p] == kClear) continue;
-      if (known.far[p] != 0) {
-        include(far_, store_, samples.bucket[p], samples.number[p]);
+      if (may_be_clutter && known.far[p] != 0 && include(far_, store_, samples.bucket[p], samples.number[p]))
         ++far_samples_;
-      }
       if (known.stray[p] != kStays) {
         drop(samples.bucket[p], samples.number[p], known.stray[p]);
       } else if (company_of(known, p).count < kStrayNeighbours) {
@@ -190,8 +188,7 @@ StrayCounts drop_strays(const SlabStore& store, KeepMasks& masks, SampleNormals 
     among = sweep.judge(among, by, run);
     if (!are_many(sweep.alone(), store)) break;
   }
-  // Normals that were measured tell outliers by their disorder.
-  if (normals != SampleNormals::given) sweep.judge_clutter(kClutterReach * first_reach, run);
+  sweep.judge_clutter(kClutterReach * first_reach, run);
   return sweep.counts();
 }
 

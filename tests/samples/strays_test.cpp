@@ -126,6 +126,12 @@ TEST(Strays, FoundNormalsThatAgreeAreNoSurface) {
   EXPECT_LT(drop(s, 1 << 16, SampleNormals::given).high, 1000u) << "measured ones that agree are";
 }
 
+TEST(Strays, ClutterGoesWhereThereAreNoNormals) {
+  const Dropped dropped = drop(plane_in_agreeing_dust(), 1 << 16, SampleNormals::none);
+  EXPECT_GE(dropped.high, 1900u);
+  EXPECT_LE(dropped.low, 25u) << "of 22,500";
+}
+
 TEST(Strays, AFoundNormalThatIsOffMakesNoStray) {
   LocalSamples s;
   add_plane(s, 100, 0, kGap, 19);
