@@ -40,7 +40,7 @@ constexpr std::string_view kPaddingStart = "comment ";
 std::string header_text(const MeshSinkSettings& settings, std::uint64_t vertices, std::uint64_t triangles,
                         std::string_view index_type, std::size_t padding) {
   std::string text = fmt::format("ply\nformat binary_little_endian 1.0\ncomment {}\n", sink_signature());
-  for (const std::string& comment : settings.comments) text += fmt::format("comment {}\n", one_line(comment));
+  for (const std::string& comment : settings.comments) text += ply_comment(comment);
   text += fmt::format("element vertex {}\n", vertices);
   const std::string_view position = settings.double_positions ? "double" : "float";
   for (const char* axis : {"x", "y", "z"}) text += fmt::format("property {} {}\n", position, axis);

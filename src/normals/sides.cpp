@@ -1,14 +1,11 @@
 #include "normals/sides.h"
 
-#include <tbb/parallel_sort.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <optional>
 #include <utility>
 
-#include "base/union_find.h"
 #include "meshes/vec3.h"
 #include "normals/directions.h"
 #include "normals/sample_window.h"
@@ -49,12 +46,15 @@ bool is_shut_in(const View& view, const View& other) {
   return view.is_closed() && other.way > kFarther * view.way;
 }
 
-/// How much a patch's front faces up, -1..1, if the sky is open above it.
-double skyward(const PatchNode& node, const Sight& s, const Vec3& up) {
-  const Vec3 outward = to_double(node.outward);
-  const double upward = dot(outward, up);
+/// How much a patch's front faces up, -1..1.
+double upwardness(const PatchNode& node, const Vec3& up) {
+  return node.area == 0 ? 0 : dot(to_double(node.outward), up) / double{node.area};
+}
+
+/// Of a patch that faces up, or down, by so much.
+bool is_open_above(const Sight& s, double upward) {
   constexpr float kHalf = 0.5F;
-  return (upward > 0 ? s.front : s.back).open < kHalf || node.area == 0 ? 0 : upward / double{node.area};
+  return (upward > 0 ? s.front : s.back).open >= kHalf;
 }
 
 /// The direction across a cloud much wider than it is high; towards the positive side of the input axis next to it.
@@ -62,8 +62,10 @@ std::optional<Vec3> flat_across(const PatchGraph& graph, const InputAxes& axes) 
   constexpr double kFlat = 0.25;  // of the variance along the shorter side
   constexpr double kWide = 0.02;
   Moments m;
-  for (std::size_t i = 1; i < graph.nodes.size(); ++i)
-    m.add(graph.nodes[i].centre, area_of(graph.nodes[i], graph.cell) / (double{graph.cell} * double{graph.cell}));
+  for (const PatchNode& node : graph.nodes) {
+    if (node.count < Occupancy::kLeastCount) continue;
+    m.add(node.centre, area_of(node, graph.cell) / (double{graph.cell} * double{graph.cell}));
+  }
   const Plane plane = fit_plane(m);
   if (!plane.valid() || plane.least > kFlat * plane.middle || plane.middle < kWide * plane.most) return {};
   const Vec3 normal = to_double(plane.normal);
@@ -87,6 +89,10 @@ bool Body::encloses() const {
   constexpr double kShut = 0.05;
   constexpr double kThin = 0.005;
   return openness() <= kOpen && std::abs(volume) > (openness() <= kShut ? kThin : kLittle) * size;
+}
+
+bool Body::is_sheet(const Vec3& across) const {
+  return openness() > kSheet && std::abs(dot(facing, across)) > kLevel * norm(facing);
 }
 
 bool is_inside_out(const Body& body) {
@@ -120,7 +126,8 @@ std::vector<Body> Sides::bodies(const std::vector<std::uint32_t>& root, const st
     body.counted += area;
     const double looked = double{looks_[i]} * area;
     body.seen += looked * sign[i] * preference(sights_[i]);
-    body.skyward += looked * sign[i] * skyward(node, sights_[i], up_);
+    const double up = upwardness(node, up_);
+    body.skyward += is_open_above(sights_[i], up) ? looked * sign[i] * up : 0;
     const bool in = is_shut_in(sights_[i].front, sights_[i].back);
     const bool out = is_shut_in(sights_[i].back, sights_[i].front);
     ((sign[i] > 0) ? body.shut_in : body.shut_out) += in ? looked : 0;
@@ -211,13 +218,45 @@ std::vector<float> Sides::votes_from_within(const Body& room, std::uint32_t room
   return votes;
 }
 
+bool Sides::seen_from_above(const std::vector<Body>& bodies, const std::vector<std::uint32_t>& root) const {
+  if (!is_level_) return false;
+  std::uint32_t widest = kFixed;  // none yet
+  for (std::uint32_t i = 1; i < bodies.size(); ++i) {
+    if (root[i] == i && (widest == kFixed || bodies[i].counted > bodies[widest].counted)) widest = i;
+  }
+  if (widest == kFixed || !bodies[widest].is_sheet(up_)) return false;
+  double all = 0;
+  double flat = 0;
+  double open = 0;
+  for (std::size_t i = 1; i < graph_.nodes.size(); ++i) {
+    const PatchNode& node = graph_.nodes[i];
+    if (looks_[i] == 0 || node.count < Occupancy::kLeastCount) continue;
+    const double area = double{looks_[i]} * area_of(node, graph_.cell);
+    const double up = upwardness(node, up_);
+    const bool steep = std::abs(up) < kUpright;
+    all += area;
+    flat += steep ? 0 : area;
+    open += !steep && is_open_above(sights_[i], up) ? area : 0;
+  }
+  constexpr double kMostWalls = 0.2;  // who stands on the ground sees more of them
+  constexpr double kBare = 0.5;       // floors lie below ceilings
+  return flat > (1 - kMostWalls) * all && open > kBare * flat;
+}
+
+std::vector<float> Sides::votes_from_above() const {
+  std::vector<float> votes(graph_.nodes.size(), 0);
+  for (std::size_t i = 1; i < votes.size(); ++i)
+    votes[i] = static_cast<float>(kFromFar * upwardness(graph_.nodes[i], up_) * graph_.nodes[i].count);
+  return votes;
+}
+
 Side Sides::choose(const Body& body) const {
   const double facing = norm(body.facing);
   const double openness = body.openness();
   const double upward = dot(body.facing, up_);
   const SignSource level = is_level_ ? SignSource::up : SignSource::unsure;
   // Ground lies open above, whatever stands on it.
-  if (openness > kSheet && std::abs(upward) > kLevel * facing) return {upward < 0, level};
+  if (body.is_sheet(up_)) return {upward < 0, level};
   if (body.encloses() && openness < kTight) return {is_inside_out(body), SignSource::outside};
   // Whatever was not seen from within faces the sky where that is open above.
   if (std::abs(body.skyward) > kClear * body.counted)
@@ -230,170 +269,6 @@ Side Sides::choose(const Body& body) const {
     if (std::abs(across) > kUpright * facing) return {across < 0, SignSource::unsure};
   }
   return {is_inside_out(body), SignSource::unsure};
-}
-
-namespace {
-
-/// Evidence between clusters, oriented by the signs so far.
-struct Evidence {
-  std::uint32_t a = 0, b = 0;
-  float sum = 0;
-  float weight = 0;  ///< sum of sizes: more than the sum's where links contradict each other
-};
-
-/// Sums what goes between the same two clusters, in a fixed order.
-void add_up(std::vector<Evidence>& evidence) {
-  tbb::parallel_sort(evidence.begin(), evidence.end(), [](const Evidence& l, const Evidence& r) {
-    if (l.a != r.a) return l.a < r.a;
-    if (l.b != r.b) return l.b < r.b;
-    if (l.sum != r.sum) return l.sum < r.sum;
-    return l.weight < r.weight;
-  });
-  std::size_t n = 0;
-  for (std::size_t i = 0; i < evidence.size();) {
-    Evidence e = evidence[i];
-    double sum = 0;
-    double weight = 0;
-    for (; i < evidence.size() && evidence[i].a == e.a && evidence[i].b == e.b; ++i) {
-      sum += double{evidence[i].sum};
-      weight += double{evidence[i].weight};
-    }
-    e.sum = static_cast<float>(sum);
-    e.weight = static_cast<float>(weight);
-    evidence[n++] = e;
-  }
-  evidence.resize(n);
-}
-
-/// With the votes of places inside a room, by node, if there are any.
-std::vector<Evidence> evidence_of(const PatchGraph& graph, const std::vector<float>& from_within = {}) {
-  std::vector<Evidence> evidence;
-  evidence.reserve(graph.edges.size());
-  for (const PatchEdge& e : graph.edges) evidence.push_back({e.a, e.b, e.agreement, std::abs(e.agreement)});
-  for (std::uint32_t i = 1; i < graph.nodes.size(); ++i) {
-    const float vote = graph.nodes[i].vote + (from_within.empty() ? 0 : from_within[i]);
-    if (vote != 0) evidence.push_back({kFixed, i, vote, std::abs(vote)});
-  }
-  add_up(evidence);
-  return evidence;
-}
-
-/// Moves the evidence from the clusters there were to those there are.
-void regroup(std::vector<Evidence>& evidence, SignedUnionFind& forest) {
-  for (Evidence& e : evidence) {
-    const std::uint32_t a = forest.find(e.a);
-    const std::uint32_t b = forest.find(e.b);
-    const int sign = forest.sign(e.a) * forest.sign(e.b);
-    e = {std::min(a, b), std::max(a, b), sign < 0 ? -e.sum : e.sum, e.weight};
-  }
-  std::erase_if(evidence, [](const Evidence& e) { return e.a == e.b || e.weight == 0; });
-  add_up(evidence);
-}
-
-/// Joins clusters until none has anything to say to another, where the sum is at least this share of the weight.
-void grow_forest(std::vector<Evidence>& evidence, float least_share, SignedUnionFind& forest, std::size_t nodes) {
-  constexpr std::size_t kNothing = ~std::size_t{0};
-  std::vector<std::size_t> best(nodes);
-  for (bool joined = true; joined;) {
-    std::fill(best.begin(), best.end(), kNothing);
-    const auto offer = [&](std::uint32_t cluster, std::size_t i) {
-      // The fixed node waits to be asked: its ties are many, and none is urgent.
-      if (cluster == kFixed) return;
-      std::size_t& now = best[cluster];
-      if (now == kNothing || std::abs(evidence[i].sum) > std::abs(evidence[now].sum)) now = i;
-    };
-    for (std::size_t i = 0; i < evidence.size(); ++i) {
-      const Evidence& e = evidence[i];
-      if (e.sum == 0 || std::abs(e.sum) < least_share * e.weight) continue;
-      offer(e.a, i);
-      offer(e.b, i);
-    }
-    joined = false;
-    for (const std::size_t i : best) {
-      if (i == kNothing) continue;
-      const Evidence& e = evidence[i];
-      joined = forest.unite(e.a, e.b, static_cast<std::int8_t>(e.sum > 0 ? 1 : -1)) || joined;
-    }
-    if (joined) regroup(evidence, forest);
-  }
-}
-
-void read_forest(SignedUnionFind& forest, std::vector<std::uint32_t>& root, PatchSigns& signs) {
-  for (std::uint32_t i = 0; i < root.size(); ++i) {
-    root[i] = forest.find(i);
-    signs.sign[i] = forest.sign(i);
-  }
-}
-
-}  // namespace
-
-PatchSigns find_signs(const PatchGraph& graph, const InputAxes& axes) {
-  constexpr float kAgreed = 0.2F;  // share of evidence between clusters that do not contradict each other
-  const std::size_t n = graph.nodes.size();
-  PatchSigns signs{std::vector<std::int8_t>(n, 1), std::vector<SignSource>(n, SignSource::fixed), 0};
-  SignedUnionFind forest(n);
-  std::vector<Evidence> evidence = evidence_of(graph);
-  grow_forest(evidence, kAgreed, forest, n);
-  std::vector<std::uint32_t> root(n);
-  read_forest(forest, root, signs);
-  std::vector<std::uint8_t> open(n, 0);
-  for (std::uint32_t i = 1; i < n; ++i) open[i] = root[i] != kFixed ? 1 : 0;
-  const Sides sides(graph, axes, choose_looks(root));
-  std::vector<Body> bodies = sides.bodies(root, signs.sign);
-  if (const auto room = sides.find_room(bodies, root, signs.sign)) {
-    evidence = evidence_of(graph, sides.votes_from_within(bodies[*room], *room, root, signs.sign));
-    forest = SignedUnionFind(n);
-    grow_forest(evidence, kAgreed, forest, n);
-    read_forest(forest, root, signs);
-    bodies = sides.bodies(root, signs.sign);
-  }
-  for (std::uint32_t i = 1; i < n; ++i) {
-    if (open[i] == 0) continue;
-    signs.source[i] = root[i] == kFixed ? SignSource::inside : sides.choose(bodies[root[i]]).source;
-  }
-  // Bodies that pass through each other, as a handle through a wall, say nothing of each other: each has its own side.
-  // Scraps that noise has cut off are none.
-  constexpr std::uint64_t kShare = 200;
-  std::uint64_t samples = 0;
-  for (const PatchNode& node : graph.nodes) samples += node.count;
-  for (std::uint32_t i = 1; i < n; ++i) {
-    if (root[i] != i || i == kFixed || bodies[i].samples < samples / kShare) continue;
-    const Side side = sides.choose(bodies[i]);
-    if (side.source == SignSource::unsure) continue;
-    ++signs.components;
-    forest.unite(kFixed, i, static_cast<std::int8_t>(side.turn ? -1 : 1));
-  }
-  regroup(evidence, forest);
-  grow_forest(evidence, 0, forest, n);
-  const bool any_fixed = std::any_of(root.begin() + 1, root.end(), [](std::uint32_t r) { return r == kFixed; });
-  signs.components += any_fixed ? 1 : 0;
-
-  read_forest(forest, root, signs);
-  bodies = sides.bodies(root, signs.sign);
-  for (std::uint32_t i = 1; i < n; ++i) {
-    if (root[i] == kFixed) continue;
-    const Body& body = bodies[root[i]];
-    signs.components += root[i] == i ? 1 : 0;
-    const Side side = sides.choose(body);
-    if (side.turn) signs.sign[i] = static_cast<std::int8_t>(-signs.sign[i]);
-    signs.source[i] = side.source;
-  }
-  return signs;
-}
-
-std::vector<SignConflicts> count_conflicts(const PatchGraph& graph, const PatchSigns& signs) {
-  std::vector<SignConflicts> slabs;
-  std::size_t e = 0;
-  for (const SlabLinks& slab : graph.slabs) {
-    SignConflicts c{slab.same + slab.opposite, slab.opposite};
-    for (; e < slab.edge_end; ++e) {
-      const PatchEdge& edge = graph.edges[e];
-      c.pairs += std::uint64_t{edge.same} + edge.opposite;
-      c.conflicts += signs.sign[edge.a] == signs.sign[edge.b] ? edge.opposite : edge.same;
-    }
-    slabs.push_back(c);
-  }
-  return slabs;
 }
 
 }  // namespace lamina::normals

@@ -84,12 +84,18 @@ struct SeenFrom {
 /// Where the parts of an input were seen from, as its file or the settings say; rows ascending.
 std::vector<SeenFrom> scanners_of(const PointSourceInfo& info, const NormalsSettings& settings);
 
+/// From the air all is seen by the same angle, and what links say between crowns and what lies below them is often
+/// wrong: a sample's vote counts for so many links. With one, a twentieth of a town's samples face down, with more than
+/// four hardly fewer do.
+inline constexpr double kFromFar = 4;
+
 class Viewpoints {
  public:
   /// `everywhere`: of rows that `by_row` (ascending) knows nothing about; each sample takes the nearest.
   Viewpoints(const std::vector<Viewpoint>& everywhere, const std::vector<SeenFrom>& by_row, const Frame& frame);
   [[nodiscard]] bool any() const { return any_; }
-  /// Cosine between the normal and the line of sight to the viewer, 0 where nothing is known. Steps of the frame.
+  /// Cosine between the normal and the line of sight to the viewer, kFromFar times that where the viewer is far away; 0
+  /// where nothing is known. Steps of the frame.
   [[nodiscard]] float vote(std::uint64_t row, const std::array<std::int32_t, 3>& at,
                            const std::array<float, 3>& normal) const;
 
@@ -115,9 +121,11 @@ class Occupancy {
  public:
   /// What lies nearer to a patch than so many cubes may be its own surface.
   static constexpr double kClear = 1.8;
+  /// Patches of fewer samples are strays that hide nothing.
+  static constexpr std::uint32_t kLeastCount = 4;
 
-  /// Cubes have the size of the graph's cells, or more where these would be too many. Patches of a few samples are
-  /// strays that hide nothing. Empty where the cells have no size.
+  /// Cubes have the size of the graph's cells, or more where these would be too many. Empty where the cells have no
+  /// size.
   explicit Occupancy(const PatchGraph& graph);
 
   [[nodiscard]] bool empty() const { return taken_.empty(); }
@@ -204,6 +212,8 @@ struct Body {
   [[nodiscard]] double openness() const;
   /// Closed, and with an inside worth the name.
   [[nodiscard]] bool encloses() const;
+  /// A sheet that lies across a direction, as ground does.
+  [[nodiscard]] bool is_sheet(const std::array<double, 3>& across) const;
 };
 
 /// A side, and why.
@@ -229,6 +239,11 @@ class Sides {
   [[nodiscard]] std::vector<float> votes_from_within(const Body& room, std::uint32_t room_root,
                                                      const std::vector<std::uint32_t>& root,
                                                      const std::vector<std::int8_t>& sign) const;
+  /// Whether all was seen from above, as terrain is from the air: level ground that what stands on it hides little of,
+  /// and hardly a wall, which whoever stands on the ground sees.
+  [[nodiscard]] bool seen_from_above(const std::vector<Body>& bodies, const std::vector<std::uint32_t>& root) const;
+  /// What is seen from above faces up; in the unit of PatchNode::vote.
+  [[nodiscard]] std::vector<float> votes_from_above() const;
   /// Of a body that no link joins to a side.
   [[nodiscard]] Side choose(const Body& body) const;
 

@@ -59,33 +59,34 @@ float Viewpoints::vote(std::uint64_t row, const std::array<std::int32_t, 3>& at,
     return std::array<double, 3>{from.at[0] - at[0], from.at[1] - at[1], from.at[2] - at[2]};
   };
   const auto squared = [](const std::array<double, 3>& d) { return d[0] * d[0] + d[1] * d[1] + d[2] * d[2]; };
-  std::array<double, 3> line{};
+  const Local* from = nullptr;
   const auto rows =
       std::upper_bound(by_row_.begin(), by_row_.end(), row, [](std::uint64_t r, const Rows& s) { return r < s.first; });
   if (rows != by_row_.begin() && std::prev(rows)->known) {
-    line = sight(std::prev(rows)->viewpoint);
+    from = &std::prev(rows)->viewpoint;
   } else {
     double nearest = 0;
-    for (const Local& from : everywhere_) {
-      const std::array<double, 3> d = sight(from);
-      const double d2 = squared(d);
-      if (&from != everywhere_.data() && !(d2 < nearest)) continue;
+    for (const Local& place : everywhere_) {
+      const double d2 = squared(sight(place));
+      if (from != nullptr && !(d2 < nearest)) continue;
       nearest = d2;
-      line = d;
+      from = &place;
     }
   }
+  if (from == nullptr) return 0;
+  const std::array<double, 3> line = sight(*from);
   const double length = std::sqrt(squared(line));
   if (!(length > 0)) return 0;
-  return static_cast<float>((line[0] * normal[0] + line[1] * normal[1] + line[2] * normal[2]) / length);
+  const double cosine = (line[0] * normal[0] + line[1] * normal[1] + line[2] * normal[2]) / length;
+  return static_cast<float>(from->direction ? kFromFar * cosine : cosine);
 }
 
 namespace {
 
 using meshes::Vec3;
 
-constexpr std::size_t kMostCubes = 256;   ///< along an axis: two million bytes
-constexpr std::size_t kMargin = 3;        ///< empty cubes around all
-constexpr std::uint32_t kLeastCount = 4;  ///< samples of a patch that can hide something
+constexpr std::size_t kMostCubes = 256;  ///< along an axis: two million bytes
+constexpr std::size_t kMargin = 3;       ///< empty cubes around all
 constexpr double kFar = std::numeric_limits<double>::max();
 
 std::ptrdiff_t whole(double v) {

@@ -88,6 +88,11 @@ class PcdHeaderParser {
     } else if (keyword == "VIEWPOINT") {
       const std::vector<std::string_view> none{"0", "0", "0", "1", "0", "0", "0"};
       header_.has_viewpoint = words_ != none;
+      const auto is_zero = [](std::string_view word) {
+        double value = 1;
+        return is_number(word, value) && value == 0;
+      };
+      header_.is_moved = words_.size() < 3 || !std::all_of(words_.begin(), words_.begin() + 3, is_zero);
     } else if (keyword != "VERSION") {
       fail(fmt::format("{} is no keyword of a PCD header", quoted_word(keyword)));
     }

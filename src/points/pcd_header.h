@@ -28,6 +28,7 @@ struct PcdHeader {
   std::uint64_t lines = 0;     ///< lines of the header
   std::uint64_t width = 0;     ///< of an organised cloud: points in a line; 0: not organised
   bool has_viewpoint = false;  ///< a VIEWPOINT other than 0 0 0 1 0 0 0
+  bool is_moved = false;       ///< its place is another one than 0 0 0
 
   [[nodiscard]] std::size_t point_bytes() const;  ///< in binary data
 };

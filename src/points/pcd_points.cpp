@@ -272,8 +272,9 @@ std::unique_ptr<PointSource> open_pcd(InputFile file, const std::string& path, c
   info.path = path;
   info.count = header.points;
   remark(header, file.name, info);
-  // An organised cloud is a sensor's picture, taken from where its coordinates begin unless VIEWPOINT says otherwise.
-  if (header.width > 0 && !header.has_viewpoint) info.scans = {{0, ScanPart::Scanner::position, {0, 0, 0}}};
+  // An organised cloud is a sensor's picture, taken from where its coordinates begin unless VIEWPOINT has another
+  // place.
+  if (header.width > 0 && !header.is_moved) info.scans = {{0, ScanPart::Scanner::position, {0, 0, 0}}};
   std::unique_ptr<PointSource> source = open_encoded(std::move(file), header, std::move(info), tmp_dir);
   // Rows are known to be there by now; all places have one, of which some are not finite.
   if (header.width == 0 || source->info().count != header.points) return source;

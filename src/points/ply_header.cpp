@@ -13,6 +13,8 @@
 namespace lamina {
 namespace {
 
+constexpr std::string_view kGoesOn = "+";  ///< begins a comment that the one before goes on in
+
 constexpr std::size_t kLongestHeader = 1 << 20;
 
 /// The line's next word, taken from it; empty at its end.
@@ -51,7 +53,7 @@ class PlyHeaderParser {
         if (!has_format_) fail("the header ends without a format line");
         return std::move(header_);
       } else if (keyword == "comment") {
-        if (word() == "crs") header_.crs = trimmed(line_);
+        comment();
       } else if (!keyword.empty() && keyword != "obj_info") {
         fail(fmt::format("{} is no keyword of a PLY header", quoted_word(keyword)));
       }
@@ -87,6 +89,17 @@ class PlyHeaderParser {
   void end_of_line() {
     if (const std::string_view more = word(); !more.empty())
       fail(fmt::format("{} is too much here", quoted_word(more)));
+  }
+
+  void comment() {
+    const std::string_view kind = word();
+    if (kind == "crs") {
+      header_.crs = trimmed(line_);
+      crs_line_ = header_.lines;
+    } else if (kind == kGoesOn && crs_line_ > 0 && crs_line_ + 1 == header_.lines) {
+      header_.crs += trimmed(line_);
+      crs_line_ = header_.lines;
+    }
   }
 
   void format() {
@@ -155,6 +168,7 @@ class PlyHeaderParser {
   std::string_view line_;
   PlyHeader header_;
   bool has_format_ = false;
+  std::uint64_t crs_line_ = 0;  ///< the last one of a crs, from 1; 0: none so far
 };
 
 }  // namespace
@@ -196,6 +210,24 @@ std::string one_line(std::string text) {
   std::replace_if(
       text.begin(), text.end(), [](unsigned char c) { return std::iscntrl(c) != 0; }, ' ');
   return text;
+}
+
+std::string ply_comment(std::string_view text) {
+  constexpr std::size_t kLongest = 240;
+  const std::string all = one_line(std::string(text));
+  // Readers drop blanks at a line's ends, and take a byte that begins with 10 for part of the character before.
+  const auto can_end = [&](std::size_t at) {
+    return all[at - 1] != ' ' && all[at] != ' ' && (static_cast<unsigned char>(all[at]) & 0xC0U) != 0x80U;
+  };
+  std::string lines = "comment ";
+  std::size_t begin = 0;
+  while (all.size() - begin > kLongest) {
+    std::size_t end = begin + kLongest;
+    while (end > begin + 1 && !can_end(end)) --end;
+    lines += all.substr(begin, end - begin) + fmt::format("\ncomment {} ", kGoesOn);
+    begin = end;
+  }
+  return lines + all.substr(begin) + "\n";
 }
 
 PlyHeader read_ply_header(const InputFile& file) {

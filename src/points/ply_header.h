@@ -58,8 +58,13 @@ PlyHeader parse_ply_header(std::string_view text, const std::string& name);
 /// `noun`: what has the names.
 void require_ply_names(std::string_view noun, const std::vector<std::string_view>& names);
 
-/// A comment's text: line breaks and other control characters become blanks.
+/// Line breaks and other control characters become blanks.
 std::string one_line(std::string text);
+
+/// A comment as a header has it, with its line's end. A long text, as a coordinate reference system is, goes on in
+/// further lines, `comment + ...`: rply, by which Open3D and CloudCompare read, takes no line of 1024 bytes, others
+/// hold fewer.
+std::string ply_comment(std::string_view text);
 
 // The elements of a PLY as points: what its vertices' properties are to us, where the rows lie in a binary file, and
 // the grid of a range image.

@@ -251,7 +251,7 @@ class PlyPointsWriter final : public PointsWriter {
 std::string ply_points_header(const PointColumns& columns, const std::vector<std::string>& comments,
                               std::uint64_t count) {
   std::string text = fmt::format("ply\nformat binary_little_endian 1.0\ncomment made by lamina {}\n", version());
-  for (const std::string& comment : comments) text += fmt::format("comment {}\n", one_line(comment));
+  for (const std::string& comment : comments) text += ply_comment(comment);
   const std::string digits = fmt::format("{}", count);
   // A number that is known only at the end must not move the rows.
   const std::size_t most = std::numeric_limits<std::uint64_t>::digits10 + 1;

@@ -123,6 +123,67 @@ RC_GTEST_PROP(PatchSigns, FindHiddenSigns, ()) {
   RC_ASSERT(s.components == components);
 }
 
+constexpr int kSide = 20;  // patches along the ground of what follows
+
+/// Level ground, patch by patch, every second one as if it faced down, and links that tell.
+PatchGraph ground() {
+  PatchGraph g;
+  g.cell = 1;
+  const auto outward = [](int i) { return i % 2 == 0 ? 1.0F : -1.0F; };
+  const auto agreement = [&](int a, int b) { return 8 * outward(a) * outward(b); };
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const auto x = static_cast<float>(i % kSide);
+    const auto y = static_cast<float>(i / kSide);
+    g.nodes.push_back({20, 1, {x, y, 0}, {0, 0, outward(i)}, 0, 0});
+    const auto node = static_cast<std::uint32_t>(i + 1);
+    if (i % kSide > 0) link(g, node - 1, node, agreement(i - 1, i));
+    if (i >= kSide) link(g, node - kSide, node, agreement(i - kSide, i));
+  }
+  return g;
+}
+
+/// Crowns over a third of the ground, which say that they face down; the first of them.
+std::uint32_t add_crowns(PatchGraph& g) {
+  const auto first = static_cast<std::uint32_t>(g.nodes.size());
+  for (std::uint32_t i = 1; i <= kSide * kSide / 3; ++i) {
+    PatchNode crown = g.nodes[i];
+    crown.centre[2] = 4;
+    g.nodes.push_back(crown);
+    link(g, i, first + i - 1, -1, 0, 1);
+    if (i > 1) link(g, first + i - 2, first + i - 1, -8);
+  }
+  return first;
+}
+
+// Seen from the air all faces up, whatever links say of crowns and the ground below, and birds do not make it high.
+TEST(PatchSigns, TurnAllUpThatIsSeenFromAbove) {
+  PatchGraph g = ground();
+  const std::uint32_t crowns = add_crowns(g);
+  const auto birds = static_cast<std::uint32_t>(g.nodes.size());
+  for (int i = 0; i < 100; ++i) g.nodes.push_back({1, 50, {static_cast<float>(i % kSide), 3, 200}, {0, 0, 50}, 0, 0});
+  const PatchSigns s = find_signs(g, kAxes);
+  for (std::uint32_t i = 1; i < birds; ++i) {
+    EXPECT_GT(static_cast<float>(s.sign[i]) * g.nodes[i].outward[2], 0) << (i < crowns ? "ground " : "crown ") << i;
+    EXPECT_EQ(s.source[i], SignSource::up);
+  }
+}
+
+// Who stands on the ground sees walls, and roofs from below: what links say of them stays.
+TEST(PatchSigns, FollowLinksWhereWallsAreSeen) {
+  PatchGraph g = ground();
+  const std::uint32_t eaves = add_crowns(g);
+  const auto walls = static_cast<std::uint32_t>(g.nodes.size());
+  for (std::uint32_t i = 0; i < kSide * kSide / 2; ++i) {
+    const auto along = static_cast<float>(i % kSide);
+    const auto up = static_cast<float>(i / kSide);
+    g.nodes.push_back({20, 1, {along, -1, up}, {0, 1, 0}, 0, 0});
+    link(g, i % kSide + 1, walls + i, 8 * g.nodes[i % kSide + 1].outward[2]);
+  }
+  const PatchSigns s = find_signs(g, kAxes);
+  for (std::uint32_t i = 1; i < eaves; ++i) EXPECT_GT(static_cast<float>(s.sign[i]) * g.nodes[i].outward[2], 0);
+  for (std::uint32_t i = eaves; i < walls; ++i) EXPECT_LT(static_cast<float>(s.sign[i]) * g.nodes[i].outward[2], 0);
+}
+
 // Each patch of a small body is looked from; of a large one some, which stand for as many as there are.
 TEST(Looks, StandForAllPatchesOfTheirBody) {
   constexpr std::uint32_t kSmall = 100;

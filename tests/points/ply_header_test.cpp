@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
 
 #include <sstream>
 
@@ -99,6 +100,24 @@ TEST(PlyHeader, EndIsSoughtInTheFirstMegabyteOnly) {
   } catch (const Error& e) {
     EXPECT_THAT(e.what(), HasSubstr("long.ply: no end_header in the first 1048576 bytes"));
   }
+}
+
+// Other readers hold so many bytes of a line.
+RC_GTEST_PROP(PlyHeader, KeepsALongCrsInShortLines, ()) {
+  const auto word = rc::gen::container<std::string>(rc::gen::element<char>('a', ',', '"', '[', '+'));
+  const auto words = *rc::gen::container<std::vector<std::string>>(*rc::gen::inRange(1, 120), rc::gen::nonEmpty(word));
+  std::string crs;
+  for (const std::string& w : words) crs += (crs.empty() ? "" : " ") + w + "\u00e9";
+  const std::string comment = ply_comment("crs " + crs);
+  for (std::size_t at = 0; at < comment.size();) {
+    const std::size_t end = comment.find('\n', at);
+    RC_ASSERT(end != std::string::npos && end - at <= 256);
+    RC_ASSERT(comment.substr(at, 8) == "comment ");
+    at = end + 1;
+  }
+  RC_ASSERT(parse_ply_header("ply\nformat ascii 1.0\n" + comment + "comment -\ncomment + x\nend_header\n", "a").crs ==
+            crs);
+  RC_ASSERT(parse_ply_header("ply\nformat ascii 1.0\ncomment + x\nend_header\n", "a").crs.empty());
 }
 
 }  // namespace

@@ -87,6 +87,22 @@ TEST_F(ScanGrids, OfPcdWithPlacesThatAreNotFinite) {
   EXPECT_TRUE(grids("b.pcd", begin + "WIDTH 4\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\n" + end).empty());
 }
 
+// A picture was taken from the origin, also where its VIEWPOINT turns it, as drivers of cameras write.
+TEST_F(ScanGrids, OfPcdAreSeenFromTheOrigin) {
+  const auto has_scanner = [&](const std::string& size, const std::string& viewpoint) {
+    test::write_file(folder_ / "a.pcd", "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\n" + size +
+                                            "\nVIEWPOINT " + viewpoint +
+                                            "\nPOINTS 4\nDATA ascii\n0 0 1\n1 0 1\n1 1 1\n0 1 1\n");
+    const auto source = open_points(folder_ / "a.pcd");
+    const std::vector<ScanPart>& scans = source->info().scans;
+    return !scans.empty() && scans[0].scanner == ScanPart::Scanner::position;
+  };
+  EXPECT_TRUE(has_scanner("WIDTH 2\nHEIGHT 2", "0 0 0 1 0 0 0"));
+  EXPECT_TRUE(has_scanner("WIDTH 2\nHEIGHT 2", "0 0.0 -0 0 1 0 0"));
+  EXPECT_FALSE(has_scanner("WIDTH 2\nHEIGHT 2", "0 0 1 1 0 0 0"));
+  EXPECT_FALSE(has_scanner("WIDTH 4\nHEIGHT 1", "0 0 0 1 0 0 0"));
+}
+
 TEST_F(ScanGrids, GoThroughPosesAndJoins) {
   test::write_file(folder_ / "a.ply", std::string(kPly) + "1 0\n1 1\n0\n1 2\n0\n1 3\n");
   test::write_file(folder_ / "pose.txt", "0 -1 0 0\n1 0 0 0\n0 0 1 5\n0 0 0 1\n");
