@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <chrono>
 #include <new>
 #include <string>
@@ -55,7 +56,10 @@ std::string unknown_word(const CLI::App& app, const CLI::App& tool) {
   for (const std::string& word : app.remaining(true)) {
     if (word.size() > 1 && word.front() == '-') {
       const std::string name = word.substr(0, word.find('='));
-      return fmt::format("unknown option '{}'{}", name, suggestion(name, option_names(tool)));
+      const std::vector<std::string> known = option_names(tool);
+      if (std::find(known.begin(), known.end(), name) != known.end())
+        return fmt::format("option '{0}' comes behind the tool: lamina {1} {0} ...", name, tool.get_name());
+      return fmt::format("unknown option '{}'{}", name, suggestion(name, known));
     }
     if (&tool == &app) {
       return fmt::format("unknown tool '{}'{}", word, suggestion(word, tool_names(app)));

@@ -127,6 +127,8 @@ TEST(Help, HiddenToolsAreNotShown) {
   EXPECT_THAT(help, testing::Not(HasSubstr("completion")));
   EXPECT_THAT(run_lamina({"clipp"}).err, HasSubstr("did you mean 'clip'?"));
   EXPECT_THAT(run_lamina({"sort", "--atribute", "x"}).err, HasSubstr("did you mean '--attribute'?"));
+  EXPECT_THAT(run_lamina({"--size", "4x4", "render", "x.ply"}).err,
+              HasSubstr("option '--size' comes behind the tool: lamina render --size ..."));
 }
 
 TEST(Help, FiveToolsInOnePipe) {
