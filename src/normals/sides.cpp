@@ -220,11 +220,15 @@ std::vector<float> Sides::votes_from_within(const Body& room, std::uint32_t room
 
 bool Sides::seen_from_above(const std::vector<Body>& bodies, const std::vector<std::uint32_t>& root) const {
   if (!is_level_) return false;
-  std::uint32_t widest = kFixed;  // none yet
-  for (std::uint32_t i = 1; i < bodies.size(); ++i) {
-    if (root[i] == i && (widest == kFixed || bodies[i].counted > bodies[widest].counted)) widest = i;
+  double cloud = 0;
+  double ground = 0;
+  for (std::uint32_t i = 0; i < bodies.size(); ++i) {
+    if (root[i] != i) continue;
+    cloud += bodies[i].counted;
+    ground += i != kFixed && bodies[i].is_sheet(up_) ? bodies[i].counted : 0;
   }
-  if (widest == kFixed || !bodies[widest].is_sheet(up_)) return false;
+  constexpr double kMost = 0.5;
+  if (ground <= kMost * cloud) return false;
   double all = 0;
   double flat = 0;
   double open = 0;
@@ -243,10 +247,12 @@ bool Sides::seen_from_above(const std::vector<Body>& bodies, const std::vector<s
   return flat > (1 - kMostWalls) * all && open > kBare * flat;
 }
 
-std::vector<float> Sides::votes_from_above() const {
-  std::vector<float> votes(graph_.nodes.size(), 0);
-  for (std::size_t i = 1; i < votes.size(); ++i)
-    votes[i] = static_cast<float>(kFromFar * upwardness(graph_.nodes[i], up_) * graph_.nodes[i].count);
+std::vector<float> Sides::votes_from_above(const std::vector<std::uint32_t>& root) const {
+  std::vector<float> votes(root.size(), 0);
+  for (std::size_t i = 1; i < root.size(); ++i) {
+    if (root[i] != kFixed)
+      votes[i] = static_cast<float>(kFromFar * upwardness(graph_.nodes[i], up_) * graph_.nodes[i].count);
+  }
   return votes;
 }
 

@@ -114,7 +114,7 @@ Place find_place(const Sides& sides, const std::vector<Body>& bodies, const std:
                  const std::vector<std::int8_t>& sign) {
   if (const auto room = sides.find_room(bodies, root, sign))
     return {sides.votes_from_within(bodies[*room], *room, root, sign), SignSource::inside};
-  if (sides.seen_from_above(bodies, root)) return {sides.votes_from_above(), SignSource::up};
+  if (sides.seen_from_above(bodies, root)) return {sides.votes_from_above(root), SignSource::up};
   return {};
 }
 

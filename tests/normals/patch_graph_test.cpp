@@ -2,6 +2,7 @@
 #include <rapidcheck/gtest.h>
 
 #include "base/union_find.h"
+#include "normals/sample_window.h"
 #include "normals/sides.h"
 
 namespace lamina::normals {
@@ -166,6 +167,18 @@ TEST(PatchSigns, TurnAllUpThatIsSeenFromAbove) {
     EXPECT_GT(static_cast<float>(s.sign[i]) * g.nodes[i].outward[2], 0) << (i < crowns ? "ground " : "crown ") << i;
     EXPECT_EQ(s.source[i], SignSource::up);
   }
+}
+
+// Where scanners or given normals say how most of it faces, they say it: a sheet that they do not reach follows its
+// links.
+TEST(PatchSigns, AskNotTheSkyWhereMostIsKnown) {
+  PatchGraph g = ground();
+  const std::uint32_t crowns = add_crowns(g);
+  for (std::uint32_t i = 1; i < crowns; ++i) link(g, kFixed, i, -100 * g.nodes[i].outward[2]);
+  const PatchSigns s = find_signs(g, kAxes);
+  for (std::uint32_t i = 1; i < crowns; ++i) EXPECT_LT(static_cast<float>(s.sign[i]) * g.nodes[i].outward[2], 0);
+  for (std::uint32_t i = crowns; i < g.nodes.size(); ++i)
+    EXPECT_GT(static_cast<float>(s.sign[i]) * g.nodes[i].outward[2], 0);
 }
 
 // Who stands on the ground sees walls, and roofs from below: what links say of them stays.
